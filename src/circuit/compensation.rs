@@ -1,0 +1,199 @@
+//! The bias compensation: a polynomial in the virtual thermometer by Horner's rule, subtracted from
+//! the rate (contract, step 6; seed paper, eq. 9).
+//!
+//! Two blocks: [`Bias`] depends on the thermometer alone, so that its emitted code can be compared
+//! with the model over every input code; [`Rate`] subtracts it.
+
+use crate::design::{Circuit, Compensation, CompensationInput};
+use crate::numeric::arithmetic::{Arithmetic, Block, Port};
+use crate::numeric::cast::{Cast, Label, Target};
+use crate::numeric::trace::ir::Interval;
+
+const ACCUMULATOR: Label = Label::of("compensation.accumulator");
+const OUTPUT: Label = Label::of("compensation.output");
+
+/// The polynomial's configuration.
+#[derive(Debug, Clone)]
+pub struct Bias {
+    /// Every raw input code.
+    pub input_range: Interval,
+    /// Fraction bits of the input word as it comes.
+    input_fraction_bits: i32,
+    /// The input is limited to this, raw.
+    clamp: Option<(i128, i128)>,
+    /// Subtracted from the limited input, raw.
+    offset: i128,
+    /// The input is read in another unit: its value times 2^this.
+    read_exponent: i32,
+    coefficients: Vec<i128>,
+    coefficient_fraction_bits: i32,
+    accumulator_fraction_bits: i32,
+    /// c_n * p.
+    pub first: Cast,
+    /// t * p after that.
+    pub inner: Cast,
+    /// c_k + t * p.
+    pub outer: Cast,
+    /// The polynomial's value to the output format.
+    pub output: Cast,
+    meanings: [String; 2],
+}
+
+impl Bias {
+    /// From the design's `[compensation]`.
+    pub fn new(circuit: &Circuit, compensation: &Compensation) -> Self {
+        let angle_bits = circuit.cordic.angle_bits;
+        // (raw range, fraction bits as they come, offset, exponent of the reading, in words)
+        let (input_range, input_fraction_bits, offset, read_exponent, meaning) =
+            match &compensation.input {
+                CompensationInput::Phase => (
+                    Interval::of_bits(angle_bits),
+                    angle_bits as i32,
+                    0,
+                    1,
+                    format!("phase in units of 2^-{angle_bits} turn"),
+                ),
+                CompensationInput::Channel(channel) => {
+                    let fraction_bits = channel.format.fraction_bits as i32;
+                    (
+                        Interval::new(channel.format.min_raw(), channel.format.max_raw()),
+                        fraction_bits,
+                        channel.offset_raw,
+                        fraction_bits - channel.scale_bits as i32,
+                        format!("{}, {}", channel.column, channel.format),
+                    )
+                }
+            };
+        let p = input_fraction_bits - read_exponent;
+        let coefficient = compensation.coefficient_format.fraction_bits as i32;
+        let accumulator = compensation.accumulator.format.fraction_bits as i32;
+        let last = if compensation.coefficients_raw.len() > 1 {
+            accumulator
+        } else {
+            coefficient
+        };
+        Bias {
+            input_range,
+            input_fraction_bits,
+            clamp: compensation.clamp_raw,
+            offset,
+            read_exponent,
+            coefficients: compensation.coefficients_raw.clone(),
+            coefficient_fraction_bits: coefficient,
+            accumulator_fraction_bits: accumulator,
+            first: Cast::to(ACCUMULATOR, coefficient + p, 0, compensation.accumulator),
+            inner: Cast::to(ACCUMULATOR, accumulator + p, 0, compensation.accumulator),
+            outer: Cast::to(ACCUMULATOR, accumulator, 0, compensation.accumulator),
+            output: Cast::to(OUTPUT, last, 0, compensation.output),
+            meanings: [meaning, format!("bias in deg/s, {}", compensation.output)],
+        }
+    }
+}
+
+impl<A: Arithmetic> Block<A, 1, 1> for Bias {
+    type State = ();
+    const NAME: &'static str = "bias";
+
+    fn inputs(&self) -> [Port; 1] {
+        [Port::new("thermometer", self.meanings[0].clone())]
+    }
+
+    fn outputs(&self) -> [Port; 1] {
+        [Port::new("bias", self.meanings[1].clone())]
+    }
+
+    #[inline(always)]
+    fn step(&self, ar: &A, _state: &mut (), [input]: [A::Word; 1]) -> [A::Word; 1] {
+        let limited = match self.clamp {
+            Some((low, high)) => ar.limit(input, low, high, self.input_fraction_bits),
+            None => input,
+        };
+        let from_centre = match self.offset {
+            0 => limited,
+            offset => ar.sub(limited, ar.constant(offset, self.input_fraction_bits)),
+        };
+        let p = ar.read_as(from_centre, self.read_exponent);
+
+        let (fine, coarse) = (self.accumulator_fraction_bits, self.coefficient_fraction_bits);
+        let mut orders = self.coefficients.iter().enumerate().rev();
+        let mut t = match orders.next() {
+            Some((_, highest)) => ar.constant(*highest, coarse),
+            None => ar.constant(0, coarse),
+        };
+        let highest = self.coefficients.len().saturating_sub(1);
+        for (order, coefficient) in orders {
+            let cast = if order + 1 == highest { &self.first } else { &self.inner };
+            let inner = ar.cast(ar.mul(t, p), cast, &[t, p]);
+            // Exact: the accumulator has at least the coefficients' fraction bits.
+            let c = ar.constant(coefficient << (fine - coarse), fine);
+            t = ar.cast(ar.add(c, inner), &self.outer, &[c, inner]);
+        }
+        [ar.cast(t, &self.output, &[t])]
+    }
+}
+
+/// The subtraction's configuration.
+#[derive(Debug, Clone)]
+pub struct Rate {
+    /// Every raw rate input, where it does not come from the chain.
+    pub input_range: Interval,
+    /// The rate input in deg/s, rounded to the output's fraction bits, no overflow step.
+    pub scale: Cast,
+    /// q - bias to the output format.
+    pub output: Cast,
+    meanings: [String; 3],
+}
+
+impl Rate {
+    /// From the design's `[compensation]`.
+    pub fn new(circuit: &Circuit, compensation: &Compensation) -> Self {
+        let (format, what) = match &compensation.input {
+            CompensationInput::Phase => (circuit.decimator.output.format, "sense I"),
+            CompensationInput::Channel(channel) => (channel.rate_format, "uncompensated rate"),
+        };
+        let output = compensation.output;
+        let fraction_bits = output.format.fraction_bits as i32;
+        Rate {
+            input_range: Interval::new(format.min_raw(), format.max_raw()),
+            scale: Cast::new(
+                OUTPUT,
+                format.fraction_bits as i32,
+                compensation.rate_full_scale_exponent(),
+                Target::signed(127, fraction_bits),
+                output.rounding,
+                None,
+            ),
+            output: Cast::to(OUTPUT, fraction_bits, 0, output),
+            meanings: [
+                format!(
+                    "{what}, {format}, full scale {} deg/s",
+                    compensation.rate_full_scale_dps
+                ),
+                format!("bias in deg/s, {output}"),
+                format!("compensated rate in deg/s, {output}"),
+            ],
+        }
+    }
+}
+
+impl<A: Arithmetic> Block<A, 2, 1> for Rate {
+    type State = ();
+    const NAME: &'static str = "rate";
+
+    fn inputs(&self) -> [Port; 2] {
+        [
+            Port::new("raw_rate", self.meanings[0].clone()),
+            Port::new("bias", self.meanings[1].clone()),
+        ]
+    }
+
+    fn outputs(&self) -> [Port; 1] {
+        [Port::new("rate", self.meanings[2].clone())]
+    }
+
+    #[inline(always)]
+    fn step(&self, ar: &A, _state: &mut (), [raw_rate, bias]: [A::Word; 2]) -> [A::Word; 1] {
+        let q = ar.cast(raw_rate, &self.scale, &[raw_rate]);
+        [ar.cast(ar.sub(q, bias), &self.output, &[q, bias])]
+    }
+}

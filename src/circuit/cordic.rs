@@ -1,0 +1,145 @@
+//! CORDIC in vectoring mode (Volder 1959): phase and magnitude of the drive vector (contract,
+//! step 5).
+
+use crate::design::Circuit;
+use crate::numeric::arithmetic::{Arithmetic, Block, IndexTable, LoopBody, Port};
+use crate::numeric::cast::{Cast, Label, Target};
+use crate::numeric::constants;
+use crate::numeric::format::{Overflow, Rounding};
+
+/// The CORDIC's configuration.
+#[derive(Debug, Clone)]
+pub struct Vectoring {
+    iterations: u32,
+    width: u32,
+    angle_bits: u32,
+    /// Fraction bits of x and y.
+    fraction_bits: i32,
+    /// I and Q with guard bits below, wrapped to the width.
+    pub widen: Cast,
+    angles: IndexTable,
+    gain: i64,
+    gain_bits: u32,
+    /// x times the gain, back to the decimator's LSB.
+    pub magnitude: Cast,
+    meanings: [String; 3],
+}
+
+impl Vectoring {
+    /// From the design's `[circuit.cordic]`.
+    pub fn new(circuit: &Circuit) -> Self {
+        let cordic = &circuit.cordic;
+        let output = circuit.decimator.output.format;
+        let from = output.fraction_bits as i32;
+        let fraction_bits = from + cordic.guard_bits as i32;
+        Vectoring {
+            iterations: cordic.iterations,
+            width: cordic.width,
+            angle_bits: cordic.angle_bits,
+            fraction_bits,
+            widen: Cast::new(
+                Label::of("circuit.cordic.guard_bits"),
+                from,
+                0,
+                Target::signed(cordic.width, fraction_bits),
+                Rounding::Floor,
+                Some(Overflow::Wrap),
+            ),
+            angles: IndexTable {
+                name: "cordic_angle",
+                entries: constants::arc_tangents(cordic.iterations, cordic.angle_bits).into(),
+                fraction_bits: cordic.angle_bits,
+            },
+            gain: constants::cordic_gain(cordic.iterations, cordic.gain_bits),
+            gain_bits: cordic.gain_bits,
+            magnitude: Cast::new(
+                Label::of("circuit.cordic.gain_bits"),
+                fraction_bits + cordic.gain_bits as i32,
+                0,
+                Target::signed(64, from),
+                Rounding::HalfUp,
+                Some(Overflow::Wrap),
+            ),
+            meanings: [
+                format!("decimated, {output}"),
+                format!("phase in units of 2^-{} turn", cordic.angle_bits),
+                format!("magnitude in units of 2^-{from}"),
+            ],
+        }
+    }
+}
+
+impl<A: Arithmetic> Block<A, 2, 2> for Vectoring {
+    type State = ();
+    const NAME: &'static str = "cordic";
+
+    fn inputs(&self) -> [Port; 2] {
+        [
+            Port::new("in_phase", self.meanings[0].clone()),
+            Port::new("quadrature", self.meanings[0].clone()),
+        ]
+    }
+
+    fn outputs(&self) -> [Port; 2] {
+        [
+            Port::new("phase", self.meanings[1].clone()),
+            Port::new("magnitude", self.meanings[2].clone()),
+        ]
+    }
+
+    #[inline(always)]
+    fn step(&self, ar: &A, _state: &mut (), [i, q]: [A::Word; 2]) -> [A::Word; 2] {
+        if let Some(polar) = ar.ideal_polar(i, q) {
+            return polar;
+        }
+        let x = ar.cast(i, &self.widen, &[i]);
+        let y = ar.cast(q, &self.widen, &[q]);
+        let radius = ar.radius(x, y);
+
+        // Into the right half plane by a quarter turn.
+        let (left, below) = (ar.is_negative(x), ar.is_negative(y));
+        let minus_x = ar.wrap(ar.neg(x), self.width, self.fraction_bits);
+        let minus_y = ar.wrap(ar.neg(y), self.width, self.fraction_bits);
+        let angle = self.angle_bits as i32;
+        let quarter = 1i128 << (self.angle_bits - 2);
+        let z_left = ar.select(below, ar.constant(-quarter, angle), ar.constant(quarter, angle));
+        let start = [
+            ar.select(left, ar.select(below, minus_y, y), x),
+            ar.select(left, ar.select(below, x, minus_x), y),
+            ar.select(left, z_left, ar.constant(0, angle)),
+        ];
+
+        let [x, _, phase] = ar.repeat(self.iterations, start, radius, self);
+        let gain = ar.constant(i128::from(self.gain), self.gain_bits as i32);
+        let magnitude = ar.cast(ar.mul(x, gain), &self.magnitude, &[x]);
+        [phase, magnitude]
+    }
+}
+
+/// One micro-rotation, toward y = 0.
+impl<A: Arithmetic> LoopBody<A, 3> for Vectoring {
+    #[inline(always)]
+    fn step(
+        &self,
+        ar: &A,
+        index: A::Index,
+        [x, y, z]: [A::Word; 3],
+        radius: &mut A::Radius,
+    ) -> [A::Word; 3] {
+        let below = ar.is_negative(y);
+        let dx = ar.shift_right_by(y, index);
+        let dy = ar.shift_right_by(x, index);
+        let dz = ar.entry(&self.angles, index);
+        let next_x = ar.select(below, ar.sub(x, dx), ar.add(x, dx));
+        let next_y = ar.select(below, ar.add(y, dy), ar.sub(y, dy));
+        let next_z = ar.select(below, ar.sub(z, dz), ar.add(z, dz));
+        let longer = ar.rotated(*radius, index);
+        let next = [
+            ar.wrap(ar.bounded(next_x, longer), self.width, self.fraction_bits),
+            ar.wrap(ar.bounded(next_y, longer), self.width, self.fraction_bits),
+            ar.wrap(next_z, self.angle_bits, self.angle_bits as i32),
+        ];
+        *radius = ar.wrapped_radius(longer, self.width);
+        next
+    }
+}

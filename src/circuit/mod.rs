@@ -1,0 +1,27 @@
+//! The digital detection circuit, one file a block, each written once over
+//! [`Arithmetic`](crate::numeric::arithmetic::Arithmetic).
+//!
+//! ```text
+//! drive code ─┬─► demodulate ─► integrate ═╗                       ┌─► phase ─┬─► compensation ─► rate
+//!             └─► demodulate ─► integrate ═╬═► decimate ─► cordic ─┤          └─► phase loop ─► NCO
+//! sense code ─┬─► demodulate ─► integrate ═╣      (every R)        └─► magnitude ─► amplitude loop ─► gain
+//!             └─► demodulate ─► integrate ═╝
+//!                     ▲ sin, cos
+//!                    NCO
+//! ```
+//!
+//! [`chain`] wires the blocks; [`engine`] runs a chain in the arithmetic and the lanes that fit it.
+//! The behaviour is that of `contracts/detection-chain.md`, step by step.
+
+pub mod amplitude_loop;
+pub mod chain;
+pub mod compensation;
+pub mod cordic;
+pub mod decimator;
+pub mod demodulator;
+pub mod engine;
+pub mod nco;
+pub mod phase_loop;
+
+/// The four channels, in the contract's order.
+pub const CHANNELS: [&str; 4] = ["drive_i", "drive_q", "sense_i", "sense_q"];

@@ -1,0 +1,339 @@
+//! The design as the program sees it. The keys of `[circuit]` and `[compensation]` are those of
+//! `contracts/detection-chain.md`; their meaning is stated there and only summarised here.
+
+use crate::numeric::format::{Format, Quantizer, Rounding};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// A design, checked: every value is inside its range and every exact intermediate fits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Design {
+    /// `name`: a C identifier; the prefix of everything that is emitted.
+    pub name: String,
+    /// The detection circuit.
+    pub circuit: Circuit,
+    /// The bias compensation; absent = no `rate` column.
+    pub compensation: Option<Compensation>,
+    /// True if the file gave its own `[compensation]` (and so chose the formats itself).
+    pub compensation_is_own: bool,
+    /// The gyro: the declared model and the plant's parameters.
+    pub gyro: Gyro,
+    /// The thermal run that `run` simulates when no record is given.
+    pub thermal_run: ThermalRun,
+    /// How a measured record's columns map to roles.
+    pub record: RecordMapping,
+    /// How the compensation is fitted.
+    pub fit: FitOptions,
+    /// Where the design came from.
+    pub source: Source,
+}
+
+/// Where a design came from, for the headers of everything that is made from it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Source {
+    /// The file as the user named it; `None` = the embedded default.
+    pub path: Option<PathBuf>,
+    /// The text as read.
+    pub text: String,
+    /// SHA-256 of the text, lower-case hexadecimal.
+    pub sha256: String,
+}
+
+/// `[circuit]`: the digital detection circuit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Circuit {
+    /// ADC sample rate, both channels, Hz.
+    pub sample_rate_hz: f64,
+    /// `[circuit.adc]`.
+    pub adc: Adc,
+    /// `[circuit.nco]`.
+    pub nco: Nco,
+    /// `[circuit.demodulator]`.
+    pub demodulator: Demodulator,
+    /// `[circuit.decimator]`.
+    pub decimator: Decimator,
+    /// `[circuit.cordic]`.
+    pub cordic: Cordic,
+    /// `[circuit.phase_loop]`; absent = the tuning word is fixed.
+    pub phase_loop: Option<PhaseLoop>,
+    /// `[circuit.amplitude_loop]`.
+    pub amplitude_loop: Option<AmplitudeLoop>,
+}
+
+/// `[circuit.adc]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Adc {
+    /// Format of a captured code; signed, 2..=32 bits.
+    pub format: Format,
+}
+
+/// `[circuit.nco]`: the numerically controlled oscillator.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Nco {
+    /// w: accumulator width, 8..=64 bits, wraps.
+    pub phase_bits: u32,
+    /// FCW as given: 0 ..= min(2^w, 2^63) - 1, or negative (modulo 2^w).
+    pub tuning_word: i64,
+    /// a: 2..=16, at most w.
+    pub table_address_bits: u32,
+    /// `floor`, or `half_up`: half an address step is added before truncating.
+    pub address_rounding: Rounding,
+    /// Format of a table entry; signed, 2..=40 bits.
+    pub table: Format,
+}
+
+/// `[circuit.demodulator]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Demodulator {
+    /// The cast of code * table entry.
+    pub product: Quantizer,
+}
+
+/// `[circuit.decimator]`: a CIC with N stages, ratio R, differential delay M.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Decimator {
+    /// N: 1..=6.
+    pub stages: u32,
+    /// R: 2..=4096.
+    pub ratio: u32,
+    /// M: 1 or 2.
+    pub differential_delay: u32,
+    /// The cast of S * 2^-G.
+    pub output: Quantizer,
+}
+
+impl Decimator {
+    /// G: the least integer with 2^G >= (R M)^N; the decimator divides by 2^G.
+    pub fn gain_bits(&self) -> u32 {
+        // (4096 * 2)^6 = 2^78 fits.
+        let gain = u128::from(self.ratio * self.differential_delay).pow(self.stages);
+        128 - (gain - 1).leading_zeros()
+    }
+}
+
+/// `[circuit.cordic]`: vectoring on (drive I, drive Q).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cordic {
+    /// n: 4..=30.
+    pub iterations: u32,
+    /// g: 0..=32.
+    pub guard_bits: u32,
+    /// Width of x and y, wraps, 4..=64.
+    pub width: u32,
+    /// b: z counts 2^-b turns, wraps, 4..=64.
+    pub angle_bits: u32,
+    /// 1..=62: fraction bits of the magnitude constant.
+    pub gain_bits: u32,
+}
+
+/// A loop gain: raw * 2^-shift, the shift a floor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LoopGain {
+    /// The integer factor.
+    pub raw: i64,
+    /// 0..=63.
+    pub shift: u32,
+}
+
+/// `[circuit.phase_loop]`: PI on the drive phase, acting on the tuning word.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PhaseLoop {
+    /// In phase units, 2^-b turn.
+    pub setpoint_raw: i64,
+    /// kp.
+    pub proportional: LoopGain,
+    /// ki.
+    pub integral: LoopGain,
+    /// Width of the integrator, wraps, 2..=64.
+    pub integrator_bits: u32,
+}
+
+/// `[circuit.amplitude_loop]`: PI on the drive magnitude, acting on the drive gain.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AmplitudeLoop {
+    /// In magnitude LSB.
+    pub setpoint_raw: i64,
+    /// 0..=63.
+    pub error_shift: u32,
+    /// 0..=63.
+    pub integrator_shift: u32,
+    /// Of the integrator, within its limits.
+    pub initial_raw: i64,
+    /// 2..=32: the gain is limited to 0 ..= 2^(gain_bits-1)-1.
+    pub gain_bits: u32,
+}
+
+impl AmplitudeLoop {
+    /// The largest gain, 2^(gain_bits-1)-1.
+    pub fn gain_limit(&self) -> i128 {
+        (1i128 << (self.gain_bits - 1)) - 1
+    }
+
+    /// The largest integrator, `gain_limit << integrator_shift`.
+    pub fn integrator_limit(&self) -> i128 {
+        self.gain_limit() << self.integrator_shift
+    }
+}
+
+/// `[compensation]`: a polynomial in the virtual thermometer, subtracted from the rate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Compensation {
+    /// What the polynomial is evaluated in.
+    pub input: CompensationInput,
+    /// Lowest order first, 1 to 16, each within `coefficient_format`.
+    pub coefficients_raw: Vec<i128>,
+    /// Format of the coefficients; at most the accumulator's fraction bits.
+    pub coefficient_format: Format,
+    /// The cast after each multiplication and after each addition.
+    pub accumulator: Quantizer,
+    /// A power of two: rate input in deg/s = value * this.
+    pub rate_full_scale_dps: f64,
+    /// Format of bias and rate, deg/s.
+    pub output: Quantizer,
+    /// `clamp_raw = [low, high]`: the input is limited to the calibrated range; absent = not.
+    pub clamp_raw: Option<(i128, i128)>,
+}
+
+impl Compensation {
+    /// log2 of `rate_full_scale_dps`, which is a power of two.
+    pub fn rate_full_scale_exponent(&self) -> i32 {
+        self.rate_full_scale_dps.log2().round() as i32
+    }
+}
+
+/// The polynomial's variable.
+#[derive(Debug, Clone, PartialEq)]
+pub enum CompensationInput {
+    /// `input = "phase"`: the CORDIC's phase as half turns in [-1, 1); the rate input is sense I.
+    Phase,
+    /// `input = "die_degc"` (or another column of a thermal record that firmware can see):
+    /// p = (raw - offset_raw) * 2^-scale_bits; the rate input is a word of its own, in deg/s.
+    Channel(ChannelInput),
+}
+
+/// A thermometer that is not the chain's own phase.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChannelInput {
+    /// The record's column: `die_degc`, `freq_hz`, `phase_rad`, `chamber_degc`.
+    pub column: String,
+    /// `input_format`: the word that firmware reads, in the column's unit.
+    pub format: Format,
+    /// `input_offset_raw`: the centre of the calibrated range, default 0.
+    pub offset_raw: i128,
+    /// `input_scale_bits`: p = (raw - offset) * 2^-scale_bits, default bits - 1; 0..=64.
+    pub scale_bits: u32,
+    /// `rate_input_format`: the uncompensated rate that firmware reads; its value times
+    /// `rate_full_scale_dps` is in deg/s.
+    pub rate_format: Format,
+}
+
+/// `[gyro]`: the resonators and the declared thermal model (seed paper, eq. 1-9).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gyro {
+    /// Drive resonance at the reference temperature, Hz; also the excitation frequency.
+    pub drive_frequency_hz: f64,
+    /// Drive quality factor Q1.
+    pub drive_q: f64,
+    /// Sense resonance at the reference temperature, Hz.
+    pub sense_frequency_hz: f64,
+    /// Sense quality factor Q2.
+    pub sense_q: f64,
+    /// T0, K.
+    pub reference_temperature_k: f64,
+    /// kappa: relative fall of the stiffness, 1/K (eq. 1, 2).
+    pub stiffness_tempco_per_k: f64,
+    /// `[gyro.bias]`: eq. 9 in the measured drive phase, deg/s, deg/s/rad, deg/s/rad^2.
+    pub bias_dps: [f64; 3],
+    /// `[gyro.electronics]`: what the electronics add to the measured drive phase.
+    pub electronics: ElectronicsPhase,
+    /// `[gyro.effects.*]`: what the device does beyond the declared model.
+    pub effects: Effects,
+}
+
+/// `[gyro.electronics]`: phase = offset + slope * (T - reference).
+#[derive(Debug, Clone, PartialEq)]
+pub struct ElectronicsPhase {
+    /// rad, at the reference temperature.
+    pub phase_offset_rad: f64,
+    /// rad/K.
+    pub phase_slope_rad_per_k: f64,
+    /// degC.
+    pub reference_temperature_degc: f64,
+}
+
+/// `[gyro.effects]`: departures of the simulated device from the declared model, by effect id.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Effects {
+    /// `[gyro.effects.mode_crossing]`.
+    pub mode_crossing: Option<ModeCrossing>,
+}
+
+/// A parasitic mode crosses the drive in temperature: a bump of resonance shape in the bias.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModeCrossing {
+    /// Height of the dispersive part's extremes, deg/s.
+    pub amplitude_dps: f64,
+    /// Temperature of the crossing, degC.
+    pub center_degc: f64,
+    /// Half width at half maximum, K.
+    pub half_width_k: f64,
+}
+
+/// `[thermal_run]`: chamber from start to stop and back, with dwells.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ThermalRun {
+    /// degC.
+    pub start_degc: f64,
+    /// degC, above start.
+    pub stop_degc: f64,
+    /// K between dwells.
+    pub step_k: f64,
+    /// s at each dwell before the readings.
+    pub dwell_s: f64,
+    /// Readings at each dwell.
+    pub readings_per_dwell: u32,
+    /// Decimated samples averaged into one reading.
+    pub samples_per_reading: u32,
+    /// Drive pick-off amplitude, fraction of the ADC's full scale.
+    pub drive_amplitude: f64,
+    /// Rate that drives the sense ADC to its full scale, deg/s.
+    pub sense_full_scale_dps: f64,
+    /// Standing quadrature, deg/s.
+    pub quadrature_dps: f64,
+    /// ADC input noise, LSB rms.
+    pub adc_noise_lsb: f64,
+    /// White rate noise, one-sided density, deg/s/sqrt(Hz).
+    pub rate_noise_dps_rthz: f64,
+    /// Seed of all noise.
+    pub seed: u64,
+}
+
+/// `[record]`: how a measured record is read.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct RecordMapping {
+    /// `[record.columns]`: contract column -> column of the file, e.g. `rate_out_dps = "gyro_x_dps"`.
+    pub columns: BTreeMap<String, String>,
+    /// `row_period_s`: the clock of a record without `time_s`, s per row.
+    pub row_period_s: Option<f64>,
+    /// `thermometer`: the column of the bias model; default: the first of phase_rad, freq_hz,
+    /// die_degc, chamber_degc that the record has.
+    pub thermometer: Option<String>,
+}
+
+/// `[fit]`: how the compensation is fitted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FitOptions {
+    /// `order`: an integer 0..=8, or "auto" (chosen by held-out error). Default 2.
+    pub order: FitOrder,
+    /// `heldout_blocks`: contiguous blocks of the cross-validation, 2..=50. Default 10.
+    pub heldout_blocks: u32,
+}
+
+/// The polynomial's order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FitOrder {
+    /// As given.
+    Fixed(u32),
+    /// By held-out error.
+    Auto,
+}

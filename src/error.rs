@@ -1,0 +1,159 @@
+//! What can go wrong, in the two kinds that a user has to tell apart: an input that cannot be
+//! used (exit status 2) and a check that does not hold (exit status 1).
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// A result of anything that reads what a user wrote.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// Why a command ended without doing all that was asked.
+#[derive(Debug, Clone, thiserror::Error)]
+pub enum Error {
+    /// The input cannot be used: exit status 2.
+    #[error(transparent)]
+    Input(#[from] Box<InputError>),
+    /// Everything was done and a check does not hold: exit status 1. The text says which.
+    #[error("{0}")]
+    Check(String),
+}
+
+impl Error {
+    /// The exit status of the process (`contracts/cli.md`): 1 = a check does not hold, 2 = the
+    /// input cannot be used.
+    pub fn exit_status(&self) -> u8 {
+        match self {
+            Error::Check(_) => 1,
+            Error::Input(_) => 2,
+        }
+    }
+}
+
+/// One thing wrong with an input: what, where, and what to do.
+///
+/// Printed as `FILE:LINE:COLUMN: error: MESSAGE`, then the line itself with a caret, then
+/// `help: HELP`. Everything but the message may be missing.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct InputError {
+    /// The file as the user named it.
+    pub file: Option<PathBuf>,
+    /// 1-based line.
+    pub line: Option<usize>,
+    /// 1-based column, in characters.
+    pub column: Option<usize>,
+    /// What is wrong, with the offending value.
+    pub message: String,
+    /// What to do about it.
+    pub help: Option<String>,
+    /// The text of the line, for the caret.
+    pub source_line: Option<String>,
+}
+
+impl InputError {
+    /// An error without a place; add one with the builder methods.
+    pub fn new(message: impl Into<String>) -> Self {
+        InputError {
+            message: message.into(),
+            ..Self::default()
+        }
+    }
+
+    /// Names the file.
+    pub fn in_file(mut self, file: impl AsRef<Path>) -> Self {
+        self.file = Some(file.as_ref().to_path_buf());
+        self
+    }
+
+    /// Names the 1-based line and column.
+    pub fn at(mut self, line: usize, column: usize) -> Self {
+        self.line = Some(line);
+        self.column = Some(column);
+        self
+    }
+
+    /// Finds line, column and the line's text from a byte offset into `text`.
+    pub fn at_offset(mut self, text: &str, offset: usize) -> Self {
+        let mut offset = offset.min(text.len());
+        while !text.is_char_boundary(offset) {
+            offset -= 1;
+        }
+        let start = text[..offset].rfind('\n').map_or(0, |p| p + 1);
+        self.line = Some(text[..offset].matches('\n').count() + 1);
+        self.column = Some(text[start..offset].chars().count() + 1);
+        self.source_line = text[start..].lines().next().map(str::to_owned);
+        self
+    }
+
+    /// Says what to do.
+    pub fn help(mut self, help: impl Into<String>) -> Self {
+        self.help = Some(help.into());
+        self
+    }
+}
+
+impl From<InputError> for Error {
+    fn from(e: InputError) -> Self {
+        Error::Input(Box::new(e))
+    }
+}
+
+impl std::error::Error for InputError {}
+
+impl fmt::Display for InputError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(file) = &self.file {
+            write!(f, "{}:", file.display())?;
+        }
+        if let Some(line) = self.line {
+            write!(f, "{line}:")?;
+            if let Some(column) = self.column {
+                write!(f, "{column}:")?;
+            }
+        }
+        if self.file.is_some() || self.line.is_some() {
+            write!(f, " ")?;
+        }
+        write!(f, "error: {}", self.message)?;
+        if let (Some(text), Some(column)) = (&self.source_line, self.column) {
+            // A very long line (a capture, a coefficient list) is cut around the caret.
+            let skip = column.saturating_sub(60);
+            let shown: String = text.chars().skip(skip).take(100).collect();
+            write!(f, "\n  | {shown}\n  | {}^", " ".repeat(column - 1 - skip))?;
+        }
+        if let Some(help) = &self.help {
+            write!(f, "\n  help: {help}")?;
+        }
+        Ok(())
+    }
+}
+
+/// An [`Error`] for an operating-system failure on `path`, such as a missing file.
+pub fn io_error(path: impl AsRef<Path>, doing: &str, e: &std::io::Error) -> Error {
+    InputError::new(format!("cannot {doing}: {e}"))
+        .in_file(path)
+        .help(match e.kind() {
+            std::io::ErrorKind::NotFound => "check the path, or make the folder first",
+            std::io::ErrorKind::PermissionDenied => "check the permissions",
+            _ => "check the path and the disk",
+        })
+        .into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_offset_becomes_line_column_and_caret() {
+        let text = "a = 1\nµb = 2\n";
+        let e = InputError::new("bad")
+            .in_file("x.toml")
+            .at_offset(text, text.find("= 2").unwrap())
+            .help("do this");
+        assert_eq!((e.line, e.column), (Some(2), Some(4)));
+        assert_eq!(
+            e.to_string(),
+            "x.toml:2:4: error: bad\n  | µb = 2\n  |    ^\n  help: do this"
+        );
+    }
+}

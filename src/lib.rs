@@ -1,0 +1,10 @@
+//! gyrogen: from a MEMS vibratory gyroscope's thermal drift to trusted fixed-point firmware.
+//!
+//! In reading order: [`numeric`] (formats and arithmetics), [`circuit`] (the detection circuit,
+//! written once), [`design`] (what a user writes), [`record`] (what was measured).
+
+pub mod circuit;
+pub mod design;
+pub mod error;
+pub mod numeric;
+pub mod record;

@@ -1,0 +1,14 @@
+//! Formats, rounding, overflow, and the arithmetics that the circuit is written over.
+//!
+//! [`format`] and [`cast`] say what a quantiser does; [`arithmetic`] is the interface of the
+//! blocks; [`float`], [`fixed`] and [`trace`] implement it; [`constants`] decides the integers
+//! nearest to sines, arc tangents and the CORDIC gain.
+
+pub mod arithmetic;
+pub mod cast;
+pub mod constants;
+pub mod fixed;
+pub mod float;
+pub mod format;
+pub mod lane;
+pub mod trace;

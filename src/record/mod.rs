@@ -1,0 +1,1 @@
+//! Measured records: thermal records and captures (`contracts/record.md`).
