@@ -5,6 +5,7 @@
 
 pub mod circuit;
 pub mod design;
+pub mod emit;
 pub mod error;
 pub mod numeric;
 pub mod record;

@@ -1,12 +1,18 @@
 //! The design: everything a run depends on, read from one TOML file.
 //!
 //! [`schema`] is what the rest of the program sees; [`reader`] turns a file into it, with the
-//! place of every mistake; [`limits`] refuses formats whose exact intermediates the engine cannot
-//! hold; [`template`] holds the embedded default and what `gyrogen init` writes.
+//! place of every mistake (`table` keeps the places, `keys` knows every key, `suggest` what was
+//! meant, `circuit_tables` and `device_tables` read the tables); [`limits`] refuses formats whose exact intermediates the
+//! engine cannot hold; [`template`] holds the embedded default and what `gyrogen init` writes.
 
+mod circuit_tables;
+mod device_tables;
+mod keys;
 pub mod limits;
 pub mod reader;
 pub mod schema;
+mod suggest;
+mod table;
 pub mod template;
 
 pub use schema::*;

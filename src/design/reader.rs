@@ -1,1 +1,152 @@
-//! (in the making)
+//! From a design file to a checked [`Design`], with the place of every mistake.
+
+use super::table::{Doc, Table};
+use super::{circuit_tables, device_tables, limits, template};
+use crate::design::schema::*;
+use crate::error::{Error, InputError, Result, io_error};
+use sha2::{Digest, Sha256};
+use std::fmt::Write as _;
+use std::path::Path;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// Reads a design file; `None` is the embedded default.
+pub fn read(path: Option<&Path>) -> Result<Design> {
+    let Some(path) = path else {
+        return template::default_design();
+    };
+    let bytes = std::fs::read(path).map_err(|e| io_error(path, "read the design", &e))?;
+    match String::from_utf8(bytes) {
+        Ok(text) => parse(&text, Some(path)),
+        Err(e) => {
+            let valid = e.utf8_error().valid_up_to();
+            let bytes = e.as_bytes();
+            let start = String::from_utf8_lossy(&bytes[..valid]);
+            let utf16 = bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]);
+            let what = match utf16 {
+                true => "the file is UTF-16, and a design is UTF-8".to_owned(),
+                false => format!("the byte 0x{:02x} is not UTF-8 text", bytes[valid]),
+            };
+            Err(InputError::new(what)
+                .in_file(path)
+                .at_offset(&start, valid)
+                .help("save the file as UTF-8 text")
+                .into())
+        }
+    }
+}
+
+/// Reads a design's text; `file` is only named. What the text leaves out is the default design's.
+pub fn parse(text: &str, file: Option<&Path>) -> Result<Design> {
+    build(text, file, Some(&template::default_design()?))
+}
+
+/// Reads the default design's text, which leaves nothing out.
+pub(super) fn parse_default(text: &str) -> Result<Design> {
+    build(text, None, None)
+}
+
+fn build(text: &str, file: Option<&Path>, base: Option<&Design>) -> Result<Design> {
+    let doc = Doc {
+        text: text.strip_prefix('\u{feff}').unwrap_or(text),
+        file,
+    };
+    let parsed = DeTable::parse(doc.text).map_err(|e| syntax(&doc, &e))?;
+    let root = Table::root(&doc, parsed.get_ref())?;
+
+    let name = root.take("name", base.map(|b| b.name.clone()), device_tables::name)?;
+    let given = root.section("circuit")?;
+    let circuit = match base {
+        Some(base) if !given.is_given() => base.circuit.clone(),
+        _ => circuit_tables::circuit(&root.need_section("circuit")?)?,
+    };
+    let own = root.section("compensation")?;
+    let compensation = if own.is_given() {
+        Some(circuit_tables::compensation(&own, &circuit)?)
+    } else if given.is_given() {
+        None
+    } else {
+        base.and_then(|b| b.compensation.clone())
+    };
+    let section = |key| root.section(key);
+    let design = Design {
+        name,
+        circuit,
+        compensation,
+        // The embedded default's formats are nobody's choice.
+        compensation_is_own: own.is_given() && base.is_some(),
+        gyro: device_tables::gyro(&section("gyro")?, base.map(|b| &b.gyro))?,
+        thermal_run: device_tables::thermal_run(
+            &section("thermal_run")?,
+            base.map(|b| &b.thermal_run),
+        )?,
+        record: device_tables::record(&section("record")?, base.map(|b| &b.record))?,
+        fit: device_tables::fit(&section("fit")?, base.map(|b| &b.fit))?,
+        source: Source {
+            path: file.map(Path::to_path_buf),
+            text: text.to_owned(),
+            sha256: sha256(text),
+        },
+    };
+    limits::check(&design).map_err(|excess| {
+        doc.error(
+            locate(parsed.get_ref(), excess.key),
+            format!("`{}` {excess}", excess.key),
+        )
+        .help(excess.remedy())
+    })?;
+    Ok(design)
+}
+
+/// Lower-case hexadecimal.
+fn sha256(text: &str) -> String {
+    let digest = Sha256::digest(text.as_bytes());
+    digest.iter().fold(String::new(), |mut hex, byte| {
+        // Writing to a String cannot fail.
+        let _ = write!(hex, "{byte:02x}");
+        hex
+    })
+}
+
+/// The byte offset of a dotted key's value, or of the innermost table on the way that is there.
+fn locate(root: &DeTable, key: &str) -> usize {
+    let (mut offset, mut here) = (0, Some(root));
+    for part in key.split('.') {
+        let Some(value): Option<&Spanned<DeValue>> = here.and_then(|t| t.get(part)) else {
+            break;
+        };
+        offset = value.span().start;
+        here = value.get_ref().as_table();
+    }
+    offset
+}
+
+/// A text that is no TOML.
+fn syntax(doc: &Doc, e: &toml::de::Error) -> Error {
+    let said = e.message();
+    let help = if said.contains("duplicate key") {
+        "a table has each key once, and a file each table once: delete or merge one of the two"
+    } else if said.contains("string") {
+        "put a text in double quotes, as in `table = \"Q1.15\"`"
+    } else if said.contains("newline") {
+        "write one `key = value` in a line"
+    } else if said.contains("leading zero") {
+        "write the number without leading zeros"
+    } else if said.contains("radix") {
+        "write a negative number in decimal"
+    } else if said.contains("extend") {
+        "give all keys of a table in one place"
+    } else if said.contains("recurs") {
+        "a design nests tables at most three deep"
+    } else {
+        "write `key = value` in a line of its own, `[table]` before the keys of a table"
+    };
+    let offset = e.span().map_or(0, |span| span.start);
+    doc.error(offset, format!("this is not TOML: {said}"))
+        .help(help)
+        .into()
+}
+
+#[cfg(test)]
+#[path = "reader_tests.rs"]
+mod tests;

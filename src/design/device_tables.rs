@@ -1,0 +1,334 @@
+//! `name`, `[gyro]`, `[thermal_run]`, `[record]` and `[fit]`: each key that a file leaves out has
+//! the default design's value.
+
+use super::keys::THERMOMETERS;
+use super::schema::*;
+use super::table::{Real, Table, Value};
+use crate::error::Result;
+use std::collections::BTreeMap;
+
+/// Words that C or Rust keep for themselves.
+const KEYWORDS: &str = " \
+    abstract alignas alignof as asm async auto await become bool box break case char class const \
+    constexpr continue crate default do double dyn else enum extern false final float fn for gen \
+    goto if impl in inline int let long loop macro match mod move mut nullptr override priv pub \
+    ref register restrict return self short signed sizeof static static_assert struct super \
+    switch thread_local trait true try type typedef typeof typeof_unqual union unsafe unsigned \
+    unsized use virtual void volatile where while yield ";
+
+/// Reads `name`: a C identifier, as it is the prefix of everything that is emitted.
+pub(super) fn name(value: Value) -> Result<String> {
+    let name = value.text("the design's name")?;
+    let reason = if name.is_empty() {
+        "is empty"
+    } else if name.len() > 63 {
+        "has more than 63 characters"
+    } else if name.starts_with('_') {
+        "begins with an underscore, which C reserves"
+    } else if KEYWORDS.contains(&format!(" {name} ")) {
+        "is a keyword of C or Rust"
+    } else if name.starts_with(|c: char| c.is_ascii_digit())
+        || !name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_')
+    {
+        "is no C identifier"
+    } else {
+        return Ok(name.to_owned());
+    };
+    Err(value
+        .error(format!("= {} {reason}", value.shown()))
+        .help("start with an ASCII letter, go on with letters, digits and `_`, such as \"gyro_a\"")
+        .into())
+}
+
+/// Reads `[gyro]`.
+pub(super) fn gyro(t: &Table, base: Option<&Gyro>) -> Result<Gyro> {
+    let real = |key, from: fn(&Gyro) -> f64, accepted, meaning| {
+        t.take(key, base.map(from), |v| v.real(accepted, meaning))
+    };
+    Ok(Gyro {
+        drive_frequency_hz: real(
+            "drive_frequency_hz",
+            |g| g.drive_frequency_hz,
+            Real::Positive,
+            "the drive mode's resonance in Hz",
+        )?,
+        drive_q: real(
+            "drive_q",
+            |g| g.drive_q,
+            Real::Positive,
+            "the drive mode's quality factor",
+        )?,
+        sense_frequency_hz: real(
+            "sense_frequency_hz",
+            |g| g.sense_frequency_hz,
+            Real::Positive,
+            "the sense mode's resonance in Hz",
+        )?,
+        sense_q: real(
+            "sense_q",
+            |g| g.sense_q,
+            Real::Positive,
+            "the sense mode's quality factor",
+        )?,
+        reference_temperature_k: real(
+            "reference_temperature_k",
+            |g| g.reference_temperature_k,
+            Real::Positive,
+            "T0 in kelvin, 300 is a warm room",
+        )?,
+        stiffness_tempco_per_k: real(
+            "stiffness_tempco_per_k",
+            |g| g.stiffness_tempco_per_k,
+            Real::Within(-1e-3, 1e-3),
+            "the stiffness's relative fall in 1/K; 49.39 ppm/K is 4.939e-5",
+        )?,
+        bias_dps: bias(&t.section("bias")?, base)?,
+        electronics: electronics(&t.section("electronics")?, base)?,
+        effects: effects(t, base)?,
+    })
+}
+
+fn bias(t: &Table, base: Option<&Gyro>) -> Result<[f64; 3]> {
+    let term = |key, order: usize, meaning| {
+        t.take(key, base.map(|g| g.bias_dps[order]), |v| {
+            v.real(Real::Any, meaning)
+        })
+    };
+    Ok([
+        term("offset_dps", 0, "the bias at phase 0 in deg/s")?,
+        term("linear_dps_per_rad", 1, "the bias's slope in deg/s/rad")?,
+        term(
+            "quadratic_dps_per_rad2",
+            2,
+            "the bias's curvature in deg/s/rad^2",
+        )?,
+    ])
+}
+
+fn electronics(t: &Table, base: Option<&Gyro>) -> Result<ElectronicsPhase> {
+    let base = base.map(|g| &g.electronics);
+    Ok(ElectronicsPhase {
+        phase_offset_rad: t.take("phase_offset_rad", base.map(|e| e.phase_offset_rad), |v| {
+            v.real(Real::Any, "radians at the reference temperature")
+        })?,
+        phase_slope_rad_per_k: t.take(
+            "phase_slope_rad_per_k",
+            base.map(|e| e.phase_slope_rad_per_k),
+            |v| v.real(Real::Any, "radians per kelvin"),
+        )?,
+        reference_temperature_degc: t.take(
+            "reference_temperature_degc",
+            base.map(|e| e.reference_temperature_degc),
+            |v| v.real(Real::Celsius, "degrees Celsius"),
+        )?,
+    })
+}
+
+/// A file with a `[gyro]` has the effects that it names and no others.
+fn effects(gyro: &Table, base: Option<&Gyro>) -> Result<Effects> {
+    if let (false, Some(base)) = (gyro.is_given(), base) {
+        return Ok(base.effects.clone());
+    }
+    let base = base.and_then(|g| g.effects.mode_crossing.as_ref());
+    let t = gyro.section("effects")?.section("mode_crossing")?;
+    if !t.is_given() {
+        return Ok(Effects::default());
+    }
+    let mode_crossing = ModeCrossing {
+        amplitude_dps: t.take("amplitude_dps", base.map(|m| m.amplitude_dps), |v| {
+            v.real(Real::Any, "the bump's height in deg/s")
+        })?,
+        center_degc: t.take("center_degc", base.map(|m| m.center_degc), |v| {
+            v.real(Real::Celsius, "the crossing's temperature in degC")
+        })?,
+        half_width_k: t.take("half_width_k", base.map(|m| m.half_width_k), |v| {
+            v.real(Real::Positive, "half the width at half maximum in K")
+        })?,
+    };
+    Ok(Effects {
+        mode_crossing: Some(mode_crossing),
+    })
+}
+
+/// The most dwells that a thermal run may have in one direction.
+const MOST_DWELLS: f64 = 10_000.0;
+
+/// Reads `[thermal_run]`.
+pub(super) fn thermal_run(t: &Table, base: Option<&ThermalRun>) -> Result<ThermalRun> {
+    let real = |key, from: fn(&ThermalRun) -> f64, accepted, meaning| {
+        t.take(key, base.map(from), |v| v.real(accepted, meaning))
+    };
+    let count = |key, from: fn(&ThermalRun) -> u32, most, meaning| {
+        t.take(key, base.map(from), |v| v.integer(1..=most, meaning))
+    };
+    let run = ThermalRun {
+        start_degc: real(
+            "start_degc",
+            |r| r.start_degc,
+            Real::Celsius,
+            "where the chamber starts and ends, degC",
+        )?,
+        stop_degc: real(
+            "stop_degc",
+            |r| r.stop_degc,
+            Real::Celsius,
+            "where the chamber turns, degC, above start_degc",
+        )?,
+        step_k: real(
+            "step_k",
+            |r| r.step_k,
+            Real::Positive,
+            "the distance of two dwells in K",
+        )?,
+        dwell_s: real(
+            "dwell_s",
+            |r| r.dwell_s,
+            Real::NotNegative,
+            "the wait before a dwell's readings in s",
+        )?,
+        readings_per_dwell: count(
+            "readings_per_dwell",
+            |r| r.readings_per_dwell,
+            10_000,
+            "readings at each dwell",
+        )?,
+        samples_per_reading: count(
+            "samples_per_reading",
+            |r| r.samples_per_reading,
+            10_000_000,
+            "decimated samples averaged into a reading",
+        )?,
+        drive_amplitude: t.take("drive_amplitude", base.map(|r| r.drive_amplitude), |v| {
+            v.real(
+                Real::Within(1e-6, 1.0),
+                "the drive's amplitude as a fraction of the ADC's full scale",
+            )
+        })?,
+        sense_full_scale_dps: real(
+            "sense_full_scale_dps",
+            |r| r.sense_full_scale_dps,
+            Real::Positive,
+            "the rate that fills the sense ADC in deg/s",
+        )?,
+        quadrature_dps: real(
+            "quadrature_dps",
+            |r| r.quadrature_dps,
+            Real::Any,
+            "the standing quadrature in deg/s",
+        )?,
+        adc_noise_lsb: real(
+            "adc_noise_lsb",
+            |r| r.adc_noise_lsb,
+            Real::NotNegative,
+            "the ADC's input noise in LSB rms",
+        )?,
+        rate_noise_dps_rthz: real(
+            "rate_noise_dps_rthz",
+            |r| r.rate_noise_dps_rthz,
+            Real::NotNegative,
+            "the white rate noise in deg/s/sqrt(Hz)",
+        )?,
+        seed: t.take("seed", base.map(|r| r.seed), |v| {
+            v.integer(0..=i128::from(u64::MAX), "the seed of all noise")
+        })?,
+    };
+    check_span(t, &run)?;
+    Ok(run)
+}
+
+/// Refuses a chamber that does not rise, or that rises in too many steps.
+fn check_span(t: &Table, run: &ThermalRun) -> Result<()> {
+    let span = run.stop_degc - run.start_degc;
+    let at = |keys: [&str; 2]| keys.iter().find_map(|key| t.get(key));
+    if span <= 0.0 {
+        let message = format!(
+            "gives a run from start_degc = {} to stop_degc = {}, which does not rise",
+            run.start_degc, run.stop_degc
+        );
+        let e = match at(["stop_degc", "start_degc"]) {
+            Some(value) => value.error(message),
+            None => t.error(format!("`[thermal_run]` {message}")),
+        };
+        return Err(e
+            .help("give both, `stop_degc` above `start_degc`: the run comes back by itself")
+            .into());
+    }
+    if run.step_k > span || span / run.step_k > MOST_DWELLS {
+        let message = format!(
+            "gives steps of {} K over {span} K; a run takes 1 to {MOST_DWELLS} steps",
+            run.step_k
+        );
+        let e = match at(["step_k", "stop_degc"]).or_else(|| t.get("start_degc")) {
+            Some(value) => value.error(message),
+            None => t.error(format!("`[thermal_run]` {message}")),
+        };
+        return Err(e
+            .help("choose `step_k` between the span and a ten-thousandth of it")
+            .into());
+    }
+    Ok(())
+}
+
+/// Reads `[record]`.
+pub(super) fn record(t: &Table, base: Option<&RecordMapping>) -> Result<RecordMapping> {
+    let base = base.cloned().unwrap_or_default();
+    let row_period_s = match t.get("row_period_s") {
+        Some(v) => Some(v.real(Real::Positive, "s from row to row")?),
+        None => base.row_period_s,
+    };
+    let thermometer = match t.get("thermometer") {
+        Some(v) => {
+            let words: Vec<(&str, &str)> = THERMOMETERS.iter().map(|w| (*w, *w)).collect();
+            Some(v.choice(&words)?.to_owned())
+        }
+        None => base.thermometer,
+    };
+    let mut columns = base.columns;
+    columns.extend(record_columns(&t.section("columns")?)?);
+    Ok(RecordMapping {
+        columns,
+        row_period_s,
+        thermometer,
+    })
+}
+
+fn record_columns(t: &Table) -> Result<BTreeMap<String, String>> {
+    let mut columns = BTreeMap::new();
+    let mut taken: BTreeMap<&str, &str> = BTreeMap::new();
+    for (role, value) in t.entries() {
+        let column = value.text("the column's name in the file")?;
+        if column.trim().is_empty() {
+            return Err(value
+                .error("names no column")
+                .help("write the column's name as the file's header spells it, or delete the key")
+                .into());
+        }
+        if let Some(other) = taken.insert(column, role) {
+            return Err(value
+                .error(format!(
+                    "is {}, the column that `{other}` is read from already",
+                    value.shown()
+                ))
+                .help("give each quantity a column of its own, or delete one of the two keys")
+                .into());
+        }
+        columns.insert(role.to_owned(), column.to_owned());
+    }
+    Ok(columns)
+}
+
+/// Reads `[fit]`.
+pub(super) fn fit(t: &Table, base: Option<&FitOptions>) -> Result<FitOptions> {
+    Ok(FitOptions {
+        order: t.take("order", base.map(|f| f.order), |v| {
+            if v.is_text() && v.text("auto")?.trim().parse::<i64>().is_err() {
+                return v.choice(&[("auto", FitOrder::Auto)]);
+            }
+            let order = v.integer(0..=8, "the polynomial's order, or \"auto\"")?;
+            Ok(FitOrder::Fixed(order))
+        })?,
+        heldout_blocks: t.take("heldout_blocks", base.map(|f| f.heldout_blocks), |v| {
+            v.integer(2..=50, "the blocks of the cross-validation")
+        })?,
+    })
+}

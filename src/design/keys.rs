@@ -1,0 +1,241 @@
+//! Every key of a design file, with an example of its value.
+
+/// Each table with its keys and, for each key, an example of a value; `[` marks a table.
+pub(super) const KEYS: &[(&str, &[(&str, &str)])] = &[
+    (
+        "",
+        &[
+            ("name", "\"gyro\""),
+            ("circuit", "["),
+            ("compensation", "["),
+            ("gyro", "["),
+            ("thermal_run", "["),
+            ("record", "["),
+            ("fit", "["),
+        ],
+    ),
+    (
+        "circuit",
+        &[
+            ("sample_rate_hz", "56000.0"),
+            ("adc", "["),
+            ("nco", "["),
+            ("demodulator", "["),
+            ("decimator", "["),
+            ("cordic", "["),
+            ("phase_loop", "["),
+            ("amplitude_loop", "["),
+        ],
+    ),
+    ("circuit.adc", &[("format", "\"Q1.15\"")]),
+    (
+        "circuit.nco",
+        &[
+            ("phase_bits", "32"),
+            ("tuning_word", "134217728"),
+            ("table_address_bits", "12"),
+            ("address_rounding", "\"half_up\""),
+            ("table", "\"Q1.15\""),
+        ],
+    ),
+    (
+        "circuit.demodulator",
+        &[(
+            "product",
+            "{ format = \"Q2.22\", rounding = \"half_up\", overflow = \"saturate\" }",
+        )],
+    ),
+    (
+        "circuit.decimator",
+        &[
+            ("stages", "3"),
+            ("ratio", "32"),
+            ("differential_delay", "1"),
+            (
+                "output",
+                "{ format = \"Q2.22\", rounding = \"half_up\", overflow = \"saturate\" }",
+            ),
+        ],
+    ),
+    (
+        "circuit.cordic",
+        &[
+            ("iterations", "20"),
+            ("guard_bits", "6"),
+            ("width", "32"),
+            ("angle_bits", "24"),
+            ("gain_bits", "24"),
+        ],
+    ),
+    (
+        "circuit.phase_loop",
+        &[
+            ("setpoint_raw", "-4194304"),
+            ("proportional", "{ raw = 9, shift = 6 }"),
+            ("integral", "{ raw = 9, shift = 11 }"),
+            ("integrator_bits", "48"),
+        ],
+    ),
+    ("circuit.phase_loop.proportional", LOOP_GAIN),
+    ("circuit.phase_loop.integral", LOOP_GAIN),
+    (
+        "circuit.amplitude_loop",
+        &[
+            ("setpoint_raw", "1048576"),
+            ("error_shift", "7"),
+            ("integrator_shift", "12"),
+            ("initial_raw", "67108864"),
+            ("gain_bits", "16"),
+        ],
+    ),
+    (
+        "compensation",
+        &[
+            ("input", "\"phase\""),
+            ("coefficients_raw", "[114923930, 800391448, 1415954326]"),
+            ("coefficient_format", "\"Q12.20\""),
+            (
+                "accumulator",
+                "{ format = \"Q13.27\", rounding = \"half_up\", overflow = \"saturate\" }",
+            ),
+            ("rate_full_scale_dps", "2048.0"),
+            (
+                "output",
+                "{ format = \"Q12.12\", rounding = \"half_up\", overflow = \"saturate\" }",
+            ),
+            ("clamp_raw", "[-5900000, -3900000]"),
+            ("input_format", "\"Q9.7\""),
+            ("input_offset_raw", "0"),
+            ("input_scale_bits", "15"),
+            ("rate_input_format", "\"Q2.22\""),
+        ],
+    ),
+    (
+        "gyro",
+        &[
+            ("drive_frequency_hz", "1750.0"),
+            ("drive_q", "50.0"),
+            ("sense_frequency_hz", "2000.0"),
+            ("sense_q", "3.0"),
+            ("reference_temperature_k", "300.0"),
+            ("stiffness_tempco_per_k", "4.939e-5"),
+            ("bias", "["),
+            ("electronics", "["),
+            ("effects", "["),
+        ],
+    ),
+    (
+        "gyro.bias",
+        &[
+            ("offset_dps", "109.60"),
+            ("linear_dps_per_rad", "242.97"),
+            ("quadratic_dps_per_rad2", "136.82"),
+        ],
+    ),
+    (
+        "gyro.electronics",
+        &[
+            ("phase_offset_rad", "0.0"),
+            ("phase_slope_rad_per_k", "-6.5e-3"),
+            ("reference_temperature_degc", "0.0"),
+        ],
+    ),
+    ("gyro.effects", &[("mode_crossing", "[")]),
+    (
+        "gyro.effects.mode_crossing",
+        &[
+            ("amplitude_dps", "4.6"),
+            ("center_degc", "43.0"),
+            ("half_width_k", "6.0"),
+        ],
+    ),
+    (
+        "thermal_run",
+        &[
+            ("start_degc", "0.0"),
+            ("stop_degc", "70.0"),
+            ("step_k", "5.0"),
+            ("dwell_s", "900.0"),
+            ("readings_per_dwell", "3"),
+            ("samples_per_reading", "512"),
+            ("drive_amplitude", "0.5"),
+            ("sense_full_scale_dps", "1024.0"),
+            ("quadrature_dps", "250.0"),
+            ("adc_noise_lsb", "1.0"),
+            ("rate_noise_dps_rthz", "0.0073"),
+            ("seed", "20040024"),
+        ],
+    ),
+    (
+        "record",
+        &[
+            ("columns", "["),
+            ("row_period_s", "10.0"),
+            ("thermometer", "\"die_degc\""),
+        ],
+    ),
+    (
+        "record.columns",
+        &[
+            ("time_s", "\"t\""),
+            ("time_since_power_on_s", "\"t_on\""),
+            ("rate_out_dps", "\"gyro_x_dps\""),
+            ("rate_dps", "\"table_dps\""),
+            ("chamber_degc", "\"chamber\""),
+            ("phase_rad", "\"drive_phase\""),
+            ("freq_hz", "\"drive_freq\""),
+            ("die_degc", "\"temp\""),
+            ("agc", "\"gain\""),
+            ("quad_dps", "\"quad\""),
+            ("supply_v", "\"vdd\""),
+            ("accel_g", "\"acc\""),
+        ],
+    ),
+    ("fit", &[("order", "2"), ("heldout_blocks", "10")]),
+];
+
+const LOOP_GAIN: &[(&str, &str)] = &[("raw", "9"), ("shift", "6")];
+
+/// The thermometers that a polynomial or a bias model can be in, besides the circuit's phase.
+pub(super) const THERMOMETERS: &[&str] = &["phase_rad", "freq_hz", "die_degc", "chamber_degc"];
+
+fn keys_of(table: &str) -> &'static [(&'static str, &'static str)] {
+    KEYS.iter().find(|(t, _)| *t == table).map_or(&[], |t| t.1)
+}
+
+/// The keys of a table.
+pub(super) fn names(table: &str) -> Vec<&'static str> {
+    keys_of(table).iter().map(|(key, _)| *key).collect()
+}
+
+/// An example of a value of a key.
+pub(super) fn example(table: &str, key: &str) -> &'static str {
+    let found = keys_of(table).iter().find(|(k, _)| *k == key);
+    found.map_or("...", |(_, example)| example)
+}
+
+/// True if the dotted path names a table of a design file.
+pub(super) fn is_table(path: &str) -> bool {
+    let (table, key) = path.rsplit_once('.').unwrap_or(("", path));
+    example(table, key) == "["
+}
+
+/// A table as a reader knows it.
+pub(super) fn title(path: &str) -> String {
+    match path {
+        "" => "the top level".to_owned(),
+        // Written in one line, not under a header.
+        path if !is_table(path) => format!("`{path}`"),
+        path => format!("`[{path}]`"),
+    }
+}
+
+/// "`a`, `b` or `c`".
+pub(super) fn one_of<'a>(words: impl Iterator<Item = &'a str>) -> String {
+    let quoted: Vec<String> = words.map(|w| format!("`{w}`")).collect();
+    match quoted.split_last() {
+        Some((last, [])) => last.clone(),
+        Some((last, rest)) => format!("{} or {last}", rest.join(", ")),
+        None => "nothing".to_owned(),
+    }
+}
