@@ -4,6 +4,7 @@
 //! written once), [`design`] (what a user writes), [`record`] (what was measured).
 
 pub mod circuit;
+pub mod cli;
 pub mod design;
 pub mod emit;
 pub mod error;

@@ -1,1 +1,5 @@
-fn main() {}
+//! The `gyrogen` binary.
+
+fn main() -> std::process::ExitCode {
+    gyrogen::cli::main()
+}

@@ -142,8 +142,8 @@ pub enum Statement {
 pub struct Lowered {
     /// Types of the inputs.
     pub inputs: Vec<Type>,
-    /// Types of the outputs.
-    pub outputs: Vec<(Typed, Type)>,
+    /// Outputs: name and value.
+    pub outputs: Vec<(&'static str, Typed)>,
     /// The body.
     pub body: Vec<Statement>,
     /// It (or a callee) may note a fault.
@@ -199,15 +199,16 @@ impl<'a> Lowering<'a> {
     }
 
     fn finish(mut self, called: bool) -> Lowered {
-        let outputs = self
-            .function
-            .outputs
-            .iter()
-            .map(|(_, id)| {
-                let ty = word_type(self.function.nodes[*id].range);
-                (self.value(*id), ty)
-            })
-            .collect();
+        let mut outputs = Vec::new();
+        for (port, id) in &self.function.outputs {
+            // An output without a name belongs to a stage that the design does not have.
+            if port.name.is_empty() {
+                continue;
+            }
+            let value = self.value(*id);
+            let ty = word_type(self.function.nodes[*id].range);
+            outputs.push((port.name, self.convert(value, ty)));
+        }
         for (slot, element, id) in &self.function.stores {
             let value = self.value(*id);
             let store = match self.function.slots[*slot].kind {
@@ -218,10 +219,12 @@ impl<'a> Lowering<'a> {
             };
             self.emit(Statement::Store(*slot, *element, store));
         }
+        let mut body = self.blocks.pop().unwrap_or_default();
+        drop_unused(&mut body, &outputs);
         Lowered {
             inputs: self.function.inputs.iter().map(|(_, r)| word_type(*r)).collect(),
             outputs,
-            body: self.blocks.pop().unwrap_or_default(),
+            body,
             may_fault: self.may_fault || called,
         }
     }
@@ -334,7 +337,13 @@ impl<'a> Lowering<'a> {
         let mut next = Vec::new();
         for ((temp, ty), out) in carried.iter().zip(&l.outs) {
             let value = self.value(*out);
-            next.push((*temp, self.convert(value, *ty)));
+            let mut value = self.convert(value, *ty);
+            let is_variable = carried.iter().any(|(t, _)| value.value == Value::Temp(*t));
+            if is_variable && value.value != Value::Temp(*temp) {
+                // Assigned one after the other: keep the old value of another variable.
+                value = self.bind(*ty, Expr::Convert(value), None);
+            }
+            next.push((*temp, value));
         }
         self.emit(Statement::Next(next));
         let body = self.blocks.pop().unwrap_or_default();
@@ -678,6 +687,82 @@ impl<'a> Lowering<'a> {
         let unit = if rounding == Rounding::Floor { -1 } else { 1 };
         let (yes, no) = (Self::constant(unit, ty), Self::constant(0, ty));
         self.bind(ty, Expr::Select(negative, yes, no), Some(after))
+    }
+}
+
+/// Removes temporaries that nothing reads; notes of faults and calls stay.
+fn drop_unused(body: &mut Vec<Statement>, outputs: &[(&'static str, Typed)]) {
+    let mut used = std::collections::BTreeSet::new();
+    let mut note = |v: &Typed| {
+        if let Value::Temp(t) = v.value {
+            used.insert(t);
+        }
+    };
+    outputs.iter().for_each(|(_, v)| note(v));
+    visit_operands(body, &mut note);
+    let before = count(body);
+    retain(body, &|s| match s {
+        Statement::Let(t, _, expr, _) => used.contains(t) || matches!(expr, Expr::Check(..)),
+        _ => true,
+    });
+    if count(body) < before {
+        drop_unused(body, outputs);
+    }
+}
+
+fn count(body: &[Statement]) -> usize {
+    body.iter()
+        .map(|s| match s {
+            Statement::Loop(_, inner) => 1 + count(inner),
+            _ => 1,
+        })
+        .sum()
+}
+
+fn retain(body: &mut Vec<Statement>, keep: &dyn Fn(&Statement) -> bool) {
+    body.retain(|s| keep(s));
+    for s in body {
+        if let Statement::Loop(_, inner) = s {
+            retain(inner, keep);
+        }
+    }
+}
+
+/// Shows every operand of every statement to `note`.
+pub fn visit_operands(body: &[Statement], note: &mut dyn FnMut(&Typed)) {
+    for statement in body {
+        match statement {
+            Statement::Let(_, _, expr, _) => expr.operands().iter().for_each(&mut *note),
+            Statement::Carry(_, _, v) | Statement::Store(_, _, v) => note(v),
+            Statement::Loop(_, inner) => visit_operands(inner, note),
+            Statement::Next(values) => values.iter().for_each(|(_, v)| note(v)),
+            Statement::Call(_, arguments, _) => arguments.iter().for_each(&mut *note),
+        }
+    }
+}
+
+impl Expr {
+    /// The values that the operation reads.
+    pub fn operands(&self) -> Vec<Typed> {
+        match *self {
+            Expr::Convert(a)
+            | Expr::Low(a)
+            | Expr::SignExtend(a, _)
+            | Expr::Neg(a)
+            | Expr::Asr(a, _)
+            | Expr::AsrIndex(a)
+            | Expr::Shl(a, _)
+            | Expr::Shr(a, _)
+            | Expr::Mask(a, _)
+            | Expr::ToSigned(a)
+            | Expr::IsNegative(a)
+            | Expr::Clamp(a, _, _)
+            | Expr::Check(a, _, _, _)
+            | Expr::Sine(_, a) => vec![a],
+            Expr::Add(a, b) | Expr::Sub(a, b) | Expr::Mul(a, b) => vec![a, b],
+            Expr::Select(t, a, b) => vec![t, a, b],
+            Expr::Entry(_) | Expr::Load(_, _) => Vec::new(),
+        }
     }
 }
 

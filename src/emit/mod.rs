@@ -1,2 +1,8 @@
-//! Emission.
+//! Firmware from the traced circuit: [`lower`] makes typed machine operations of the program,
+//! [`bundle`] gathers what is printed, [`c`] and [`rust`] spell it, [`files`] writes the bundle with
+//! its self-test, vectors and manifest.
+
+pub mod bundle;
+pub mod c;
 pub mod lower;
+pub mod rust;

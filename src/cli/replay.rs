@@ -1,0 +1,172 @@
+//! `gyrogen replay`: captured ADC codes through the circuit, bit for bit.
+
+use crate::circuit::engine::{self, ArithmeticKind, Rows};
+use crate::design::Design;
+use crate::error::{Error, Result};
+use crate::record::capture::{CaptureReader, mismatch_warnings};
+use crate::record::rows::{Kind, RowWriter};
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+/// Run captured ADC codes through the circuit; one row a decimated sample.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Design file; the embedded default if left out.
+    design: Option<PathBuf>,
+    /// Captured codes, CSV or NPY.
+    #[arg(long)]
+    capture: PathBuf,
+    /// Where the rows go: CSV, or an int64 (float64) array if it ends in .npy.
+    #[arg(long)]
+    out: PathBuf,
+    /// Bit-accurate, or without any quantisation.
+    #[arg(long, value_enum, default_value = "fixed")]
+    arith: Arith,
+}
+
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum Arith {
+    Fixed,
+    Float,
+}
+
+/// ADC samples that are read, processed and written at a time.
+const BLOCK: usize = 1 << 16;
+
+/// Runs the command.
+///
+/// # Errors
+/// An unusable design or capture (exit 2), or an overflow where the design says `error` (exit 1);
+/// no file is written then.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let design = super::design(arguments.design.as_deref())?;
+    let kind = match arguments.arith {
+        Arith::Fixed => ArithmeticKind::Fixed,
+        Arith::Float => ArithmeticKind::Float,
+    };
+    let mut capture = CaptureReader::open(&arguments.capture, design.circuit.adc.format)?;
+    warn_of_mismatches(&design, &capture);
+
+    let columns = engine::columns(&design);
+    let mut header = vec!["index"];
+    header.extend(&columns);
+    let written = match kind {
+        ArithmeticKind::Fixed => Kind::Integer,
+        ArithmeticKind::Float => Kind::Float,
+    };
+    let mut writer = RowWriter::create(&arguments.out, &header, written)?;
+
+    let mut engine = engine::engine(&design, kind);
+    let mut rows = engine.no_rows();
+    let (mut drive, mut sense) = (Vec::new(), Vec::new());
+    let mut progress = Progress::new(capture.rows_hint());
+    let (mut samples, mut index) = (0u64, 0u64);
+    let mut busy = Duration::ZERO;
+    loop {
+        let count = capture.read_block(&mut drive, &mut sense, BLOCK)?;
+        if count == 0 {
+            break;
+        }
+        let start = Instant::now();
+        engine
+            .process(&drive, &sense, &mut rows)
+            .map_err(|overflowed| Error::Check(overflowed.to_string()))?;
+        busy += start.elapsed();
+        samples += count as u64;
+        index = write(&mut rows, columns.len(), index, &mut writer)?;
+        progress.show(samples);
+    }
+    progress.done();
+    writer.finish()?;
+    eprintln!(
+        "replayed {samples} samples into {index} rows: {:.1} M samples/s in the circuit, \
+         {:.1} M/s with reading and writing, one thread",
+        rate(samples, busy),
+        rate(samples, progress.started.elapsed()),
+    );
+    Ok(())
+}
+
+/// M samples/s.
+fn rate(samples: u64, time: Duration) -> f64 {
+    samples as f64 / time.as_secs_f64().max(1e-9) / 1e6
+}
+
+/// Writes and clears the rows; gives the next row's index.
+fn write(rows: &mut Rows, columns: usize, mut index: u64, writer: &mut RowWriter) -> Result<u64> {
+    match rows {
+        Rows::Integer(words) => {
+            let mut line = Vec::with_capacity(columns + 1);
+            for row in words.chunks_exact(columns) {
+                line.clear();
+                line.push(i128::from(index));
+                line.extend_from_slice(row);
+                writer.write_integers(&line)?;
+                index += 1;
+            }
+            words.clear();
+        }
+        Rows::Real(values) => {
+            let mut line = Vec::with_capacity(columns + 1);
+            for row in values.chunks_exact(columns) {
+                line.clear();
+                line.push(index as f64);
+                line.extend_from_slice(row);
+                writer.write_floats(&line)?;
+                index += 1;
+            }
+            values.clear();
+        }
+    }
+    Ok(index)
+}
+
+fn warn_of_mismatches(design: &Design, capture: &CaptureReader) {
+    let nco = &design.circuit.nco;
+    let circle = 1i128 << nco.phase_bits;
+    let word = i128::from(nco.tuning_word).rem_euclid(circle) as u128;
+    for warning in mismatch_warnings(
+        capture.meta(),
+        design.circuit.sample_rate_hz,
+        (word, nco.phase_bits),
+        design.circuit.adc.format.bits(),
+    ) {
+        eprintln!("warning: {warning}");
+    }
+}
+
+/// A bar on a terminal for what takes over two seconds.
+struct Progress {
+    started: Instant,
+    total: Option<u64>,
+    bar: Option<indicatif::ProgressBar>,
+}
+
+impl Progress {
+    fn new(total: Option<u64>) -> Self {
+        Progress {
+            started: Instant::now(),
+            total,
+            bar: None,
+        }
+    }
+
+    fn show(&mut self, samples: u64) {
+        if self.bar.is_none() && self.started.elapsed() > Duration::from_secs(2) {
+            // Draws to stderr, and only on a terminal.
+            self.bar = Some(match self.total {
+                Some(total) => indicatif::ProgressBar::new(total),
+                None => indicatif::ProgressBar::new_spinner(),
+            });
+        }
+        if let Some(bar) = &self.bar {
+            bar.set_position(samples);
+        }
+    }
+
+    fn done(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}

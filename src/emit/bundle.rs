@@ -1,0 +1,194 @@
+//! What is printed, apart from the language: the program, lowered, with its states and initial
+//! values under checked names.
+
+use super::lower::{Lowered, Type, lower, residue_type, word_type};
+use crate::circuit::compensation::{Bias, Rate};
+use crate::circuit::engine;
+use crate::design::{CompensationInput, Design};
+use crate::numeric::arithmetic::{Arithmetic, Block, Port};
+use crate::numeric::trace::Trace;
+use crate::numeric::trace::ir::{Program, SlotKind};
+
+/// Which part of the firmware is emitted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Part {
+    /// The bias polynomial and its subtraction.
+    Compensation,
+    /// The constant tables.
+    Tables,
+    /// The whole chain; the compensation alone where its thermometer is not the chain's phase.
+    Chain,
+}
+
+/// A value that the state has at the start and that is not zero.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Initial {
+    /// Member of the chain's state.
+    pub member: &'static str,
+    /// Variable in it.
+    pub variable: &'static str,
+    /// Raw value.
+    pub value: i128,
+}
+
+/// A state's type: its variables with their C or Rust types, or members with their own state.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StateType {
+    /// The state's name.
+    pub name: &'static str,
+    /// Variables: name, elements, type.
+    pub variables: Vec<(&'static str, usize, Type)>,
+    /// Members: name, state.
+    pub members: Vec<(&'static str, &'static str)>,
+}
+
+/// A program ready for printing.
+#[derive(Debug)]
+pub struct Bundle {
+    /// The prefix of every name.
+    pub prefix: String,
+    /// The recorded program.
+    pub program: Program,
+    /// Its functions, lowered.
+    pub lowered: Vec<Lowered>,
+    /// States, members before what holds them.
+    pub states: Vec<StateType>,
+    /// What is not zero at the start.
+    pub initial: Vec<Initial>,
+    /// Sense and drive codes in, rows out.
+    pub has_chain: bool,
+    /// R, where there is a chain.
+    pub ratio: u32,
+}
+
+impl Bundle {
+    /// Traces and lowers the part of a design.
+    pub fn new(design: &Design, part: Part) -> Self {
+        let on_phase = design
+            .compensation
+            .as_ref()
+            .is_none_or(|c| c.input == CompensationInput::Phase);
+        let has_chain = part != Part::Compensation && on_phase;
+        let program = if has_chain {
+            engine::trace(design)
+        } else {
+            trace_compensation(design)
+        };
+        Bundle {
+            prefix: design.name.clone(),
+            lowered: lower(&program),
+            states: states(&program),
+            initial: if has_chain { initial(design) } else { Vec::new() },
+            program,
+            has_chain,
+            ratio: design.circuit.decimator.ratio,
+        }
+    }
+
+    /// True if any function may note a fault.
+    pub fn may_fault(&self) -> bool {
+        self.lowered.iter().any(|l| l.may_fault)
+    }
+}
+
+/// Bias, subtraction, and both together.
+struct Compensate {
+    bias: Bias,
+    rate: Rate,
+}
+
+impl<A: Arithmetic> Block<A, 2, 2> for Compensate {
+    type State = ();
+    const NAME: &'static str = "compensate";
+
+    fn inputs(&self) -> [Port; 2] {
+        let [thermometer] = Block::<A, 1, 1>::inputs(&self.bias);
+        let [raw_rate, _] = Block::<A, 2, 1>::inputs(&self.rate);
+        [thermometer, raw_rate]
+    }
+
+    fn outputs(&self) -> [Port; 2] {
+        let [bias] = Block::<A, 1, 1>::outputs(&self.bias);
+        let [rate] = Block::<A, 2, 1>::outputs(&self.rate);
+        [bias, rate]
+    }
+
+    fn step(&self, ar: &A, _: &mut (), [thermometer, raw_rate]: [A::Word; 2]) -> [A::Word; 2] {
+        let [bias] = ar.call(&self.bias, "", &mut (), [thermometer]);
+        let [rate] = ar.call(&self.rate, "", &mut (), [raw_rate, bias]);
+        [bias, rate]
+    }
+}
+
+/// The compensation alone as a program: `bias`, `rate`, `compensate`.
+pub fn trace_compensation(design: &Design) -> Program {
+    let trace = Trace::new();
+    if let Some(c) = &design.compensation {
+        let mut block = Compensate {
+            bias: Bias::new(&design.circuit, c),
+            rate: Rate::new(&design.circuit, c),
+        };
+        let casts = block.bias.casts_mut().into_iter();
+        for (id, cast) in casts.chain(block.rate.casts_mut()).enumerate() {
+            cast.id = id;
+        }
+        let ranges = [block.bias.input_range, block.rate.input_range];
+        trace.record(&block, &(), ranges);
+    }
+    trace.finish()
+}
+
+fn states(program: &Program) -> Vec<StateType> {
+    let mut states: Vec<StateType> = Vec::new();
+    for function in &program.functions {
+        if function.state.is_empty() {
+            continue;
+        }
+        let known = states.iter().position(|s| s.name == function.state);
+        let k = known.unwrap_or_else(|| {
+            states.push(StateType {
+                name: function.state,
+                variables: Vec::new(),
+                members: Vec::new(),
+            });
+            states.len() - 1
+        });
+        let state = &mut states[k];
+        for slot in &function.slots {
+            if !state.variables.iter().any(|(name, _, _)| *name == slot.name) {
+                let ty = match slot.kind {
+                    SlotKind::Word(range) => word_type(range),
+                    SlotKind::Residue(bits) => residue_type(bits),
+                };
+                state.variables.push((slot.name, slot.len, ty));
+            }
+        }
+        for member in &function.members {
+            if !state.members.contains(member) {
+                state.members.push(*member);
+            }
+        }
+    }
+    // Those with members hold the others and come last.
+    states.sort_by_key(|s| !s.members.is_empty());
+    states
+}
+
+/// What is not zero in the chain's state before the first sample.
+fn initial(design: &Design) -> Vec<Initial> {
+    let nco = crate::circuit::nco::Oscillator::new(&design.circuit.nco);
+    let mut initial = vec![Initial {
+        member: "nco",
+        variable: "tuning_word",
+        value: nco.tuning_word,
+    }];
+    if let Some(l) = &design.circuit.amplitude_loop {
+        initial.push(Initial {
+            member: "amplitude_loop",
+            variable: "integrator",
+            value: i128::from(l.initial_raw),
+        });
+    }
+    initial.retain(|i| i.value != 0);
+    initial
+}

@@ -1,0 +1,409 @@
+//! A capture in CSV: its own byte parser, a line at a time out of one bounded buffer.
+
+use super::capture::{COLUMNS, Codes, HEADER_HELP};
+use super::capture_lines::{Line, Lines};
+use super::capture_meta::{CaptureMeta, Value};
+use crate::error::{Error, InputError, Result};
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+const BOM: &[u8] = b"\xef\xbb\xbf";
+
+/// The rows of a CSV capture.
+pub(super) struct CsvSource {
+    path: PathBuf,
+    lines: Lines,
+    layout: Layout,
+    codes: Codes,
+    /// The first of the empty lines just passed: fine at the end, refused before a row.
+    empty_line: Option<usize>,
+}
+
+/// Where the two columns stand.
+#[derive(Debug, Clone, Copy)]
+struct Layout {
+    /// Cells in every row.
+    cells: usize,
+    /// 0-based cell of `drive_code` and of `sense_code`.
+    used: [usize; 2],
+}
+
+impl CsvSource {
+    /// Reads comments and header from `input`, which stands at the start of the file.
+    pub(super) fn open(
+        path: &Path,
+        input: Box<dyn Read + Send>,
+        codes: Codes,
+    ) -> Result<(Self, CaptureMeta)> {
+        let mut lines = Lines::new(path, input);
+        let mut meta = CaptureMeta::default();
+        let mut seen = Vec::new();
+        let layout = loop {
+            let number = lines.number;
+            let Some(bytes) = lines.next()? else {
+                return Err(InputError::new("the capture has no header line")
+                    .in_file(path)
+                    .help(HEADER_HELP)
+                    .into());
+            };
+            let line = Line {
+                path,
+                number,
+                bytes: match number {
+                    1 => bytes.strip_prefix(BOM).unwrap_or(bytes),
+                    _ => bytes,
+                },
+            };
+            match line.bytes.trim_ascii_start().first() {
+                None => {}
+                Some(b'#') => read_comment(line, &mut meta, &mut seen)?,
+                Some(_) => break read_header(line)?,
+            }
+        };
+        let source = CsvSource {
+            path: path.to_path_buf(),
+            lines,
+            layout,
+            codes,
+            empty_line: None,
+        };
+        Ok((source, meta))
+    }
+
+    /// Appends up to `max_rows` rows; fewer = the end, or the error that follows them.
+    pub(super) fn read(
+        &mut self,
+        drive: &mut Vec<i32>,
+        sense: &mut Vec<i32>,
+        max_rows: usize,
+    ) -> Result<()> {
+        while drive.len() < max_rows {
+            let bytes = self.lines.whole_lines()?;
+            if bytes.is_empty() {
+                return Ok(());
+            }
+            let (mut used, mut rows) = (0, 0);
+            if self.empty_line.is_none() {
+                while drive.len() < max_rows {
+                    let Some((d, s, next)) = fast_row(bytes, used, self.layout, self.codes) else {
+                        break;
+                    };
+                    drive.push(d);
+                    sense.push(s);
+                    used = next;
+                    rows += 1;
+                }
+            }
+            let at_end = used == bytes.len();
+            self.lines.take(used, rows);
+            if at_end || drive.len() == max_rows {
+                continue;
+            }
+            // A row with any peculiarity, or an error: one line the slow way.
+            let number = self.lines.number;
+            let Some(bytes) = self.lines.next()? else {
+                return Ok(());
+            };
+            if bytes.iter().all(|&b| is_blank(b)) {
+                self.empty_line.get_or_insert(number);
+                continue;
+            }
+            let path = self.path.as_path();
+            if let Some(number) = self.empty_line {
+                let bytes = b"".as_slice();
+                return Err(Line {
+                    path,
+                    number,
+                    bytes,
+                }
+                .refuse(0, "an empty line between rows")
+                .help("take the line away, or put the row there that is missing")
+                .into());
+            }
+            let line = Line {
+                path,
+                number,
+                bytes,
+            };
+            let [d, s] = slow_row(line, self.layout, self.codes)?;
+            drive.push(d);
+            sense.push(s);
+        }
+        Ok(())
+    }
+}
+
+fn is_blank(b: u8) -> bool {
+    b == b' ' || b == b'\t'
+}
+
+/// Reads the row that starts at `at`: both codes and the start of the next line. `None` = the row
+/// has something that [`slow_row`] must look at, such as an error.
+#[inline]
+fn fast_row(bytes: &[u8], at: usize, layout: Layout, codes: Codes) -> Option<(i32, i32, usize)> {
+    let [drive, sense] = layout.used;
+    let (first, second) = (drive.min(sense), drive.max(sense));
+    let at = skip_cells(bytes, at, first)?;
+    let (a, at) = fast_integer(bytes, at)?;
+    if bytes.get(at) != Some(&b',') {
+        return None;
+    }
+    let at = skip_cells(bytes, at, second - first)?;
+    let (b, mut at) = fast_integer(bytes, at)?;
+    if second + 1 < layout.cells {
+        if bytes.get(at) != Some(&b',') {
+            return None;
+        }
+        at = skip_cells(bytes, at, layout.cells - 1 - second)?;
+        while !matches!(bytes.get(at)?, b',' | b'\n' | b'\r') {
+            at += 1;
+        }
+    }
+    if bytes.get(at) == Some(&b'\r') {
+        at += 1;
+    }
+    if bytes.get(at) != Some(&b'\n') {
+        return None;
+    }
+    let range = i64::from(codes.min)..=i64::from(codes.max);
+    if !range.contains(&a) || !range.contains(&b) {
+        return None;
+    }
+    let (d, s) = if drive < sense { (a, b) } else { (b, a) };
+    Some((d as i32, s as i32, at + 1))
+}
+
+/// The position after `count` more commas; `None` if the line has not so many.
+#[inline]
+fn skip_cells(bytes: &[u8], mut at: usize, count: usize) -> Option<usize> {
+    for _ in 0..count {
+        loop {
+            match bytes.get(at)? {
+                b',' => break,
+                b'\n' => return None,
+                _ => at += 1,
+            }
+        }
+        at += 1;
+    }
+    Some(at)
+}
+
+/// Blanks, `-?[0-9]{1,18}`, blanks: the number and the position after.
+#[inline]
+fn fast_integer(bytes: &[u8], mut at: usize) -> Option<(i64, usize)> {
+    while is_blank(*bytes.get(at)?) {
+        at += 1;
+    }
+    let negative = *bytes.get(at)? == b'-';
+    at += usize::from(negative);
+    let start = at;
+    let mut value = 0i64;
+    loop {
+        let digit = bytes.get(at)?.wrapping_sub(b'0');
+        if digit > 9 {
+            break;
+        }
+        if at - start >= 18 {
+            return None;
+        }
+        value = value * 10 + i64::from(digit);
+        at += 1;
+    }
+    if at == start {
+        return None;
+    }
+    while is_blank(*bytes.get(at)?) {
+        at += 1;
+    }
+    Some((if negative { -value } else { value }, at))
+}
+
+/// Reads any row (without its line end), or says what is wrong with it.
+fn slow_row(line: Line<'_>, layout: Layout, codes: Codes) -> Result<[i32; 2]> {
+    let mut found = [0; 2];
+    let (mut start, mut cells, mut surplus) = (0, 0, 0);
+    let mut problem: Option<Error> = None;
+    for cell in line.bytes.split(|&b| b == b',') {
+        if cells == layout.cells {
+            surplus = start;
+        }
+        if let Some(column) = layout.used.iter().position(|&used| used == cells) {
+            match read_cell(line, start, cell, COLUMNS[column], codes) {
+                Ok(code) => found[column] = code,
+                Err(e) => problem = problem.or(Some(e)),
+            }
+        }
+        cells += 1;
+        start += cell.len() + 1;
+    }
+    if cells != layout.cells {
+        let at = match cells > layout.cells {
+            true => surplus,
+            false => line.bytes.len(),
+        };
+        let plural = if cells == 1 { "" } else { "s" };
+        return Err(line
+            .refuse(
+                at,
+                &format!(
+                    "this row has {cells} cell{plural}, the header has {}",
+                    layout.cells
+                ),
+            )
+            .help("every row has as many cells as the header; repair the row or take it away")
+            .into());
+    }
+    problem.map_or(Ok(found), Err)
+}
+
+/// Reads one cell that is used; `start` is its byte offset in the line.
+fn read_cell(line: Line<'_>, start: usize, cell: &[u8], name: &str, codes: Codes) -> Result<i32> {
+    let lead = cell.iter().take_while(|&&b| is_blank(b)).count();
+    let tail = cell.iter().rev().take_while(|&&b| is_blank(b)).count();
+    let text = cell
+        .get(lead..cell.len().saturating_sub(tail))
+        .unwrap_or(b"");
+    let help = "a code is a whole number (`-?[0-9]+`); repair the row or take it away";
+    if text.is_empty() {
+        let message = format!("the cell of {name} is empty");
+        return Err(line.refuse(start, &message).help(help).into());
+    }
+    let shown = shorten(text);
+    let digits = text.strip_prefix(b"-").unwrap_or(text);
+    if digits.is_empty() || !digits.iter().all(u8::is_ascii_digit) {
+        let message = format!("{name} `{shown}` is no integer");
+        return Err(line.refuse(start + lead, &message).help(help).into());
+    }
+    let size = digits.iter().fold(0i64, |v, b| {
+        v.saturating_mul(10).saturating_add(i64::from(b - b'0'))
+    });
+    let value = if digits.len() < text.len() {
+        -size
+    } else {
+        size
+    };
+    i32::try_from(value)
+        .ok()
+        .filter(|code| (codes.min..=codes.max).contains(code))
+        .ok_or_else(|| line.place(start + lead, codes.refuse(&shown, name)).into())
+}
+
+/// Text for a message, cut to a readable length.
+fn shorten(text: &[u8]) -> String {
+    let text = String::from_utf8_lossy(text);
+    let mut shown: String = text.chars().take(40).collect();
+    if shown.len() < text.len() {
+        shown.push('…');
+    }
+    shown
+}
+
+/// Reads one comment line `# key = value`; any other comment, and an unknown key, is passed over.
+/// What follows a further `#` is a remark.
+fn read_comment(
+    line: Line<'_>,
+    meta: &mut CaptureMeta,
+    seen: &mut Vec<&'static str>,
+) -> Result<()> {
+    let text = String::from_utf8_lossy(line.bytes);
+    let help = "a comment line of a capture reads `# fs_hz = 224000.0`; correct the value, or take \
+                the line away";
+    let Some((left, right)) = text.split_once('=') else {
+        return Ok(());
+    };
+    let key = left.trim().trim_start_matches('#').trim();
+    let Some(key) = CaptureMeta::KEYS.into_iter().find(|&known| known == key) else {
+        return Ok(());
+    };
+    let refuse = |offset: usize, message: String| {
+        InputError::new(message)
+            .in_file(line.path)
+            .at_offset(&text, offset)
+            .at(line.number, text[..offset].chars().count() + 1)
+            .help(help)
+    };
+    if seen.contains(&key) {
+        let offset = left.find(key).unwrap_or(0);
+        return Err(refuse(offset, format!("`{key}` is given a second time")).into());
+    }
+    seen.push(key);
+    let value = right.split('#').next().unwrap_or("");
+    let offset = left.len() + 1 + (value.len() - value.trim_start().len());
+    meta.set(key, Value::of_text(value.trim()))
+        .map_err(|problem| refuse(offset, problem).into())
+}
+
+/// Finds the two columns in the header line.
+fn read_header(line: Line<'_>) -> Result<Layout> {
+    if line.bytes.contains(&0) || line.bytes.starts_with(b"\xff\xfe") {
+        let message = "this is neither a CSV file in UTF-8 nor an NPY file (it has binary bytes)";
+        let e = InputError::new(message).in_file(line.path);
+        return Err(e.help(HEADER_HELP).into());
+    }
+    let names: Vec<&[u8]> = line
+        .bytes
+        .split(|&b| b == b',')
+        .map(<[u8]>::trim_ascii)
+        .collect();
+    let mut used = [0; 2];
+    for (column, place) in COLUMNS.into_iter().zip(&mut used) {
+        let is_it = |name: &&[u8]| *name == column.as_bytes();
+        let Some(first) = names.iter().position(is_it) else {
+            let message = format!("the header has no column `{column}`");
+            return Err(line.refuse(0, &message).help(HEADER_HELP).into());
+        };
+        if let Some(again) = names.iter().rposition(is_it).filter(|&last| last > first) {
+            let before: usize = line
+                .bytes
+                .split(|&b| b == b',')
+                .take(again)
+                .map(|cell| cell.len() + 1)
+                .sum();
+            return Err(line
+                .refuse(before, &format!("the header has `{column}` twice"))
+                .help("rename one of the two columns")
+                .into());
+        }
+        *place = first;
+    }
+    Ok(Layout {
+        cells: names.len(),
+        used,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numeric::format::Format;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(4000))]
+
+        #[test]
+        fn what_the_fast_way_accepts_the_slow_way_reads_the_same(
+            bytes in prop::collection::vec(
+                prop::sample::select(b"0123456789012345678999,,,,,--  \t\rx".as_slice()), 0..14),
+            cells in 2usize..5, first in 0usize..5, second in 0usize..4,
+        ) {
+            let used = [first % cells, (first + 1 + second % (cells - 1)) % cells];
+            let (layout, codes) = (Layout { cells, used }, Codes::of(Format::q(1, 15)));
+            let whole = [bytes.as_slice(), b"\n1,2,3,4,5\n"].concat();
+            let line = Line {
+                path: Path::new("x.csv"),
+                number: 2,
+                bytes: bytes.strip_suffix(b"\r").unwrap_or(&bytes),
+            };
+            let slow = slow_row(line, layout, codes).ok();
+            if let Some((d, s, next)) = fast_row(&whole, 0, layout, codes) {
+                prop_assert_eq!(slow, Some([d, s]));
+                prop_assert_eq!(next, bytes.len() + 1);
+            } else if !bytes.contains(&b'\r') {
+                // No number here is too long for the fast way.
+                prop_assert_eq!(slow, None);
+            }
+        }
+    }
+}

@@ -1,0 +1,299 @@
+//! The output of `replay` (`contracts/detection-chain.md`, "Output of `replay`"): rows of numbers
+//! to CSV or NPY, in the file whole or not at all.
+
+use super::npy_header;
+use crate::error::{Error, InputError, Result, io_error};
+use std::fs::{self, File, OpenOptions, Permissions};
+use std::io::{self, Seek, Write};
+use std::path::{Path, PathBuf};
+use tempfile::NamedTempFile;
+
+/// Bytes gathered before they are written.
+const BUFFER_BYTES: usize = 1 << 18;
+
+/// Below it a whole number is exact in an f64 and written without a point.
+const WHOLE_LIMIT: u64 = 1 << 53;
+
+/// What the numbers of a file are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Raw integers; NPY holds them modulo 2^64 as int64.
+    Integer,
+    /// Reals; NPY holds float64, CSV the shortest text that reads back as the same f64.
+    Float,
+}
+
+/// Writes rows to a file that appears under its name only by [`RowWriter::finish`]; dropped
+/// before, it leaves nothing, and an existing file as it was. A path that ends in `.npy` gets an
+/// NPY array (rows x columns, C order), any other CSV with one header line.
+///
+/// What is no regular file (`/dev/stdout`, a pipe) is written straight.
+pub struct RowWriter {
+    path: PathBuf,
+    target: Target,
+    kind: Kind,
+    npy: bool,
+    columns: usize,
+    rows: u64,
+    buffer: Vec<u8>,
+}
+
+enum Target {
+    /// A temporary file beside `path`, the permissions of the file it replaces.
+    Replace {
+        temporary: NamedTempFile,
+        path: PathBuf,
+        permissions: Option<Permissions>,
+    },
+    /// The file itself, which is no regular one.
+    Straight(Box<dyn Write + Send>),
+}
+
+impl RowWriter {
+    /// Opens the output with these column names.
+    ///
+    /// # Errors
+    /// A folder that is missing or cannot be written, an existing file that cannot be written, a
+    /// folder of that name, NPY to what is no regular file. Nothing is left behind.
+    pub fn create(path: &Path, columns: &[&str], kind: Kind) -> Result<Self> {
+        let npy = path
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("npy"));
+        let target = Target::open(path)?;
+        if npy && matches!(target, Target::Straight(_)) {
+            return Err(InputError::new("an NPY file must be a regular file")
+                .in_file(path)
+                .help("write it into a folder, or write CSV (a name without `.npy`)")
+                .into());
+        }
+        let mut writer = RowWriter {
+            path: path.to_path_buf(),
+            target,
+            kind,
+            npy,
+            columns: columns.len(),
+            rows: 0,
+            buffer: Vec::with_capacity(BUFFER_BYTES + 4096),
+        };
+        if npy {
+            writer.buffer = writer.npy_header();
+        } else {
+            writer.buffer.extend(columns.join(",").bytes());
+            writer.buffer.push(b'\n');
+        }
+        Ok(writer)
+    }
+
+    /// Writes one row of raw integers, one a column. A value is written as given, so an unsigned
+    /// word is passed as the non-negative number that it is; NPY keeps the lowest 64 bits.
+    ///
+    /// # Errors
+    /// A failed write; a row of the wrong kind or length.
+    pub fn write_integers(&mut self, values: &[i128]) -> Result<()> {
+        self.check(Kind::Integer, values.len())?;
+        if self.npy {
+            for &value in values {
+                self.buffer.extend((value as i64).to_le_bytes());
+            }
+            return self.end_row();
+        }
+        let mut digits = itoa::Buffer::new();
+        for &value in values {
+            // 64 bits are much faster than 128, and nearly always enough.
+            let text = match i64::try_from(value) {
+                Ok(value) => digits.format(value),
+                Err(_) => digits.format(value),
+            };
+            self.buffer.extend_from_slice(text.as_bytes());
+            self.buffer.push(b',');
+        }
+        self.end_csv_row()
+    }
+
+    /// Writes one row of reals, one a column. In CSV a value is the shortest decimal that reads
+    /// back as the same f64; a whole number has no point, a very small or large one an exponent.
+    ///
+    /// # Errors
+    /// A failed write; a row of the wrong kind or length.
+    pub fn write_floats(&mut self, values: &[f64]) -> Result<()> {
+        self.check(Kind::Float, values.len())?;
+        if self.npy {
+            for value in values {
+                self.buffer.extend(value.to_le_bytes());
+            }
+            return self.end_row();
+        }
+        let mut digits = itoa::Buffer::new();
+        for &value in values {
+            let whole = value as i64;
+            if whole as f64 == value && whole.unsigned_abs() < WHOLE_LIMIT && whole != 0 {
+                self.buffer
+                    .extend_from_slice(digits.format(whole).as_bytes());
+            } else if value.is_finite() && value != 0.0 {
+                // JSON's numbers are the shortest that read back, and made fast.
+                serde_json::to_writer(&mut self.buffer, &value)
+                    .map_err(|e| write_failed(&self.path, &e.into()))?;
+            } else {
+                write!(self.buffer, "{value}").map_err(|e| write_failed(&self.path, &e))?;
+            }
+            self.buffer.push(b',');
+        }
+        self.end_csv_row()
+    }
+
+    /// Writes what is left and puts the file under its name.
+    ///
+    /// # Errors
+    /// A failed write; then nothing is left and an existing file stays.
+    pub fn finish(mut self) -> Result<()> {
+        self.flush()?;
+        let header = self.npy.then(|| self.npy_header());
+        let failed = |e: &io::Error| write_failed(&self.path, e);
+        match self.target {
+            Target::Straight(mut output) => output.flush().map_err(|e| failed(&e)),
+            Target::Replace {
+                mut temporary,
+                path,
+                permissions,
+            } => {
+                let file = temporary.as_file_mut();
+                if let Some(header) = header {
+                    file.rewind().map_err(|e| failed(&e))?;
+                    file.write_all(&header).map_err(|e| failed(&e))?;
+                }
+                if let Some(permissions) = permissions {
+                    file.set_permissions(permissions).map_err(|e| failed(&e))?;
+                }
+                temporary.persist(path).map_err(|e| failed(&e.error))?;
+                Ok(())
+            }
+        }
+    }
+
+    fn npy_header(&self) -> Vec<u8> {
+        let descr = match self.kind {
+            Kind::Integer => "<i8",
+            Kind::Float => "<f8",
+        };
+        npy_header::write(descr, self.rows, self.columns)
+    }
+
+    /// Refuses a row that the file cannot have: a mistake of the program.
+    fn check(&self, kind: Kind, count: usize) -> Result<()> {
+        if kind == self.kind && count == self.columns {
+            return Ok(());
+        }
+        Err(InputError::new(format!(
+            "internal mistake: a row of {count} values ({kind:?}) for {} columns ({:?})",
+            self.columns, self.kind
+        ))
+        .in_file(&self.path)
+        .into())
+    }
+
+    fn end_csv_row(&mut self) -> Result<()> {
+        match self.buffer.last_mut() {
+            Some(comma) if self.columns > 0 => *comma = b'\n',
+            _ => self.buffer.push(b'\n'),
+        }
+        self.end_row()
+    }
+
+    fn end_row(&mut self) -> Result<()> {
+        self.rows += 1;
+        if self.buffer.len() >= BUFFER_BYTES {
+            self.flush()?;
+        }
+        Ok(())
+    }
+
+    fn flush(&mut self) -> Result<()> {
+        match &mut self.target {
+            Target::Replace { temporary, .. } => temporary.as_file_mut().write_all(&self.buffer),
+            Target::Straight(output) => output.write_all(&self.buffer),
+        }
+        .map_err(|e| write_failed(&self.path, &e))?;
+        self.buffer.clear();
+        Ok(())
+    }
+}
+
+impl Target {
+    fn open(path: &Path) -> Result<Target> {
+        for (names, stream) in [
+            (["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"], 1),
+            (["/dev/stderr", "/dev/fd/2", "/proc/self/fd/2"], 2),
+        ] {
+            if names.iter().any(|name| path == Path::new(name)) {
+                return Ok(Target::Straight(match stream {
+                    1 => Box::new(io::stdout()),
+                    _ => Box::new(io::stderr()),
+                }));
+            }
+        }
+        let existing = match fs::metadata(path) {
+            Ok(existing) => Some(existing),
+            Err(e) if e.kind() == io::ErrorKind::NotFound => None,
+            Err(e) => return Err(write_failed(path, &e)),
+        };
+        let Some(existing) = existing else {
+            return Target::replace(path.to_path_buf(), path, None);
+        };
+        if existing.is_dir() {
+            return Err(InputError::new("this is a folder, not a file to write")
+                .in_file(path)
+                .help("name a file in it, such as `rows.csv`")
+                .into());
+        }
+        // Opened without a change to it: may it be written at all?
+        let file = OpenOptions::new().write(true).open(path);
+        let file: File = file.map_err(|e| write_failed(path, &e))?;
+        if !existing.is_file() {
+            return Ok(Target::Straight(Box::new(file)));
+        }
+        // A link stays a link: the file that it names is replaced.
+        let real = fs::canonicalize(path).map_err(|e| write_failed(path, &e))?;
+        Target::replace(real, path, Some(existing.permissions()))
+    }
+
+    /// A temporary file in the folder of `real`; `named` is the path as the user gave it.
+    fn replace(real: PathBuf, named: &Path, permissions: Option<Permissions>) -> Result<Target> {
+        if real.file_name().is_none() {
+            return Err(InputError::new("this names no file to write")
+                .in_file(named)
+                .help("name a file, such as `rows.csv`")
+                .into());
+        }
+        let folder = match real.parent() {
+            Some(parent) if parent != Path::new("") => parent,
+            _ => Path::new("."),
+        };
+        if !folder.is_dir() {
+            let message = format!("cannot write: there is no folder `{}`", folder.display());
+            return Err(InputError::new(message)
+                .in_file(named)
+                .help(format!("make it first: `mkdir -p {}`", folder.display()))
+                .into());
+        }
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".gyrogen-").suffix(".tmp");
+        #[cfg(unix)]
+        {
+            // As for any new file: what the umask leaves of 0666.
+            use std::os::unix::fs::PermissionsExt;
+            builder.permissions(Permissions::from_mode(0o666));
+        }
+        let temporary = builder
+            .tempfile_in(folder)
+            .map_err(|e| write_failed(named, &e))?;
+        Ok(Target::Replace {
+            temporary,
+            path: real,
+            permissions,
+        })
+    }
+}
+
+fn write_failed(path: &Path, e: &io::Error) -> Error {
+    io_error(path, "write the rows", e)
+}
