@@ -5,8 +5,11 @@
 
 pub mod circuit;
 pub mod cli;
+pub mod closure;
 pub mod design;
 pub mod emit;
 pub mod error;
 pub mod numeric;
+pub mod output;
 pub mod record;
+pub mod verify;

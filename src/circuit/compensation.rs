@@ -81,9 +81,11 @@ impl Bias {
             coefficients: compensation.coefficients_raw.clone(),
             coefficient_fraction_bits: coefficient,
             accumulator_fraction_bits: accumulator,
-            first: Cast::to(ACCUMULATOR, coefficient + p, 0, compensation.accumulator),
+            first: Cast::to(ACCUMULATOR, coefficient + p, 0, compensation.accumulator)
+                .with_coefficient(accumulator - coefficient),
             inner: Cast::to(ACCUMULATOR, accumulator + p, 0, compensation.accumulator),
-            outer: Cast::to(ACCUMULATOR, accumulator, 0, compensation.accumulator),
+            outer: Cast::to(ACCUMULATOR, accumulator, 0, compensation.accumulator)
+                .with_coefficient(accumulator - coefficient),
             output: Cast::to(OUTPUT, last, 0, compensation.output),
             meanings: [meaning, format!("bias in deg/s, {}", compensation.output)],
         }
@@ -121,12 +123,16 @@ impl<A: Arithmetic> Block<A, 1, 1> for Bias {
             None => ar.constant(0, coarse),
         };
         let highest = self.coefficients.len().saturating_sub(1);
+        let aligned = self.coefficients.last().map_or(0, |c| c << (fine - coarse).max(0));
+        let mut reported = ar.constant(aligned, fine);
         for (order, coefficient) in orders {
             let cast = if order + 1 == highest { &self.first } else { &self.inner };
-            let inner = ar.cast(ar.mul(t, p), cast, &[t, p]);
+            // An overflow is reported with all words in the accumulator's LSB.
+            let inner = ar.cast(ar.mul(t, p), cast, &[reported, p]);
             // Exact: the accumulator has at least the coefficients' fraction bits.
             let c = ar.constant(coefficient << (fine - coarse), fine);
             t = ar.cast(ar.add(c, inner), &self.outer, &[c, inner]);
+            reported = t;
         }
         [ar.cast(t, &self.output, &[t])]
     }

@@ -3,9 +3,12 @@
 //! Results go to stdout or to files, talk to stderr. Exit status 0 = done and every check holds,
 //! 1 = a check does not hold, 2 = the input cannot be used (`contracts/cli.md`).
 
+mod emit;
 mod replay;
+mod verify;
 
 use crate::error::{Error, Result};
+use crate::verify::compare::Compared;
 use clap::{Parser, Subcommand, ValueEnum};
 use std::process::ExitCode;
 
@@ -19,7 +22,9 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Emit(emit::Arguments),
     Replay(replay::Arguments),
+    Verify(verify::Arguments),
 }
 
 /// How results are printed.
@@ -36,7 +41,9 @@ pub enum OutputFormat {
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
     let result = match &cli.command {
+        Command::Emit(arguments) => emit::run(arguments),
         Command::Replay(arguments) => replay::run(arguments),
+        Command::Verify(arguments) => verify::run(arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -53,4 +60,47 @@ pub fn main() -> ExitCode {
 /// Reads the design named on the command line, or the embedded default.
 fn design(path: Option<&std::path::Path>) -> Result<crate::design::Design> {
     crate::design::reader::read(path)
+}
+
+/// Indented JSON with a final newline: what is written and what `--format json` prints.
+fn json<T: serde::Serialize>(value: &T) -> String {
+    // Structures of strings and finite numbers always have a JSON form.
+    serde_json::to_string_pretty(value).unwrap_or_default() + "\n"
+}
+
+/// Makes a folder for results.
+fn make_folder(folder: &std::path::Path) -> Result<()> {
+    std::fs::create_dir_all(folder)
+        .map_err(|e| crate::error::io_error(folder, "make the folder", &e))
+}
+
+/// A table of numbers for the terminal.
+fn table(header: &[&str]) -> comfy_table::Table {
+    let mut table = comfy_table::Table::new();
+    table.load_preset(comfy_table::presets::UTF8_HORIZONTAL_ONLY);
+    table.set_header(header);
+    table
+}
+
+/// Emitted code against the model, a line each.
+fn comparison_table(compared: &[Compared]) -> comfy_table::Table {
+    let mut table = table(&["emitted", "language", "inputs", "words compared", "mismatches"]);
+    for c in compared {
+        let inputs = if c.exhaustive {
+            format!("{} (all)", c.inputs)
+        } else {
+            c.inputs.to_string()
+        };
+        table.add_row([
+            c.name.clone(),
+            c.language.to_owned(),
+            inputs,
+            c.compared.to_string(),
+            c.mismatches.to_string(),
+        ]);
+    }
+    for column in table.column_iter_mut().skip(2) {
+        column.set_cell_alignment(comfy_table::CellAlignment::Right);
+    }
+    table
 }

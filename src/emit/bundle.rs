@@ -92,9 +92,12 @@ impl Bundle {
 }
 
 /// Bias, subtraction, and both together.
-struct Compensate {
-    bias: Bias,
-    rate: Rate,
+#[derive(Debug, Clone)]
+pub struct Compensate {
+    /// The polynomial.
+    pub bias: Bias,
+    /// The subtraction.
+    pub rate: Rate,
 }
 
 impl<A: Arithmetic> Block<A, 2, 2> for Compensate {
@@ -120,18 +123,23 @@ impl<A: Arithmetic> Block<A, 2, 2> for Compensate {
     }
 }
 
+/// The compensation's blocks with their casts numbered as in a program of their own.
+pub fn compensation_alone(design: &Design) -> Option<(Bias, Rate)> {
+    let compensation = design.compensation.as_ref()?;
+    let mut bias = Bias::new(&design.circuit, compensation);
+    let mut rate = Rate::new(&design.circuit, compensation);
+    let casts = bias.casts_mut().into_iter().chain(rate.casts_mut());
+    for (id, cast) in casts.enumerate() {
+        cast.id = id;
+    }
+    Some((bias, rate))
+}
+
 /// The compensation alone as a program: `bias`, `rate`, `compensate`.
 pub fn trace_compensation(design: &Design) -> Program {
     let trace = Trace::new();
-    if let Some(c) = &design.compensation {
-        let mut block = Compensate {
-            bias: Bias::new(&design.circuit, c),
-            rate: Rate::new(&design.circuit, c),
-        };
-        let casts = block.bias.casts_mut().into_iter();
-        for (id, cast) in casts.chain(block.rate.casts_mut()).enumerate() {
-            cast.id = id;
-        }
+    if let Some((bias, rate)) = compensation_alone(design) {
+        let block = Compensate { bias, rate };
         let ranges = [block.bias.input_range, block.rate.input_range];
         trace.record(&block, &(), ranges);
     }

@@ -4,5 +4,8 @@
 
 pub mod bundle;
 pub mod c;
+pub mod files;
 pub mod lower;
+pub mod manifest;
 pub mod rust;
+pub mod views;

@@ -25,7 +25,6 @@ pub fn constant(raw: i128, ty: Type) -> String {
         Type::Unsigned(Width::W128) => format!("{}_u128", raw as u128),
         Type::Unsigned(Width::W64) => format!("{}_u64", raw as u64),
         Type::Unsigned(Width::W32) => format!("{}_u32", raw as u32),
-        Type::Signed(_) if raw < 0 => format!("({raw}_{})", type_name(ty)),
         Type::Signed(_) => format!("{raw}_{}", type_name(ty)),
         Type::Bool => (raw != 0).to_string(),
     }
@@ -187,24 +186,31 @@ impl Printer<'_> {
 
     fn expression(&self, expr: &Expr, ty: Type) -> String {
         let v = |t: &Typed| self.value(t);
+        // `-1.f()` is `-(1.f())`.
+        let receiver = |t: &Typed| match t.value {
+            Value::Constant(raw) if raw < 0 => format!("({})", self.value(t)),
+            _ => self.value(t),
+        };
         let name = type_name(ty);
         match expr {
-            Expr::Convert(a) | Expr::Low(a) | Expr::ToSigned(a) => format!("{} as {name}", v(a)),
+            Expr::Convert(a) | Expr::Low(a) | Expr::ToSigned(a) => {
+                format!("{} as {name}", receiver(a))
+            }
             Expr::SignExtend(a, bits) => {
                 let Type::Unsigned(width) = a.ty else {
                     return v(a);
                 };
                 match width.bits() - bits {
                     0 => format!("{} as {name}", v(a)),
-                    spare => format!("({}.wrapping_shl({spare}) as {name}) >> {spare}", v(a)),
+                    spare => format!("({}.wrapping_shl({spare}) as {name}) >> {spare}", receiver(a)),
                 }
             }
-            Expr::Add(a, b) => format!("{}.wrapping_add({})", v(a), v(b)),
-            Expr::Sub(a, b) => format!("{}.wrapping_sub({})", v(a), v(b)),
-            Expr::Mul(a, b) => format!("{}.wrapping_mul({})", v(a), v(b)),
-            Expr::Neg(a) => format!("{}.wrapping_neg()", v(a)),
+            Expr::Add(a, b) => format!("{}.wrapping_add({})", receiver(a), v(b)),
+            Expr::Sub(a, b) => format!("{}.wrapping_sub({})", receiver(a), v(b)),
+            Expr::Mul(a, b) => format!("{}.wrapping_mul({})", receiver(a), v(b)),
+            Expr::Neg(a) => format!("{}.wrapping_neg()", receiver(a)),
             Expr::Asr(a, n) => format!("{} >> {n}", v(a)),
-            Expr::AsrIndex(a) => format!("{}.wrapping_shr(i)", v(a)),
+            Expr::AsrIndex(a) => format!("{}.wrapping_shr(i)", receiver(a)),
             Expr::Shl(a, n) => format!("{} << {n}", v(a)),
             Expr::Shr(a, n) => format!("{} >> {n}", v(a)),
             Expr::Mask(a, n) => {
@@ -214,7 +220,7 @@ impl Printer<'_> {
             Expr::Select(t, a, b) => format!("if {} {{ {} }} else {{ {} }}", v(t), v(a), v(b)),
             Expr::Clamp(a, low, high) => format!(
                 "{}.max({}).min({})",
-                v(a),
+                receiver(a),
                 constant(*low, ty),
                 constant(*high, ty)
             ),

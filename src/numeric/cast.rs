@@ -104,6 +104,8 @@ pub struct Cast {
     pub rounding: Rounding,
     /// What happens outside the target; `None`: nothing, the word is exact whatever its size.
     pub overflow: Option<Overflow>,
+    /// The first operand in a report is a coefficient, aligned by this many bits.
+    pub coefficient_shift: Option<u32>,
     narrow: Kernel<i64>,
     wide: Kernel<i128>,
 }
@@ -133,6 +135,7 @@ impl Cast {
             shift,
             rounding,
             overflow,
+            coefficient_shift: None,
             narrow: Kernel::new(shift, target, rounding, overflow, (low, high)),
             wide: Kernel::new(shift, target, rounding, overflow, (low, high)),
         }
@@ -148,6 +151,19 @@ impl Cast {
             q.rounding,
             Some(q.overflow),
         )
+    }
+
+    /// Says that the first operand is a coefficient that was aligned by `shift` bits.
+    pub fn with_coefficient(mut self, shift: i32) -> Self {
+        self.coefficient_shift = Some(shift.max(0) as u32);
+        self
+    }
+
+    /// True if the other cast, of the same key, does the same to every word.
+    pub fn does_as(&self, other: &Cast) -> bool {
+        self.label.key == other.label.key
+            && (self.target, self.gain, self.shift) == (other.target, other.gain, other.shift)
+            && (self.rounding, self.overflow) == (other.rounding, other.overflow)
     }
 
     /// The limits of the target as the overflow mode states them.

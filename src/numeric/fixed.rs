@@ -14,10 +14,14 @@ pub struct Overflowed {
     pub sample: u64,
     /// The node.
     pub label: Label,
+    /// Number of the cast in its chain.
+    pub cast: usize,
     /// The exact word before the overflow step, raw.
     pub value: i128,
     /// What went into the node, raw; see `contracts/detection-chain.md`.
     pub operands: [Option<i128>; 2],
+    /// The first operand is a coefficient, aligned by this many bits.
+    pub coefficient_shift: Option<u32>,
 }
 
 impl std::fmt::Display for Overflowed {
@@ -26,10 +30,15 @@ impl std::fmt::Display for Overflowed {
         let operands: Vec<String> = self.operands.iter().flatten().map(i128::to_string).collect();
         write!(
             f,
-            ": raw value {} does not fit (operands {})",
+            ": raw value {} does not fit (operands {}",
             self.value,
             operands.join(", ")
-        )
+        )?;
+        if let (Some(shift @ 1..), Some(first)) = (self.coefficient_shift, self.operands[0]) {
+            let raw = first >> shift;
+            write!(f, "; {first} is coefficient {raw} aligned by {shift} bits")?;
+        }
+        write!(f, ")")
     }
 }
 
@@ -69,14 +78,16 @@ impl<W, R> Fixed<W, R> {
 impl<W: Lane, R> Fixed<W, R> {
     #[cold]
     #[inline(never)]
-    fn report(&self, label: Label, value: W, operands: &[W]) {
+    fn report(&self, cast: &Cast, value: W, operands: &[W]) {
         if self.overflowed.get().is_none() {
             let operand = |k: usize| operands.get(k).map(|w| w.wide());
             self.overflowed.set(Some(Overflowed {
                 sample: self.sample.get(),
-                label,
+                label: cast.label,
+                cast: cast.id,
                 value: value.wide(),
                 operands: [operand(0), operand(1)],
+                coefficient_shift: cast.coefficient_shift,
             }));
         }
     }
@@ -116,7 +127,7 @@ impl<W: HasKernel, R: Lane> Arithmetic for Fixed<W, R> {
     #[inline(always)]
     fn cast(&self, a: W, cast: &Cast, operands: &[W]) -> W {
         cast.kernel::<W>()
-            .apply(a, |value| self.report(cast.label, value, operands))
+            .apply(a, |value| self.report(cast, value, operands))
     }
     #[inline(always)]
     fn wrap(&self, a: W, bits: u32, _fraction_bits: i32) -> W {

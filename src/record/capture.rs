@@ -29,6 +29,11 @@ enum Source {
     Npy(NpySource),
 }
 
+/// A file that calls itself NPY is read as nothing else.
+fn is_named_npy(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy"))
+}
+
 impl CaptureReader {
     /// Opens a capture and reads its header. The content decides what it is: an NPY magic makes it
     /// NPY (meta from the side-car of the same stem), anything else is read as CSV (meta from the
@@ -58,7 +63,7 @@ impl CaptureReader {
                 .into());
         }
         let codes = Codes::of(adc);
-        let (meta, source) = if start.first() == npy_header::MAGIC.first() {
+        let (meta, source) = if start.first() == npy_header::MAGIC.first() || is_named_npy(path) {
             let npy = NpySource::open(path, file, kind.is_file().then_some(kind.len()), codes)?;
             (CaptureMeta::of_sidecar(path)?, Source::Npy(npy))
         } else {

@@ -1,18 +1,37 @@
 //! Measured records: thermal records and captures (`contracts/record.md`).
 //!
-//! [`capture`] streams captured ADC codes from CSV or NPY; [`capture_meta`] is what a capture says
-//! of itself; [`rows`] writes one row a decimated sample.
+//! [`thermal`] reads a thermal record; `cells` cuts its lines and reads its numbers, [`columns`]
+//! says which column plays which part, `clock` puts the rows in time, `plausibility` and `frozen`
+//! look for what is readable but unlikely; [`stats`] holds the few robust statistics that all of
+//! them share. [`capture`] streams captured ADC codes from CSV or NPY; [`capture_meta`] is what a
+//! capture says of itself; [`rows`] writes one row a decimated sample.
 
 pub mod capture;
 mod capture_csv;
 mod capture_lines;
 pub mod capture_meta;
 mod capture_npy;
+mod cells;
+mod clock;
+pub mod columns;
+mod frozen;
+mod npy_header;
+mod plausibility;
+pub mod rows;
+pub mod stats;
+pub mod thermal;
+mod warning;
+
+#[cfg(test)]
+mod broken_tests;
 #[cfg(test)]
 mod capture_random_tests;
 #[cfg(test)]
 mod capture_tests;
-mod npy_header;
-pub mod rows;
+#[cfg(test)]
+mod reading_tests;
 #[cfg(test)]
 mod rows_tests;
+
+pub use thermal::{ThermalRecord, read};
+pub use warning::Warning;

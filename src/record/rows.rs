@@ -2,11 +2,10 @@
 //! to CSV or NPY, in the file whole or not at all.
 
 use super::npy_header;
-use crate::error::{Error, InputError, Result, io_error};
-use std::fs::{self, File, OpenOptions, Permissions};
-use std::io::{self, Seek, Write};
+use crate::error::{InputError, Result};
+use crate::output::{OutputFile, write_failed};
+use std::io::Write;
 use std::path::{Path, PathBuf};
-use tempfile::NamedTempFile;
 
 /// Bytes gathered before they are written.
 const BUFFER_BYTES: usize = 1 << 18;
@@ -30,23 +29,12 @@ pub enum Kind {
 /// What is no regular file (`/dev/stdout`, a pipe) is written straight.
 pub struct RowWriter {
     path: PathBuf,
-    target: Target,
+    target: OutputFile,
     kind: Kind,
     npy: bool,
     columns: usize,
     rows: u64,
     buffer: Vec<u8>,
-}
-
-enum Target {
-    /// A temporary file beside `path`, the permissions of the file it replaces.
-    Replace {
-        temporary: NamedTempFile,
-        path: PathBuf,
-        permissions: Option<Permissions>,
-    },
-    /// The file itself, which is no regular one.
-    Straight(Box<dyn Write + Send>),
 }
 
 impl RowWriter {
@@ -59,8 +47,8 @@ impl RowWriter {
         let npy = path
             .extension()
             .is_some_and(|e| e.eq_ignore_ascii_case("npy"));
-        let target = Target::open(path)?;
-        if npy && matches!(target, Target::Straight(_)) {
+        let target = OutputFile::open(path)?;
+        if npy && target.is_straight() {
             return Err(InputError::new("an NPY file must be a regular file")
                 .in_file(path)
                 .help("write it into a folder, or write CSV (a name without `.npy`)")
@@ -148,26 +136,7 @@ impl RowWriter {
     pub fn finish(mut self) -> Result<()> {
         self.flush()?;
         let header = self.npy.then(|| self.npy_header());
-        let failed = |e: &io::Error| write_failed(&self.path, e);
-        match self.target {
-            Target::Straight(mut output) => output.flush().map_err(|e| failed(&e)),
-            Target::Replace {
-                mut temporary,
-                path,
-                permissions,
-            } => {
-                let file = temporary.as_file_mut();
-                if let Some(header) = header {
-                    file.rewind().map_err(|e| failed(&e))?;
-                    file.write_all(&header).map_err(|e| failed(&e))?;
-                }
-                if let Some(permissions) = permissions {
-                    file.set_permissions(permissions).map_err(|e| failed(&e))?;
-                }
-                temporary.persist(path).map_err(|e| failed(&e.error))?;
-                Ok(())
-            }
-        }
+        self.target.finish(header.as_deref())
     }
 
     fn npy_header(&self) -> Vec<u8> {
@@ -208,92 +177,8 @@ impl RowWriter {
     }
 
     fn flush(&mut self) -> Result<()> {
-        match &mut self.target {
-            Target::Replace { temporary, .. } => temporary.as_file_mut().write_all(&self.buffer),
-            Target::Straight(output) => output.write_all(&self.buffer),
-        }
-        .map_err(|e| write_failed(&self.path, &e))?;
+        self.target.write_all(&self.buffer)?;
         self.buffer.clear();
         Ok(())
     }
-}
-
-impl Target {
-    fn open(path: &Path) -> Result<Target> {
-        for (names, stream) in [
-            (["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"], 1),
-            (["/dev/stderr", "/dev/fd/2", "/proc/self/fd/2"], 2),
-        ] {
-            if names.iter().any(|name| path == Path::new(name)) {
-                return Ok(Target::Straight(match stream {
-                    1 => Box::new(io::stdout()),
-                    _ => Box::new(io::stderr()),
-                }));
-            }
-        }
-        let existing = match fs::metadata(path) {
-            Ok(existing) => Some(existing),
-            Err(e) if e.kind() == io::ErrorKind::NotFound => None,
-            Err(e) => return Err(write_failed(path, &e)),
-        };
-        let Some(existing) = existing else {
-            return Target::replace(path.to_path_buf(), path, None);
-        };
-        if existing.is_dir() {
-            return Err(InputError::new("this is a folder, not a file to write")
-                .in_file(path)
-                .help("name a file in it, such as `rows.csv`")
-                .into());
-        }
-        // Opened without a change to it: may it be written at all?
-        let file = OpenOptions::new().write(true).open(path);
-        let file: File = file.map_err(|e| write_failed(path, &e))?;
-        if !existing.is_file() {
-            return Ok(Target::Straight(Box::new(file)));
-        }
-        // A link stays a link: the file that it names is replaced.
-        let real = fs::canonicalize(path).map_err(|e| write_failed(path, &e))?;
-        Target::replace(real, path, Some(existing.permissions()))
-    }
-
-    /// A temporary file in the folder of `real`; `named` is the path as the user gave it.
-    fn replace(real: PathBuf, named: &Path, permissions: Option<Permissions>) -> Result<Target> {
-        if real.file_name().is_none() {
-            return Err(InputError::new("this names no file to write")
-                .in_file(named)
-                .help("name a file, such as `rows.csv`")
-                .into());
-        }
-        let folder = match real.parent() {
-            Some(parent) if parent != Path::new("") => parent,
-            _ => Path::new("."),
-        };
-        if !folder.is_dir() {
-            let message = format!("cannot write: there is no folder `{}`", folder.display());
-            return Err(InputError::new(message)
-                .in_file(named)
-                .help(format!("make it first: `mkdir -p {}`", folder.display()))
-                .into());
-        }
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".gyrogen-").suffix(".tmp");
-        #[cfg(unix)]
-        {
-            // As for any new file: what the umask leaves of 0666.
-            use std::os::unix::fs::PermissionsExt;
-            builder.permissions(Permissions::from_mode(0o666));
-        }
-        let temporary = builder
-            .tempfile_in(folder)
-            .map_err(|e| write_failed(named, &e))?;
-        Ok(Target::Replace {
-            temporary,
-            path: real,
-            permissions,
-        })
-    }
-}
-
-fn write_failed(path: &Path, e: &io::Error) -> Error {
-    io_error(path, "write the rows", e)
 }

@@ -1,10 +1,10 @@
-/* {{ banner }}
+/* {{ v.banner }}
  *
  * Integer helpers with defined behaviour on every C99 target: floor shifts, sign extension,
  * limits, and 128-bit words for the few values that need more than 64 bits.
  */
-#ifndef {{ guard }}_ARITH_H
-#define {{ guard }}_ARITH_H
+#ifndef {{ v.guard }}_ARITH_H
+#define {{ v.guard }}_ARITH_H
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -16,85 +16,85 @@
 
 {% for w in [32, 64] %}
 /* floor(a / 2^n), n < {{ w }} */
-static inline int{{ w }}_t {{ p }}_asr_{{ w }}(int{{ w }}_t a, uint32_t n)
+static inline int{{ w }}_t {{ v.p }}_asr_{{ w }}(int{{ w }}_t a, uint32_t n)
 {
     return (a >= 0) ? (int{{ w }}_t)((uint{{ w }}_t)a >> n)
                     : ((-(int{{ w }}_t)((uint{{ w }}_t)(-(a + 1)) >> n)) - 1);
 }
 
 /* The bits up to and with `sign` as a two's-complement number. */
-static inline int{{ w }}_t {{ p }}_sign_extend_{{ w }}(uint{{ w }}_t a, uint{{ w }}_t sign)
+static inline int{{ w }}_t {{ v.p }}_sign_extend_{{ w }}(uint{{ w }}_t a, uint{{ w }}_t sign)
 {
     const uint{{ w }}_t below = (uint{{ w }}_t)(sign - UINT{{ w }}_C(1));
     const uint{{ w }}_t low = a & below;
     return ((a & sign) != UINT{{ w }}_C(0)) ? ((-(int{{ w }}_t)(below - low)) - 1) : (int{{ w }}_t)low;
 }
 
-static inline int{{ w }}_t {{ p }}_clamp_{{ w }}(int{{ w }}_t a, int{{ w }}_t low, int{{ w }}_t high)
+static inline int{{ w }}_t {{ v.p }}_clamp_{{ w }}(int{{ w }}_t a, int{{ w }}_t low, int{{ w }}_t high)
 {
     return (a < low) ? low : ((a > high) ? high : a);
 }
 
 /* As clamp; the first word outside is noted by its number. */
-static inline int{{ w }}_t {{ p }}_check_{{ w }}(int{{ w }}_t a, int{{ w }}_t low, int{{ w }}_t high,
+static inline int{{ w }}_t {{ v.p }}_check_{{ w }}(int{{ w }}_t a, int{{ w }}_t low, int{{ w }}_t high,
                                       uint32_t number, uint32_t *fault)
 {
     if (((a < low) || (a > high)) && (*fault == UINT32_C(0))) {
         *fault = number;
     }
-    return {{ p }}_clamp_{{ w }}(a, low, high);
+    return {{ v.p }}_clamp_{{ w }}(a, low, high);
 }
 {% endfor %}
-{% if wide %}
+{% if v.wide %}
 /* 128-bit two's-complement words. */
 typedef struct {
     uint64_t hi;
     uint64_t lo;
-} {{ p }}_w128_t;
+} {{ v.p }}_w128_t;
 
-static inline {{ p }}_w128_t {{ p }}_w128_make(uint64_t hi, uint64_t lo)
+static inline {{ v.p }}_w128_t {{ v.p }}_w128_make(uint64_t hi, uint64_t lo)
 {
-    {{ p }}_w128_t r;
+    {{ v.p }}_w128_t r;
     r.hi = hi;
     r.lo = lo;
     return r;
 }
 
-static inline bool {{ p }}_w128_is_negative({{ p }}_w128_t a)
+static inline bool {{ v.p }}_w128_is_negative({{ v.p }}_w128_t a)
 {
     return (a.hi >> 63U) != UINT64_C(0);
 }
 
-static inline {{ p }}_w128_t {{ p }}_w128_from_s64(int64_t a)
+static inline {{ v.p }}_w128_t {{ v.p }}_w128_from_s64(int64_t a)
 {
-    return {{ p }}_w128_make((a < 0) ? UINT64_MAX : UINT64_C(0), (uint64_t)a);
+    return {{ v.p }}_w128_make((a < 0) ? UINT64_MAX : UINT64_C(0), (uint64_t)a);
 }
 
 /* The low word; for values that fit. */
-static inline int64_t {{ p }}_w128_to_s64({{ p }}_w128_t a)
+static inline int64_t {{ v.p }}_w128_to_s64({{ v.p }}_w128_t a)
 {
-    return {{ p }}_sign_extend_64(a.lo, UINT64_C(1) << 63U);
+    return {{ v.p }}_sign_extend_64(a.lo, UINT64_C(1) << 63U);
 }
 
-static inline {{ p }}_w128_t {{ p }}_w128_add({{ p }}_w128_t a, {{ p }}_w128_t b)
+static inline {{ v.p }}_w128_t {{ v.p }}_w128_add({{ v.p }}_w128_t a, {{ v.p }}_w128_t b)
 {
     const uint64_t lo = a.lo + b.lo;
     const uint64_t carry = (lo < a.lo) ? UINT64_C(1) : UINT64_C(0);
-    return {{ p }}_w128_make(a.hi + b.hi + carry, lo);
+    return {{ v.p }}_w128_make(a.hi + b.hi + carry, lo);
 }
 
-static inline {{ p }}_w128_t {{ p }}_w128_neg({{ p }}_w128_t a)
+static inline {{ v.p }}_w128_t {{ v.p }}_w128_neg({{ v.p }}_w128_t a)
 {
-    return {{ p }}_w128_add({{ p }}_w128_make(~a.hi, ~a.lo), {{ p }}_w128_make(UINT64_C(0), UINT64_C(1)));
+    return {{ v.p }}_w128_add({{ v.p }}_w128_make(~a.hi, ~a.lo), {{ v.p }}_w128_make(UINT64_C(0), UINT64_C(1)));
 }
 
-static inline {{ p }}_w128_t {{ p }}_w128_sub({{ p }}_w128_t a, {{ p }}_w128_t b)
+static inline {{ v.p }}_w128_t {{ v.p }}_w128_sub({{ v.p }}_w128_t a, {{ v.p }}_w128_t b)
 {
-    return {{ p }}_w128_add(a, {{ p }}_w128_neg(b));
+    return {{ v.p }}_w128_add(a, {{ v.p }}_w128_neg(b));
 }
 
 /* The low 128 bits of the product, from 32-bit digits. */
-static inline {{ p }}_w128_t {{ p }}_w128_mul({{ p }}_w128_t a, {{ p }}_w128_t b)
+static inline {{ v.p }}_w128_t {{ v.p }}_w128_mul({{ v.p }}_w128_t a, {{ v.p }}_w128_t b)
 {
     const uint64_t mask = UINT64_C(0xFFFFFFFF);
     const uint64_t a0 = a.lo & mask;
@@ -107,76 +107,76 @@ static inline {{ p }}_w128_t {{ p }}_w128_mul({{ p }}_w128_t a, {{ p }}_w128_t b
     const uint64_t middle = (p00 >> 32U) + (p01 & mask) + (p10 & mask);
     const uint64_t lo = (p00 & mask) | (middle << 32U);
     const uint64_t hi = (a1 * b1) + (p01 >> 32U) + (p10 >> 32U) + (middle >> 32U);
-    return {{ p }}_w128_make(hi + (a.hi * b.lo) + (a.lo * b.hi), lo);
+    return {{ v.p }}_w128_make(hi + (a.hi * b.lo) + (a.lo * b.hi), lo);
 }
 
-static inline {{ p }}_w128_t {{ p }}_w128_shl({{ p }}_w128_t a, uint32_t n)
+static inline {{ v.p }}_w128_t {{ v.p }}_w128_shl({{ v.p }}_w128_t a, uint32_t n)
 {
     if (n == 0U) {
         return a;
     }
     if (n >= 64U) {
-        return {{ p }}_w128_make(a.lo << (n - 64U), UINT64_C(0));
+        return {{ v.p }}_w128_make(a.lo << (n - 64U), UINT64_C(0));
     }
-    return {{ p }}_w128_make((a.hi << n) | (a.lo >> (64U - n)), a.lo << n);
+    return {{ v.p }}_w128_make((a.hi << n) | (a.lo >> (64U - n)), a.lo << n);
 }
 
 /* a / 2^n with `fill` entering from above; n < 128. */
-static inline {{ p }}_w128_t {{ p }}_w128_shift_in({{ p }}_w128_t a, uint32_t n, uint64_t fill)
+static inline {{ v.p }}_w128_t {{ v.p }}_w128_shift_in({{ v.p }}_w128_t a, uint32_t n, uint64_t fill)
 {
     if (n == 0U) {
         return a;
     }
     if (n == 64U) {
-        return {{ p }}_w128_make(fill, a.hi);
+        return {{ v.p }}_w128_make(fill, a.hi);
     }
     if (n > 64U) {
-        return {{ p }}_w128_make(fill, (a.hi >> (n - 64U)) | (fill << (128U - n)));
+        return {{ v.p }}_w128_make(fill, (a.hi >> (n - 64U)) | (fill << (128U - n)));
     }
-    return {{ p }}_w128_make((a.hi >> n) | (fill << (64U - n)), (a.lo >> n) | (a.hi << (64U - n)));
+    return {{ v.p }}_w128_make((a.hi >> n) | (fill << (64U - n)), (a.lo >> n) | (a.hi << (64U - n)));
 }
 
-static inline {{ p }}_w128_t {{ p }}_w128_shr({{ p }}_w128_t a, uint32_t n)
+static inline {{ v.p }}_w128_t {{ v.p }}_w128_shr({{ v.p }}_w128_t a, uint32_t n)
 {
-    return {{ p }}_w128_shift_in(a, n, UINT64_C(0));
+    return {{ v.p }}_w128_shift_in(a, n, UINT64_C(0));
 }
 
-static inline {{ p }}_w128_t {{ p }}_w128_asr({{ p }}_w128_t a, uint32_t n)
+static inline {{ v.p }}_w128_t {{ v.p }}_w128_asr({{ v.p }}_w128_t a, uint32_t n)
 {
-    return {{ p }}_w128_shift_in(a, n, {{ p }}_w128_is_negative(a) ? UINT64_MAX : UINT64_C(0));
+    return {{ v.p }}_w128_shift_in(a, n, {{ v.p }}_w128_is_negative(a) ? UINT64_MAX : UINT64_C(0));
 }
 
 /* a modulo 2^n, n < 128. */
-static inline {{ p }}_w128_t {{ p }}_w128_mask({{ p }}_w128_t a, uint32_t n)
+static inline {{ v.p }}_w128_t {{ v.p }}_w128_mask({{ v.p }}_w128_t a, uint32_t n)
 {
-    return (n >= 64U) ? {{ p }}_w128_make(a.hi & ((UINT64_C(1) << (n - 64U)) - UINT64_C(1)), a.lo)
-                      : {{ p }}_w128_make(UINT64_C(0), a.lo & ((UINT64_C(1) << n) - UINT64_C(1)));
+    return (n >= 64U) ? {{ v.p }}_w128_make(a.hi & ((UINT64_C(1) << (n - 64U)) - UINT64_C(1)), a.lo)
+                      : {{ v.p }}_w128_make(UINT64_C(0), a.lo & ((UINT64_C(1) << n) - UINT64_C(1)));
 }
 
 /* The low n bits as a two's-complement number, 0 < n <= 128. */
-static inline {{ p }}_w128_t {{ p }}_w128_sign_extend({{ p }}_w128_t a, uint32_t n)
+static inline {{ v.p }}_w128_t {{ v.p }}_w128_sign_extend({{ v.p }}_w128_t a, uint32_t n)
 {
-    return {{ p }}_w128_asr({{ p }}_w128_shl(a, 128U - n), 128U - n);
+    return {{ v.p }}_w128_asr({{ v.p }}_w128_shl(a, 128U - n), 128U - n);
 }
 
-static inline bool {{ p }}_w128_less({{ p }}_w128_t a, {{ p }}_w128_t b)
+static inline bool {{ v.p }}_w128_less({{ v.p }}_w128_t a, {{ v.p }}_w128_t b)
 {
     const uint64_t top = UINT64_C(1) << 63U;
     return ((a.hi ^ top) < (b.hi ^ top)) || ((a.hi == b.hi) && (a.lo < b.lo));
 }
 
-static inline {{ p }}_w128_t {{ p }}_clamp_128({{ p }}_w128_t a, {{ p }}_w128_t low, {{ p }}_w128_t high)
+static inline {{ v.p }}_w128_t {{ v.p }}_clamp_128({{ v.p }}_w128_t a, {{ v.p }}_w128_t low, {{ v.p }}_w128_t high)
 {
-    return {{ p }}_w128_less(a, low) ? low : ({{ p }}_w128_less(high, a) ? high : a);
+    return {{ v.p }}_w128_less(a, low) ? low : ({{ v.p }}_w128_less(high, a) ? high : a);
 }
 
-static inline {{ p }}_w128_t {{ p }}_check_128({{ p }}_w128_t a, {{ p }}_w128_t low, {{ p }}_w128_t high,
+static inline {{ v.p }}_w128_t {{ v.p }}_check_128({{ v.p }}_w128_t a, {{ v.p }}_w128_t low, {{ v.p }}_w128_t high,
                                        uint32_t number, uint32_t *fault)
 {
-    if (({{ p }}_w128_less(a, low) || {{ p }}_w128_less(high, a)) && (*fault == UINT32_C(0))) {
+    if (({{ v.p }}_w128_less(a, low) || {{ v.p }}_w128_less(high, a)) && (*fault == UINT32_C(0))) {
         *fault = number;
     }
-    return {{ p }}_clamp_128(a, low, high);
+    return {{ v.p }}_clamp_128(a, low, high);
 }
 {% endif %}
 #endif

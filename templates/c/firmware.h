@@ -1,44 +1,44 @@
-/* {{ banner }}
+/* {{ v.banner }}
  *
-{% for line in facts %} * {{ line }}
+{% for line in v.facts %} * {{ line }}
 {% endfor %} */
-#ifndef {{ guard }}_H
-#define {{ guard }}_H
+#ifndef {{ v.guard }}_H
+#define {{ v.guard }}_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "{{ p }}_arith.h"
+#include "{{ v.p }}_arith.h"
 
-{% for s in states %}typedef struct {
-{% for v in s.variables %}    {{ v }};
-{% endfor %}} {{ p }}_{{ s.name }}_t;
+{% for s in v.states %}typedef struct {
+{% for x in s.variables %}    {{ x }};
+{% endfor %}} {{ v.p }}_{{ s.name }}_t;
 
-{% endfor %}{% for s in structs %}/* What {{ p }}_{{ s.name }} returns. */
+{% endfor %}{% for s in v.structs %}/* What {{ v.p }}_{{ s.name }} returns. */
 typedef struct {
-{% for v in s.members %}    {{ v.0 }}; /* {{ v.1 }} */
-{% endfor %}} {{ p }}_{{ s.name }}_out_t;
+{% for x in s.members %}    {{ x.0 }}; /* {{ x.1 }} */
+{% endfor %}} {{ v.p }}_{{ s.name }}_out_t;
 
-{% endfor %}{% for f in functions %}/* {{ f.name }}
+{% endfor %}{% for f in v.functions %}/* {{ f.name }}
 {% for line in f.notes %} *   {{ line }}
 {% endfor %} */
 {{ f.declaration }};
 
-{% endfor %}{% if chain %}/* The chain with its sample counter. */
+{% endfor %}{% if v.chain %}/* The chain with its sample counter. */
 typedef struct {
-    {{ p }}_chain_t chain;
+    {{ v.p }}_chain_t chain;
     uint32_t count; /* samples of the decimation period at hand */
     uint32_t fault; /* number of the first overflow where the design says `error`; 0 = none */
-} {{ p }}_t;
+} {{ v.p }}_t;
 
 /* Before the first sample. */
-void {{ p }}_init({{ p }}_t *g);
+void {{ v.p }}_init({{ v.p }}_t *g);
 
-/* One ADC sample of both channels; true when `row` holds a new decimated sample (every {{ ratio }}). */
-bool {{ p }}_push({{ p }}_t *g, int32_t drive, int32_t sense, {{ p }}_period_out_t *row);
+/* One ADC sample of both channels; true when `row` holds a new decimated sample (every {{ v.ratio }}). */
+bool {{ v.p }}_push({{ v.p }}_t *g, int32_t drive, int32_t sense, {{ v.p }}_period_out_t *row);
 
 {% endif %}/* Start-up check: 0 = every function gives the model's bits on the built-in stimulus; otherwise the
  * number of the first function that does not, counted as in the manifest. Stack only. */
-uint32_t {{ p }}_selftest(void);
+uint32_t {{ v.p }}_selftest(void);
 
 #endif

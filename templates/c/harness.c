@@ -1,4 +1,4 @@
-/* {{ banner }}
+/* {{ v.banner }}
  *
  * Host-side driver, not firmware. `selftest` runs the start-up check; `table NAME` writes a table;
  * `call NAME` reads int64 inputs and writes the outputs; `range NAME LOW COUNT` counts one input
@@ -10,8 +10,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "{{ p }}.h"
-#include "{{ p }}_tables.h"
+#include "{{ v.p }}.h"
+#include "{{ v.p }}_tables.h"
 
 #define RECORDS 4096U
 
@@ -27,10 +27,10 @@ static void put(const uint64_t *words, size_t count)
     }
 }
 
-{% for f in functions %}static void call_{{ f.name }}(const int64_t *in, uint64_t *out)
+{% for f in v.tested() %}static void call_{{ f.name }}(const int64_t *in, uint64_t *out)
 {
 {% if f.faults %}    uint32_t fault = UINT32_C(0);
-{% endif %}    const {{ f.result }} r = {{ p }}_{{ f.name }}({{ f.harness_arguments }});
+{% endif %}    const {{ f.result }} r = {{ v.p }}_{{ f.name }}({{ f.harness_arguments }});
 {% for o in f.outputs %}    out[{{ loop.index0 }}] = {{ o }};
 {% endfor %}    out[{{ f.outputs.len() }}] = {% if f.faults %}fault{% else %}UINT64_C(0){% endif %};
 }
@@ -43,7 +43,7 @@ static void put(const uint64_t *words, size_t count)
 } function_t;
 
 static const function_t functions[] = {
-{% for f in functions %}    {"{{ f.name }}", {{ f.inputs.len() }}U, {{ f.outputs.len() + 1 }}U, call_{{ f.name }}},
+{% for f in v.tested() %}    {"{{ f.name }}", {{ f.inputs.len() }}U, {{ f.outputs.len() + 1 }}U, call_{{ f.name }}},
 {% endfor %}    {NULL, 0U, 0U, NULL},
 };
 
@@ -80,9 +80,9 @@ static int range(const function_t *f, int64_t low, int64_t count)
 
 static int table(const char *name)
 {
-{% for t in tables %}    if (strcmp(name, "{{ t.name }}") == 0) {
+{% for t in v.tables %}    if (strcmp(name, "{{ t.name }}") == 0) {
         for (size_t k = 0U; k < {{ t.len }}U; ++k) {
-            const uint64_t word = (uint64_t)(int64_t){{ p }}_{{ t.name }}[k];
+            const uint64_t word = (uint64_t)(int64_t){{ v.p }}_{{ t.name }}[k];
             put(&word, 1U);
         }
         return 0;
@@ -91,18 +91,18 @@ static int table(const char *name)
     return 2;
 }
 
-{% if chain %}static int chain(void)
+{% if v.chain %}static int chain(void)
 {
-    static {{ p }}_t g;
-    {{ p }}_period_out_t row;
+    static {{ v.p }}_t g;
+    {{ v.p }}_period_out_t row;
     int32_t codes[2];
     uint64_t out[16];
-    {{ p }}_init(&g);
+    {{ v.p }}_init(&g);
     while (get(codes, sizeof codes) == 1U) {
-        if ({{ p }}_push(&g, codes[0], codes[1], &row)) {
-{% for o in row %}            out[{{ loop.index0 }}] = {{ o }};
-{% endfor %}            out[{{ row.len() }}] = g.fault;
-            put(out, {{ row.len() + 1 }}U);
+        if ({{ v.p }}_push(&g, codes[0], codes[1], &row)) {
+{% for o in v.row %}            out[{{ loop.index0 }}] = {{ o }};
+{% endfor %}            out[{{ v.row.len() }}] = g.fault;
+            put(out, {{ v.row.len() + 1 }}U);
         }
     }
     return 0;
@@ -115,7 +115,7 @@ static int table(const char *name)
     static char buffer[1U << 16U];
     (void)setvbuf(stdout, buffer, _IOFBF, sizeof buffer);
     if (strcmp(mode, "selftest") == 0) {
-        const uint32_t failed = {{ p }}_selftest();
+        const uint32_t failed = {{ v.p }}_selftest();
         (void)printf("selftest: %s (%" PRIu32 ")\n", (failed == 0U) ? "pass" : "FAIL", failed);
         return (failed == 0U) ? 0 : 1;
     }
@@ -128,7 +128,7 @@ static int table(const char *name)
     if ((strcmp(mode, "table") == 0) && (argc > 2)) {
         return table(argv[2]);
     }
-{% if chain %}    if (strcmp(mode, "chain") == 0) {
+{% if v.chain %}    if (strcmp(mode, "chain") == 0) {
         return chain();
     }
 {% endif %}    (void)fprintf(stderr, "unknown mode or function\n");

@@ -1,7 +1,7 @@
-/* {{ banner }} */
-#include "{{ p }}_tables.h"
+/* {{ v.banner }} */
+#include "{{ v.p }}_tables.h"
 
-{% for t in tables %}const {{ t.ty }} {{ p }}_{{ t.name }}[{{ t.len }}] = {
+{% for t in v.tables %}const {{ t.ty }} {{ v.p }}_{{ t.name }}[{{ t.len }}] = {
 {% for line in t.lines %}    {{ line }}
 {% endfor %}};
 

@@ -1,10 +1,10 @@
-/* {{ banner }} */
-#ifndef {{ guard }}_TABLES_H
-#define {{ guard }}_TABLES_H
+/* {{ v.banner }} */
+#ifndef {{ v.guard }}_TABLES_H
+#define {{ v.guard }}_TABLES_H
 
 #include <stdint.h>
 
-{% for t in tables %}/* {{ t.note }} */
-extern const {{ t.ty }} {{ p }}_{{ t.name }}[{{ t.len }}];
+{% for t in v.tables %}/* {{ t.note }} */
+extern const {{ t.ty }} {{ v.p }}_{{ t.name }}[{{ t.len }}];
 
 {% endfor %}#endif

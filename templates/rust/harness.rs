@@ -1,4 +1,4 @@
-// {{ banner }}
+// {{ v.banner }}
 //
 // Host-side driver, not firmware; the protocol is that of the C bundle's harness.
 use std::io::{BufReader, BufWriter, Read, Write, stdin, stdout};
@@ -19,32 +19,32 @@ fn put(to: &mut impl Write, words: &[u64]) {
 
 type Call = fn(&[i64], &mut Vec<u64>);
 
-{% for f in functions %}{% if f.tested %}fn call_{{ f.name }}(a: &[i64], out: &mut Vec<u64>) {
+{% for f in v.functions %}{% if f.tested %}fn call_{{ f.name }}(a: &[i64], out: &mut Vec<u64>) {
 {% if f.faults %}    let mut fault = 0_u32;
-{% endif %}    let r = {{ p }}::{{ f.name }}({{ f.harness_arguments }});
+{% endif %}    let r = {{ v.p }}::{{ f.name }}({{ f.harness_arguments }});
 {% for o in f.outputs %}    out.push({{ o }});
 {% endfor %}    out.push({% if f.faults %}u64::from(fault){% else %}0{% endif %});
 }
 
 {% endif %}{% endfor %}const FUNCTIONS: &[(&str, usize, Call)] = &[
-{% for f in functions %}{% if f.tested %}    ("{{ f.name }}", {{ f.inputs.len() }}, call_{{ f.name }}),
+{% for f in v.functions %}{% if f.tested %}    ("{{ f.name }}", {{ f.inputs.len() }}, call_{{ f.name }}),
 {% endif %}{% endfor %}];
 
 fn table(name: &str) -> Option<Vec<u64>> {
     match name {
-{% for t in tables %}        "{{ t.name }}" => Some({{ p }}::{{ t.upper }}.iter().map(|v| i64::from(*v) as u64).collect()),
+{% for t in v.tables %}        "{{ t.name }}" => Some({{ v.p }}::{{ t.upper }}.iter().map(|v| i64::from(*v) as u64).collect()),
 {% endfor %}        _ => None,
     }
 }
 
-{% if chain %}fn chain(input: &mut impl Read, output: &mut impl Write) {
-    let mut g = {{ p }}::Detector::new();
+{% if v.chain %}fn chain(input: &mut impl Read, output: &mut impl Write) {
+    let mut g = {{ v.p }}::Detector::new();
     while let Some(bytes) = get::<8>(input) {
         let [a, b, c, d, e, f, h, i] = bytes;
         let drive = i32::from_ne_bytes([a, b, c, d]);
         let sense = i32::from_ne_bytes([e, f, h, i]);
         if let Some(row) = g.push(drive, sense) {
-            put(output, &[{% for o in harness_row %}{{ o }}, {% endfor %}u64::from(g.fault)]);
+            put(output, &[{% for o in v.harness_row %}{{ o }}, {% endfor %}u64::from(g.fault)]);
         }
     }
 }
@@ -58,7 +58,7 @@ fn table(name: &str) -> Option<Vec<u64>> {
     let (mut input, mut output) = (BufReader::new(stdin().lock()), BufWriter::new(stdout().lock()));
     match (mode, function) {
         ("selftest", _) => {
-            let failed = {{ p }}::selftest();
+            let failed = {{ v.p }}::selftest();
             let verdict = if failed == 0 { "pass" } else { "FAIL" };
             println_to(&mut output, &format!("selftest: {verdict} ({failed})"));
             drop(output);
@@ -91,7 +91,7 @@ fn table(name: &str) -> Option<Vec<u64>> {
                 put(&mut output, &out);
             }
         }
-{% if chain %}        ("chain", _) => chain(&mut input, &mut output),
+{% if v.chain %}        ("chain", _) => chain(&mut input, &mut output),
 {% endif %}        _ => {
             eprintln!("unknown mode or function");
             std::process::exit(2);

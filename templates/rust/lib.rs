@@ -1,30 +1,30 @@
-// {{ banner }}
+// {{ v.banner }}
 //
-{% for line in facts %}// {{ line }}
+{% for line in v.facts %}// {{ line }}
 {% endfor %}
 #![no_std]
 #![forbid(unsafe_code)]
 #![allow(clippy::all)]
 
-{% for t in tables %}/// {{ t.note }}
+{% for t in v.tables %}/// {{ t.note }}
 pub static {{ t.upper }}: [{{ t.ty }}; {{ t.len }}] = [
 {% for line in t.lines %}    {{ line }}
 {% endfor %}];
 
-{% endfor %}{% for s in states %}/// State of `{{ s.name }}`.
+{% endfor %}{% for s in v.states %}/// State of `{{ s.name }}`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct {{ s.camel }} {
-{% for v in s.variables %}    pub {{ v }},
+{% for x in s.variables %}    pub {{ x }},
 {% endfor %}}
 
-{% endfor %}{% for s in structs %}/// What `{{ s.name }}` returns.
+{% endfor %}{% for s in v.structs %}/// What `{{ s.name }}` returns.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct {{ s.camel }}Out {
-{% for v in s.members %}    /// {{ v.1 }}
-    pub {{ v.0 }},
+{% for x in s.members %}    /// {{ x.1 }}
+    pub {{ x.0 }},
 {% endfor %}}
 
-{% endfor %}{% for c in checks %}/// Limits `a`; the first word outside is noted by its number.
+{% endfor %}{% for c in v.checks %}/// Limits `a`; the first word outside is noted by its number.
 fn check_{{ c }}(a: {{ c }}, low: {{ c }}, high: {{ c }}, number: u32, fault: &mut u32) -> {{ c }} {
     if (a < low || a > high) && *fault == 0 {
         *fault = number;
@@ -32,9 +32,9 @@ fn check_{{ c }}(a: {{ c }}, low: {{ c }}, high: {{ c }}, number: u32, fault: &m
     a.max(low).min(high)
 }
 
-{% endfor %}{% for f in functions %}{% for line in f.notes %}/// {{ line }}
+{% endfor %}{% for f in v.functions %}{% for line in f.notes %}/// {{ line }}
 {% endfor %}{{ f.definition }}
-{% endfor %}{% if chain %}/// The chain with its sample counter.
+{% endfor %}{% if v.chain %}/// The chain with its sample counter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Detector {
     /// Every block's state.
@@ -56,7 +56,7 @@ impl Detector {
     pub fn new() -> Self {
         #[allow(unused_mut)]
         let mut chain = Chain::default();
-{% for i in initial %}        chain.{{ i }};
+{% for i in v.initial %}        chain.{{ i }};
 {% endfor %}        Detector {
             chain,
             count: 0,
@@ -64,15 +64,15 @@ impl Detector {
         }
     }
 
-    /// One ADC sample of both channels; a row after every {{ ratio }}.
+    /// One ADC sample of both channels; a row after every {{ v.ratio }}.
     pub fn push(&mut self, drive: i32, sense: i32) -> Option<PeriodOut> {
-        sample(&mut self.chain, drive, sense{% if sample_faults %}, &mut self.fault{% endif %});
+        sample(&mut self.chain, drive, sense{% if v.sample_faults %}, &mut self.fault{% endif %});
         self.count = self.count.wrapping_add(1);
-        if self.count < {{ ratio }} {
+        if self.count < {{ v.ratio }} {
             return None;
         }
         self.count = 0;
-        Some(period(&mut self.chain{% if period_faults %}, &mut self.fault{% endif %}))
+        Some(period(&mut self.chain{% if v.period_faults %}, &mut self.fault{% endif %}))
     }
 }
 
@@ -80,7 +80,7 @@ impl Detector {
     (h ^ word).wrapping_mul(0x100_0000_01b3)
 }
 
-{% if stimulated %}fn stimulus(x: &mut u64, low: i64, span: u64) -> i64 {
+{% if v.stimulated %}fn stimulus(x: &mut u64, low: i64, span: u64) -> i64 {
     *x = x.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
     let r = *x >> 1;
     let offset = match span.checked_add(1) {
@@ -94,12 +94,12 @@ impl Detector {
 /// number of the first function that does not, counted as in the manifest.
 pub fn selftest() -> u32 {
     const BASIS: u64 = 0xcbf2_9ce4_8422_2325;
-{% for t in tables %}    if {{ t.upper }}.iter().fold(BASIS, |h, v| mix(h, i64::from(*v) as u64)) != {{ t.checksum }} {
+{% for t in v.tables %}    if {{ t.upper }}.iter().fold(BASIS, |h, v| mix(h, i64::from(*v) as u64)) != {{ t.checksum }} {
         return {{ t.number }}; // table {{ t.name }}
     }
-{% endfor %}{% for f in functions %}{% if f.tested %}    {
+{% endfor %}{% for f in v.functions %}{% if f.tested %}    {
         let mut h = BASIS;
-        let mut x = {{ seed }}_u64;
+        let mut x = {{ v.seed }}_u64;
 {% if f.faults %}        let mut fault = 0_u32;
 {% endif %}        for _ in 0..{{ f.count }}_u32 {
 {% for i in f.inputs %}            let a{{ loop.index0 }} = stimulus(&mut x, {{ i.low }}, {{ i.span }}) as {{ i.ty }};
@@ -110,19 +110,19 @@ pub fn selftest() -> u32 {
             return {{ f.number }}; // {{ f.name }}
         }
     }
-{% endif %}{% endfor %}{% if chain %}    {
+{% endif %}{% endfor %}{% if v.chain %}    {
         let mut h = BASIS;
-        let mut x = {{ seed }}_u64;
+        let mut x = {{ v.seed }}_u64;
         let mut g = Detector::new();
-        for _ in 0..{{ chain_count }}_u32 {
-            let drive = stimulus(&mut x, {{ code_low }}, {{ code_span }}) as i32;
-            let sense = stimulus(&mut x, {{ code_low }}, {{ code_span }}) as i32;
+        for _ in 0..{{ v.chain_count }}_u32 {
+            let drive = stimulus(&mut x, {{ v.code_low }}, {{ v.code_span }}) as i32;
+            let sense = stimulus(&mut x, {{ v.code_low }}, {{ v.code_span }}) as i32;
             if let Some(row) = g.push(drive, sense) {
-{% for o in row %}                h = mix(h, {{ o }});
+{% for o in v.row %}                h = mix(h, {{ o }});
 {% endfor %}            }
         }
-        if h != {{ chain_checksum }} {
-            return {{ chain_number }}; // chain
+        if h != {{ v.chain_checksum }} {
+            return {{ v.chain_number }}; // chain
         }
     }
 {% endif %}    0

@@ -177,7 +177,13 @@ impl Trace {
         program.casts[cast.id] = cast.clone();
         let seen = &mut program.cast_ranges[cast.id];
         *seen = Some(seen.map_or(before_overflow, |r| r.join(before_overflow)));
-        cast.id
+        // Channels share a function where their casts do the same and need not be told apart.
+        let seen = program.casts.iter().zip(&program.cast_ranges);
+        let mut seen = seen.map(|(other, range)| range.map(|_| other));
+        let first = seen.position(|other| {
+            other.is_some_and(|o| o.overflow != Some(Overflow::Error) && o.does_as(cast))
+        });
+        first.unwrap_or(cast.id)
     }
 }
 

@@ -1,0 +1,71 @@
+//! `gyrogen verify`: rebuilds a bundle from its own files alone and runs its vectors.
+
+use super::OutputFormat;
+use crate::error::{Error, Result};
+use crate::verify::bundle::{self, Verification};
+use std::path::PathBuf;
+
+/// Rebuild a firmware bundle from its own files, run its self-test and vectors.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// The bundle's folder.
+    bundle: PathBuf,
+    /// Where the code runs.
+    #[arg(long, value_enum, default_value = "host")]
+    target: Target,
+    /// Folder for verify.json; the bundle itself if left out.
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// How the result is printed.
+    #[arg(long, value_enum, default_value = "text")]
+    format: OutputFormat,
+}
+
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum Target {
+    Host,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A folder that holds no bundle (exit 2); a difference (exit 1).
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let Target::Host = arguments.target;
+    let command = format!("gyrogen verify {}", arguments.bundle.display());
+    let verification = bundle::verify(&arguments.bundle, &command)?;
+    let json = super::json(&verification);
+    let folder = arguments.out.as_ref().unwrap_or(&arguments.bundle);
+    super::make_folder(folder)?;
+    crate::output::write_whole(&folder.join("verify.json"), json.as_bytes())?;
+    match arguments.format {
+        OutputFormat::Json => print!("{json}"),
+        OutputFormat::Text => print(&verification),
+    }
+    if verification.holds {
+        return Ok(());
+    }
+    Err(Error::Check(reasons(&verification).join("; ")))
+}
+
+fn print(v: &Verification) {
+    println!("{}", super::comparison_table(&v.functions));
+    println!("self-test: {}", if v.selftest { "pass" } else { "FAIL" });
+    println!("toolchain: {}", v.toolchain);
+}
+
+fn reasons(v: &Verification) -> Vec<String> {
+    let mut reasons = Vec::new();
+    for f in v.functions.iter().filter(|f| f.mismatches > 0) {
+        let first = f.first.as_deref().unwrap_or("");
+        reasons.push(format!("{} ({}): first difference at {first}", f.name, f.language));
+    }
+    if !v.selftest {
+        reasons.push("the self-test fails".into());
+    }
+    if !v.changed_files.is_empty() {
+        let files = v.changed_files.join(", ");
+        reasons.push(format!("files differ from the manifest: {files}"));
+    }
+    reasons
+}

@@ -1,0 +1,27 @@
+//! The closure: what a measured record says about the declared model.
+//!
+//! [`baseline`] fits the bias model, a polynomial in the thermometer's reading. It is made of
+//! [`polynomial`] (algebra and least squares), [`weights`] (spikes, dwells), [`noise`] (its
+//! correlation, and the coefficients' covariance), [`folds`] (held-out blocks), [`order`] (its
+//! choice), [`sweep`] (heating against cooling) and [`checks`] (what a user should know of before
+//! believing the fit). Nothing here knows the plant (law 4).
+
+pub mod baseline;
+pub mod checks;
+pub mod folds;
+pub mod noise;
+pub mod order;
+pub mod polynomial;
+pub mod sweep;
+pub mod weights;
+
+#[cfg(test)]
+mod baseline_tests;
+#[cfg(test)]
+mod check_tests;
+#[cfg(test)]
+mod lego_tests;
+#[cfg(test)]
+mod synthetic;
+
+pub use baseline::{BaselineFit, fit};

@@ -1,0 +1,347 @@
+//! What the templates show: strings only, made from the bundle.
+
+use super::bundle::{Bundle, StateType};
+use super::lower::{Type, Width};
+use super::{c, rust};
+use crate::numeric::trace::ir::Interval;
+
+/// A language to print.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Language {
+    /// C99.
+    C,
+    /// Rust, `no_std`.
+    Rust,
+}
+
+/// A table.
+#[derive(Debug, Clone)]
+pub struct TableView {
+    /// Name without the prefix.
+    pub name: String,
+    /// Name in capitals.
+    pub upper: String,
+    /// Element type.
+    pub ty: &'static str,
+    /// Entries.
+    pub len: usize,
+    /// What it holds.
+    pub note: String,
+    /// Entries, ten a line.
+    pub lines: Vec<String>,
+    /// Raw entries.
+    pub entries: Vec<i64>,
+    /// Number in the self-test.
+    pub number: u32,
+    /// FNV-1a of the entries.
+    pub checksum: String,
+}
+
+/// A state's type.
+#[derive(Debug, Clone)]
+pub struct StateView {
+    /// Name.
+    pub name: String,
+    /// Name as a Rust type.
+    pub camel: String,
+    /// Declarations without `;` or `,`.
+    pub variables: Vec<String>,
+}
+
+/// A structure that a function returns.
+#[derive(Debug, Clone)]
+pub struct StructView {
+    /// The function's name.
+    pub name: String,
+    /// As a Rust type, without `Out`.
+    pub camel: String,
+    /// Declaration and meaning.
+    pub members: Vec<(String, String)>,
+}
+
+/// An input of a function in the self-test.
+#[derive(Debug, Clone)]
+pub struct InputView {
+    /// Type.
+    pub ty: String,
+    /// Lower end.
+    pub low: String,
+    /// Width of the range.
+    pub span: String,
+}
+
+/// A function.
+#[derive(Debug, Clone)]
+pub struct FunctionView {
+    /// Name without the prefix.
+    pub name: String,
+    /// Domain, range, meaning.
+    pub notes: Vec<String>,
+    /// Prototype without `;`.
+    pub declaration: String,
+    /// Definition.
+    pub definition: String,
+    /// Type of the result.
+    pub result: String,
+    /// It may note a fault.
+    pub faults: bool,
+    /// It has no state and inputs of at most 64 bits: the self-test and the harness call it.
+    pub tested: bool,
+    /// Its inputs.
+    pub inputs: Vec<InputView>,
+    /// Arguments a0, a1, ... in the self-test.
+    pub arguments: String,
+    /// Arguments from an array of 64-bit words in the harness.
+    pub harness_arguments: String,
+    /// Outputs of `r` as unsigned 64-bit words.
+    pub outputs: Vec<String>,
+    /// Number in the self-test.
+    pub number: u32,
+    /// Draws in the self-test.
+    pub count: u32,
+    /// FNV-1a of the outputs.
+    pub checksum: String,
+}
+
+/// The tables of a bundle.
+pub fn tables(bundle: &Bundle, language: Language) -> Vec<TableView> {
+    let mut tables = Vec::new();
+    for (k, table) in bundle.program.sine_tables.iter().enumerate() {
+        let note = format!(
+            "One turn of a sine, {} entries, amplitude {} (error at most half an LSB)",
+            table.entries.len(),
+            table.entries.iter().max().copied().unwrap_or(0)
+        );
+        tables.push((format!("sine_{k}"), note, table.entries.to_vec()));
+    }
+    for table in &bundle.program.index_tables {
+        let note = format!(
+            "atan(2^-i) in units of 2^-{} turn (error at most half a unit)",
+            table.fraction_bits
+        );
+        tables.push((table.name.to_owned(), note, table.entries.to_vec()));
+    }
+    tables
+        .into_iter()
+        .enumerate()
+        .map(|(k, (name, note, entries))| table(k, name, note, entries, language))
+        .collect()
+}
+
+fn table(
+    k: usize,
+    name: String,
+    note: String,
+    entries: Vec<i64>,
+    language: Language,
+) -> TableView {
+    let largest = entries.iter().map(|v| v.unsigned_abs()).max().unwrap_or(0);
+    let (c_type, rust_type) = match largest {
+        0..=0x7fff => ("int16_t", "i16"),
+        0x8000..=0x7fff_ffff => ("int32_t", "i32"),
+        _ => ("int64_t", "i64"),
+    };
+    let entry = |v: &i64| match (language, c_type) {
+        (Language::C, "int64_t") => format!("INT64_C({v})"),
+        (Language::C, "int32_t") => format!("INT32_C({v})"),
+        _ => v.to_string(),
+    };
+    let line = |chunk: &[i64]| chunk.iter().map(|v| entry(v) + ",").collect::<Vec<_>>().join(" ");
+    TableView {
+        upper: name.to_uppercase(),
+        name,
+        ty: if language == Language::C { c_type } else { rust_type },
+        len: entries.len(),
+        note,
+        lines: entries.chunks(10).map(line).collect(),
+        number: k as u32 + 1,
+        checksum: format!("{:#x}", entries.iter().fold(BASIS, |h, v| mix(h, *v as u64))),
+        entries,
+    }
+}
+
+/// The states of a bundle.
+pub fn states(bundle: &Bundle, language: Language) -> Vec<StateView> {
+    bundle.states.iter().map(|s| state(bundle, s, language)).collect()
+}
+
+fn state(bundle: &Bundle, s: &StateType, language: Language) -> StateView {
+    let p = &bundle.prefix;
+    let mut variables = Vec::new();
+    for (name, len, ty) in &s.variables {
+        variables.push(match (language, len) {
+            (Language::C, 1) => format!("{} {name}", c::type_name(p, *ty)),
+            (Language::C, n) => format!("{} {name}[{n}]", c::type_name(p, *ty)),
+            (Language::Rust, 1) => format!("{name}: {}", rust::type_name(*ty)),
+            (Language::Rust, n) => format!("{name}: [{}; {n}]", rust::type_name(*ty)),
+        });
+    }
+    for (name, ty) in &s.members {
+        variables.push(match language {
+            Language::C => format!("{p}_{ty}_t {name}"),
+            Language::Rust => format!("{name}: {}", rust::camel(ty)),
+        });
+    }
+    StateView {
+        name: s.name.to_owned(),
+        camel: rust::camel(s.name),
+        variables,
+    }
+}
+
+/// The structures that functions return.
+pub fn structs(bundle: &Bundle, language: Language) -> Vec<StructView> {
+    let mut structs = Vec::new();
+    for (function, lowered) in bundle.program.functions.iter().zip(&bundle.lowered) {
+        if lowered.outputs.len() < 2 {
+            continue;
+        }
+        let ports = function.outputs.iter().filter(|(port, _)| !port.name.is_empty());
+        let members = ports.zip(&lowered.outputs).map(|((port, _), (name, v))| {
+            let declaration = match language {
+                Language::C => format!("{} {name}", c::type_name(&bundle.prefix, v.ty)),
+                Language::Rust => format!("{name}: {}", rust::type_name(v.ty)),
+            };
+            (declaration, port.meaning.clone())
+        });
+        structs.push(StructView {
+            name: function.name.clone(),
+            camel: rust::camel(&function.name),
+            members: members.collect(),
+        });
+    }
+    structs
+}
+
+/// The functions of a bundle; checksums of the tested ones are filled in by the caller.
+pub fn functions(bundle: &Bundle, language: Language) -> Vec<FunctionView> {
+    (0..bundle.program.functions.len())
+        .map(|k| function(bundle, k, language))
+        .collect()
+}
+
+fn function(bundle: &Bundle, k: usize, language: Language) -> FunctionView {
+    let (function, lowered) = (&bundle.program.functions[k], &bundle.lowered[k]);
+    let p = &bundle.prefix;
+    let mut notes = Vec::new();
+    for (port, range) in &function.inputs {
+        notes.push(format!(
+            "in  {}: {} .. {}; {}",
+            port.name, range.low, range.high, port.meaning
+        ));
+    }
+    for (port, id) in &function.outputs {
+        if !port.name.is_empty() {
+            let range = function.nodes[*id].range;
+            notes.push(format!(
+                "out {}: {} .. {}; {}",
+                port.name, range.low, range.high, port.meaning
+            ));
+        }
+    }
+    notes.extend(guarantee(&function.name).map(str::to_owned));
+
+    let fault = match (lowered.may_fault, language) {
+        (false, _) => "",
+        (true, Language::C) => ", &fault",
+        (true, Language::Rust) => ", &mut fault",
+    };
+    let arguments: Vec<String> = (0..lowered.inputs.len()).map(|i| format!("a{i}")).collect();
+    let ty = |ty: &Type| match language {
+        Language::C => c::type_name(p, *ty),
+        Language::Rust => rust::type_name(*ty).to_owned(),
+    };
+    let from_array: Vec<String> = lowered
+        .inputs
+        .iter()
+        .enumerate()
+        .map(|(i, t)| match language {
+            Language::C => format!("({})in[{i}]", ty(t)),
+            Language::Rust => format!("a[{i}] as {}", ty(t)),
+        })
+        .collect();
+    let outputs = match lowered.outputs.as_slice() {
+        [(_, v)] => vec![word_64("r", v.ty, language)],
+        several => several
+            .iter()
+            .map(|(name, v)| word_64(&format!("r.{name}"), v.ty, language))
+            .collect(),
+    };
+    let inputs = function.inputs.iter().zip(&lowered.inputs);
+    FunctionView {
+        name: function.name.clone(),
+        notes,
+        declaration: c::signature(bundle, k),
+        definition: match language {
+            Language::C => c::definition(bundle, k),
+            Language::Rust => rust::definition(bundle, k),
+        },
+        result: match lowered.outputs.as_slice() {
+            [(_, v)] => ty(&v.ty),
+            _ => format!("{p}_{}_out_t", function.name),
+        },
+        faults: lowered.may_fault,
+        tested: false,
+        inputs: inputs.map(|((_, range), t)| input(*range, ty(t), language)).collect(),
+        arguments: arguments.join(", ") + fault,
+        harness_arguments: from_array.join(", ") + fault,
+        outputs,
+        number: 0,
+        count: 0,
+        checksum: String::new(),
+    }
+}
+
+fn input(range: Interval, ty: String, language: Language) -> InputView {
+    let span = (range.high - range.low) as u64;
+    match language {
+        Language::C => InputView {
+            ty,
+            low: c::constant("", range.low, Type::Signed(Width::W64)),
+            span: format!("UINT64_C({span})"),
+        },
+        Language::Rust => InputView {
+            ty,
+            low: rust::constant(range.low, Type::Signed(Width::W64)),
+            span: format!("{span}_u64"),
+        },
+    }
+}
+
+/// An expression's low 64 bits, unsigned.
+pub fn word_64(expression: &str, ty: Type, language: Language) -> String {
+    match (language, ty) {
+        (Language::C, Type::Signed(Width::W128) | Type::Unsigned(Width::W128)) => {
+            format!("{expression}.lo")
+        }
+        (Language::C, Type::Signed(_)) => format!("(uint64_t)(int64_t){expression}"),
+        (Language::C, _) => format!("(uint64_t){expression}"),
+        (Language::Rust, _) => format!("{expression} as u64"),
+    }
+}
+
+/// What a block's result is worth against real arithmetic on the same inputs.
+fn guarantee(function: &str) -> Option<&'static str> {
+    let base = function.trim_end_matches(|c: char| c == '_' || c.is_ascii_digit());
+    Some(match base {
+        "nco" => "error: phase exact modulo one turn; the table's address drops the low phase bits",
+        "demodulate" | "decimate" => {
+            "error: one rounding to the output's LSB (half an LSB if to nearest), nothing else"
+        }
+        "integrate" | "retune" => "error: none, exact modulo 2^width",
+        "cordic" => {
+            "error: residual angle at most atan(2^-(n-1)), and half a unit for each of n table angles"
+        }
+        "bias" => "error: see the budget in the report; each step one rounding to the accumulator's LSB",
+        "rate" => "error: one rounding of the input to the output's LSB; the difference is exact",
+        _ => return None,
+    })
+}
+
+/// Start of the FNV-like checksum.
+pub const BASIS: u64 = 0xcbf2_9ce4_8422_2325;
+
+/// One step of the checksum.
+pub fn mix(h: u64, word: u64) -> u64 {
+    (h ^ word).wrapping_mul(0x100_0000_01b3)
+}

@@ -1,0 +1,176 @@
+//! Files that appear whole or not at all.
+
+use crate::error::{Error, InputError, Result, io_error};
+use std::fs::{self, File, OpenOptions, Permissions};
+use std::io::{self, Seek, Write};
+use std::path::{Path, PathBuf};
+use tempfile::NamedTempFile;
+
+/// A file that appears under its name only by [`OutputFile::finish`]; dropped before, it leaves
+/// nothing, and an existing file as it was. What is no regular file is written straight.
+pub struct OutputFile {
+    named: PathBuf,
+    target: Target,
+}
+
+enum Target {
+    /// A temporary file beside `path`, the permissions of the file it replaces.
+    Replace {
+        temporary: NamedTempFile,
+        path: PathBuf,
+        permissions: Option<Permissions>,
+    },
+    /// The file itself, which is no regular one.
+    Straight(Box<dyn Write + Send>),
+}
+
+
+impl OutputFile {
+    /// Opens the output.
+    ///
+    /// # Errors
+    /// A folder that is missing or cannot be written, an existing file that cannot be written, a
+    /// folder of that name. Nothing is left behind.
+    pub fn open(path: &Path) -> Result<Self> {
+        Ok(OutputFile {
+            named: path.to_path_buf(),
+            target: Target::open(path)?,
+        })
+    }
+
+    /// True for what is no regular file (`/dev/stdout`, a pipe).
+    pub fn is_straight(&self) -> bool {
+        matches!(self.target, Target::Straight(_))
+    }
+
+    /// Appends bytes.
+    ///
+    /// # Errors
+    /// A failed write.
+    pub fn write_all(&mut self, bytes: &[u8]) -> Result<()> {
+        match &mut self.target {
+            Target::Replace { temporary, .. } => temporary.as_file_mut().write_all(bytes),
+            Target::Straight(output) => output.write_all(bytes),
+        }
+        .map_err(|e| write_failed(&self.named, &e))
+    }
+
+    /// Overwrites the file's start with `start`, if any, and puts the file under its name.
+    ///
+    /// # Errors
+    /// A failed write; then nothing is left and an existing file stays.
+    pub fn finish(self, start: Option<&[u8]>) -> Result<()> {
+        let named = self.named;
+        let failed = |e: &io::Error| write_failed(&named, e);
+        match self.target {
+            Target::Straight(mut output) => output.flush().map_err(|e| failed(&e)),
+            Target::Replace {
+                mut temporary,
+                path,
+                permissions,
+            } => {
+                let file = temporary.as_file_mut();
+                if let Some(start) = start {
+                    file.rewind().map_err(|e| failed(&e))?;
+                    file.write_all(start).map_err(|e| failed(&e))?;
+                }
+                if let Some(permissions) = permissions {
+                    file.set_permissions(permissions).map_err(|e| failed(&e))?;
+                }
+                temporary.persist(path).map_err(|e| failed(&e.error))?;
+                Ok(())
+            }
+        }
+    }
+}
+
+/// Writes a file whole or not at all.
+///
+/// # Errors
+/// As [`OutputFile`].
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
+    let mut file = OutputFile::open(path)?;
+    file.write_all(bytes)?;
+    file.finish(None)
+}
+
+impl Target {
+    fn open(path: &Path) -> Result<Target> {
+        for (names, stream) in [
+            (["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"], 1),
+            (["/dev/stderr", "/dev/fd/2", "/proc/self/fd/2"], 2),
+        ] {
+            if names.iter().any(|name| path == Path::new(name)) {
+                return Ok(Target::Straight(match stream {
+                    1 => Box::new(io::stdout()),
+                    _ => Box::new(io::stderr()),
+                }));
+            }
+        }
+        let existing = match fs::metadata(path) {
+            Ok(existing) => Some(existing),
+            Err(e) if e.kind() == io::ErrorKind::NotFound => None,
+            Err(e) => return Err(write_failed(path, &e)),
+        };
+        let Some(existing) = existing else {
+            return Target::replace(path.to_path_buf(), path, None);
+        };
+        if existing.is_dir() {
+            return Err(InputError::new("this is a folder, not a file to write")
+                .in_file(path)
+                .help("name a file in it, such as `rows.csv`")
+                .into());
+        }
+        // Opened without a change to it: may it be written at all?
+        let file = OpenOptions::new().write(true).open(path);
+        let file: File = file.map_err(|e| write_failed(path, &e))?;
+        if !existing.is_file() {
+            return Ok(Target::Straight(Box::new(file)));
+        }
+        // A link stays a link: the file that it names is replaced.
+        let real = fs::canonicalize(path).map_err(|e| write_failed(path, &e))?;
+        Target::replace(real, path, Some(existing.permissions()))
+    }
+
+    /// A temporary file in the folder of `real`; `named` is the path as the user gave it.
+    fn replace(real: PathBuf, named: &Path, permissions: Option<Permissions>) -> Result<Target> {
+        if real.file_name().is_none() {
+            return Err(InputError::new("this names no file to write")
+                .in_file(named)
+                .help("name a file, such as `rows.csv`")
+                .into());
+        }
+        let folder = match real.parent() {
+            Some(parent) if parent != Path::new("") => parent,
+            _ => Path::new("."),
+        };
+        if !folder.is_dir() {
+            let message = format!("cannot write: there is no folder `{}`", folder.display());
+            return Err(InputError::new(message)
+                .in_file(named)
+                .help(format!("make it first: `mkdir -p {}`", folder.display()))
+                .into());
+        }
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".gyrogen-").suffix(".tmp");
+        #[cfg(unix)]
+        {
+            // As for any new file: what the umask leaves of 0666.
+            use std::os::unix::fs::PermissionsExt;
+            builder.permissions(Permissions::from_mode(0o666));
+        }
+        let temporary = builder
+            .tempfile_in(folder)
+            .map_err(|e| write_failed(named, &e))?;
+        Ok(Target::Replace {
+            temporary,
+            path: real,
+            permissions,
+        })
+    }
+}
+
+/// The error of a failed write.
+pub(crate) fn write_failed(path: &Path, e: &io::Error) -> Error {
+    io_error(path, "write the file", e)
+}

@@ -1,0 +1,319 @@
+//! Which column of a file plays which part (`contracts/record.md` section 1).
+
+use super::cells::{self, Cell};
+use super::warning::Warning;
+use crate::design::RecordMapping;
+use crate::error::{InputError, Result};
+use std::path::Path;
+
+/// The contract's columns, with their units.
+pub const KNOWN: [(&str, &str); 12] = [
+    ("time_s", "s"),
+    ("time_since_power_on_s", "s"),
+    ("rate_out_dps", "deg/s"),
+    ("rate_dps", "deg/s"),
+    ("chamber_degc", "degC"),
+    ("phase_rad", "rad"),
+    ("freq_hz", "Hz"),
+    ("die_degc", "degC"),
+    ("agc", "1"),
+    ("quad_dps", "deg/s"),
+    ("supply_v", "V"),
+    ("accel_g", "g"),
+];
+
+/// The thermometers, in the order in which the bias model takes the first that a record has.
+pub const THERMOMETERS: [&str; 4] = ["phase_rad", "freq_hz", "die_degc", "chamber_degc"];
+
+/// True for a column of the contract.
+pub fn is_known(name: &str) -> bool {
+    KNOWN.iter().any(|(known, _)| *known == name)
+}
+
+/// The unit of a column: the contract's, or by the suffix of an auxiliary column's name;
+/// `"1"` where the name carries none.
+pub fn unit_of(name: &str) -> &'static str {
+    const SUFFIXES: [(&str, &str); 14] = [
+        ("_dps", "deg/s"),
+        ("_degc", "degC"),
+        ("_rad", "rad"),
+        ("_hz", "Hz"),
+        ("_ppm", "ppm"),
+        ("_pct", "%"),
+        ("_hpa", "hPa"),
+        ("_pa", "Pa"),
+        ("_mv", "mV"),
+        ("_ma", "mA"),
+        ("_v", "V"),
+        ("_a", "A"),
+        ("_g", "g"),
+        ("_s", "s"),
+    ];
+    if let Some((_, unit)) = KNOWN.iter().find(|(known, _)| *known == name) {
+        return unit;
+    }
+    SUFFIXES
+        .iter()
+        .find(|(suffix, _)| name.ends_with(suffix))
+        .map_or("1", |(_, unit)| unit)
+}
+
+/// A line of the file, for messages.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Line<'a> {
+    /// The record's path.
+    pub path: &'a Path,
+    /// 1-based.
+    pub number: usize,
+    /// Without its line ending.
+    pub text: &'a str,
+}
+
+impl Line<'_> {
+    /// An error at a character column of this line.
+    pub(super) fn error(&self, column: usize, message: String, help: String) -> InputError {
+        let mut e = InputError::new(message)
+            .in_file(self.path)
+            .at(self.number, column.max(1))
+            .help(help);
+        // A caret under control characters or at the end of a megabyte helps nobody.
+        if self.text.len() < 4096 && !self.text.contains(char::is_control) {
+            e.source_line = Some(self.text.to_owned());
+        }
+        e
+    }
+}
+
+/// The parts that the columns of a file play.
+#[derive(Debug, Clone)]
+pub(super) struct Roles {
+    /// By column of the file: its name there, and the contract or auxiliary names it serves.
+    pub columns: Vec<(String, Vec<String>)>,
+    /// What was decided on the way.
+    pub warnings: Vec<Warning>,
+}
+
+impl Roles {
+    /// The file's column that serves `name`.
+    pub(super) fn index_of(&self, name: &str) -> Option<usize> {
+        self.columns
+            .iter()
+            .position(|(_, names)| names.iter().any(|n| n == name))
+    }
+}
+
+/// Reads the header and gives each column its part.
+///
+/// # Errors
+/// No header, a column without a name, twice the same name, a mapping to a column that the file
+/// lacks, no clock, no rate.
+pub(super) fn resolve(line: Line<'_>, mapping: &RecordMapping) -> Result<Roles> {
+    let header = header_cells(line)?;
+    let names: Vec<&str> = header.iter().map(|c| &*c.text).collect();
+    for (i, cell) in header.iter().enumerate() {
+        if let Some(first) = names[..i].iter().position(|n| *n == cell.text) {
+            if cell.text.is_empty() {
+                continue;
+            }
+            return Err(line
+                .error(
+                    cell.column,
+                    format!(
+                        "column \"{}\" is there twice (first at column {})",
+                        cell.text, header[first].column
+                    ),
+                    "rename or remove one of them".to_owned(),
+                )
+                .into());
+        }
+    }
+    let mut columns: Vec<(String, Vec<String>)> = names
+        .iter()
+        .map(|n| ((*n).to_owned(), Vec::new()))
+        .collect();
+    for (role, wanted) in &mapping.columns {
+        match names.iter().position(|n| n == wanted) {
+            Some(i) if !wanted.is_empty() => columns[i].1.push(role.clone()),
+            _ => {
+                return Err(line
+                    .error(
+                        1,
+                        format!(
+                            "the record has no column \"{wanted}\", which [record.columns] names \
+                             for {role}"
+                        ),
+                        suggestion(role, &names),
+                    )
+                    .into());
+            }
+        }
+    }
+    let mut warnings = Vec::new();
+    for (name, roles) in &mut columns {
+        if !roles.is_empty() || name.is_empty() {
+            continue;
+        }
+        if let Some(other) = mapping.columns.get(name.as_str()) {
+            warnings.push(Warning::on(
+                "shadowed_column",
+                name,
+                format!(
+                    "[record.columns] takes {name} from \"{other}\"; the file's own column {name} \
+                     is left out"
+                ),
+            ));
+        } else {
+            roles.push(name.clone());
+        }
+    }
+    let roles = Roles { columns, warnings };
+    for role in ["time_s", "rate_out_dps"] {
+        let clocked = role == "time_s" && mapping.row_period_s.is_some();
+        if roles.index_of(role).is_none() && !clocked {
+            return Err(line
+                .error(
+                    1,
+                    format!("the record has no column {role}, which is required"),
+                    suggestion(role, &names),
+                )
+                .into());
+        }
+    }
+    Ok(roles)
+}
+
+/// The header's cells, refused where the line cannot be a header.
+fn header_cells(line: Line<'_>) -> Result<Vec<Cell<'_>>> {
+    let header = match cells::split(line.text) {
+        Ok(header) => header,
+        Err(column) => return Err(open_quote(line, column).into()),
+    };
+    if let [only] = header.as_slice() {
+        for (mark, name) in [(';', "semicolons"), ('\t', "tabs"), ('|', "bars")] {
+            if only.text.contains(mark) {
+                return Err(line
+                    .error(
+                        1,
+                        format!("the columns are separated by {name}"),
+                        "separate them with commas, and write decimal points".to_owned(),
+                    )
+                    .into());
+            }
+        }
+    }
+    if header.iter().all(|c| cells::number(&c.text).is_ok()) {
+        return Err(line
+            .error(
+                1,
+                "the record has no header row: its first line holds numbers only".to_owned(),
+                "write the columns' names on the first line, with units, such as \
+                 time_s,rate_out_dps,die_degc"
+                    .to_owned(),
+            )
+            .into());
+    }
+    Ok(header)
+}
+
+/// The error for a quote that is not closed.
+pub(super) fn open_quote(line: Line<'_>, column: usize) -> InputError {
+    line.error(
+        column,
+        "this quote is not closed on its line".to_owned(),
+        "close it, or remove it: numbers need no quotes, and a row is one line".to_owned(),
+    )
+}
+
+/// Lists the file's columns and shows the part of a design file that would map `role`.
+fn suggestion(role: &str, names: &[&str]) -> String {
+    let named: Vec<&str> = names.iter().copied().filter(|n| !n.is_empty()).collect();
+    let hints: &[&str] = match role {
+        "time_s" => &["time", "sec", "clock"],
+        "rate_out_dps" => &["gyro", "rate", "omega", "dps", "gx", "gz"],
+        "rate_dps" => &["table", "rate", "truth"],
+        "phase_rad" => &["phase", "phi"],
+        "freq_hz" => &["freq", "hz"],
+        "agc" => &["agc", "gain"],
+        "quad_dps" => &["quad"],
+        "supply_v" => &["supply", "vdd", "volt"],
+        "accel_g" => &["acc"],
+        _ => &["temp", "degc"],
+    };
+    // "gyro" before "rate": the order of the hints is their strength.
+    let guess = hints
+        .iter()
+        .find_map(|h| named.iter().find(|n| n.to_lowercase().contains(h)))
+        .filter(|n| **n != "time_since_power_on_s");
+    let listed: Vec<&str> = named.iter().copied().take(40).collect();
+    let more = named.len() - listed.len();
+    let mut text = format!("the file has: {}", listed.join(", "));
+    if more > 0 {
+        text.push_str(&format!(" and {more} more"));
+    }
+    let value = guess.map_or("NAME_IN_THE_FILE", |n| n);
+    text.push_str(&format!(
+        "\n  say in the design which one it is:\n    [record.columns]\n    {role} = \"{value}\""
+    ));
+    if role == "time_s" {
+        text.push_str(
+            "\n  or, if the rows are evenly spaced and the file has no clock:\n    [record]\n    \
+             row_period_s = 1.0",
+        );
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(text: &str) -> Line<'_> {
+        Line {
+            path: Path::new("r.csv"),
+            number: 3,
+            text,
+        }
+    }
+
+    #[test]
+    fn a_mapping_renames_and_shadows() {
+        let mut mapping = RecordMapping::default();
+        for (role, name) in [
+            ("rate_out_dps", "gyro_x_dps"),
+            ("die_degc", "temp"),
+            ("time_since_power_on_s", "time_s"),
+        ] {
+            mapping.columns.insert(role.into(), name.into());
+        }
+        // The mapping of time_s to a second part takes nothing from the clock if it says so too.
+        mapping.columns.insert("time_s".into(), "time_s".into());
+        let roles = resolve(at("time_s,gyro_x_dps,gyro_y_dps,temp,die_degc"), &mapping).unwrap();
+        assert_eq!(
+            roles.columns[0].1,
+            ["time_s", "time_since_power_on_s"],
+            "{roles:?}"
+        );
+        assert_eq!(roles.columns[1].1, ["rate_out_dps"]);
+        assert_eq!(roles.columns[2].1, ["gyro_y_dps"]);
+        assert_eq!(roles.columns[3].1, ["die_degc"]);
+        assert!(roles.columns[4].1.is_empty());
+        assert_eq!(roles.warnings[0].code, "shadowed_column");
+    }
+
+    #[test]
+    fn a_missing_rate_shows_the_snippet() {
+        let e = resolve(at("time_s,gyro_x_dps"), &RecordMapping::default()).unwrap_err();
+        let text = e.to_string();
+        assert!(text.contains("r.csv:3:1"), "{text}");
+        assert!(text.contains("the file has: time_s, gyro_x_dps"), "{text}");
+        assert!(text.contains("rate_out_dps = \"gyro_x_dps\""), "{text}");
+    }
+
+    #[test]
+    fn units_come_from_the_name() {
+        assert_eq!(unit_of("phase_rad"), "rad");
+        assert_eq!(unit_of("pressure_hpa"), "hPa");
+        assert_eq!(unit_of("agc"), "1");
+        assert_eq!(unit_of("whatever"), "1");
+    }
+}

@@ -1,0 +1,443 @@
+//! What can be read but is unlikely to be what the column's name says: wrong units, wrong sign.
+//!
+//! Each check looks for one mistake that people make, and warns; none refuses, because none can
+//! be certain. Channels that do not move are looked for in `frozen`.
+
+use super::columns;
+use super::stats;
+use super::thermal::ThermalRecord;
+use super::warning::Warning;
+use std::f64::consts::{PI, TAU};
+
+/// Adds a warning for each column whose values are unlikely.
+pub(super) fn check(record: &ThermalRecord, warnings: &mut Vec<Warning>) {
+    for (name, values) in &record.columns {
+        let column = Column {
+            name,
+            values,
+            sorted: stats::sorted(values),
+            record,
+        };
+        let found = match name.as_str() {
+            "phase_rad" => phase(&column),
+            "rate_out_dps" | "rate_dps" | "quad_dps" => rate(&column),
+            "freq_hz" => frequency(&column),
+            "agc" => gain(&column),
+            "supply_v" => supply(&column),
+            "accel_g" => acceleration(&column),
+            _ if columns::unit_of(name) == "degC" => temperature(&column),
+            _ => None,
+        };
+        warnings.extend(found);
+    }
+    warnings.extend(scale(record));
+    warnings.extend(time(record));
+}
+
+/// A column under test; `sorted` has at least one value, since empty columns were left out.
+struct Column<'a> {
+    name: &'a str,
+    values: &'a [f64],
+    sorted: Vec<f64>,
+    record: &'a ThermalRecord,
+}
+
+impl Column<'_> {
+    fn quantile(&self, p: f64) -> f64 {
+        stats::quantile_sorted(&self.sorted, p)
+    }
+
+    fn median(&self) -> f64 {
+        self.quantile(0.5)
+    }
+
+    fn min(&self) -> f64 {
+        self.quantile(0.0)
+    }
+
+    fn max(&self) -> f64 {
+        self.quantile(1.0)
+    }
+
+    /// Count of the values for which `bad` holds, and the line of the first.
+    fn count(&self, bad: impl Fn(f64) -> bool) -> (usize, usize) {
+        let rows = self.values.iter().zip(&self.record.lines);
+        let mut hits = rows.filter(|(v, _)| bad(**v));
+        let first = hits.next();
+        (
+            usize::from(first.is_some()) + hits.count(),
+            first.map_or(0, |(_, line)| *line),
+        )
+    }
+
+    fn warn(&self, code: &'static str, message: String) -> Option<Warning> {
+        Some(Warning::on(code, self.name, message))
+    }
+}
+
+/// A resonator's drive phase moves within half a turn; a phase in radians lies within a turn.
+/// The quantiles keep a single glitch from passing for a wrong unit.
+fn phase(c: &Column<'_>) -> Option<Warning> {
+    let range = format!("{:.6} to {:.6}", c.min(), c.max());
+    let largest = c.quantile(0.95).abs().max(c.quantile(0.05).abs());
+    let steps = c.values.windows(2).map(|w| (w[1] - w[0]).abs());
+    let wraps = steps.filter(|d| (*d - TAU).abs() < 0.25 * TAU).count();
+    let span = c.quantile(0.95) - c.quantile(0.05);
+    if largest > TAU {
+        return c.warn(
+            "phase_in_degrees",
+            format!(
+                "phase_rad runs from {range}: beyond a full turn of 2 pi, so it looks like \
+                 degrees; divide by 57.29578 if it is"
+            ),
+        );
+    }
+    if wraps > 0 && span > PI && c.max() - c.min() > 0.75 * TAU {
+        return c.warn(
+            "phase_wraps",
+            format!(
+                "phase_rad jumps by a full turn {wraps} times (range {range}): unwrap it, or the \
+                 polynomial sees two ends of one temperature"
+            ),
+        );
+    }
+    if span > PI {
+        return c.warn(
+            "phase_in_degrees",
+            format!(
+                "phase_rad runs from {range}: a resonator's phase moves by half a turn (pi) at \
+                 most, so this looks like degrees; divide by 57.29578 if it is"
+            ),
+        );
+    }
+    let (beyond, line) = c.count(|v| v.abs() > TAU);
+    if beyond > 0 {
+        return c.warn(
+            "phase_out_of_range",
+            format!("{beyond} values of phase_rad lie beyond 2 pi, the first on line {line}"),
+        );
+    }
+    None
+}
+
+/// Temperatures in Celsius: a median of 200 to 450 is a Kelvin reading of -73 to 177 degC; no
+/// silicon thermometer reads outside -100 to 250 degC.
+fn temperature(c: &Column<'_>) -> Option<Warning> {
+    let name = c.name;
+    let range = format!("{:.2} to {:.2}", c.min(), c.max());
+    if (200.0..=450.0).contains(&c.median()) && c.quantile(0.05) > 150.0 {
+        return c.warn(
+            "temperature_in_kelvin",
+            format!("{name} runs from {range}: it looks like kelvin; subtract 273.15 if it is"),
+        );
+    }
+    let (beyond, line) = c.count(|v| !v.is_nan() && !(-100.0..=250.0).contains(&v));
+    if beyond > 0 {
+        return c.warn(
+            "temperature_out_of_range",
+            format!(
+                "{beyond} values of {name} lie outside -100..250 degC (range {range}), the first \
+                 on line {line}: raw counts, another unit, or glitches?"
+            ),
+        );
+    }
+    None
+}
+
+/// No gyro turns faster than 20 000 deg/s; 16-bit codes and millidegrees do.
+fn rate(c: &Column<'_>) -> Option<Warning> {
+    let name = c.name;
+    let (beyond, line) = c.count(|v| v.abs() > 20_000.0);
+    (beyond > 0).then(|| {
+        Warning::on(
+            "rate_out_of_range",
+            name,
+            format!(
+                "{beyond} values of {name} lie beyond +-20000 deg/s (range {:.1} to {:.1}), the \
+                 first on line {line}: raw codes or millidegrees, not deg/s?",
+                c.min(),
+                c.max()
+            ),
+        )
+    })
+}
+
+/// Drive resonances lie between 1 and 200 kHz.
+fn frequency(c: &Column<'_>) -> Option<Warning> {
+    let (low, line) = c.count(|v| v <= 0.0);
+    if low > 0 {
+        return c.warn(
+            "frequency_out_of_range",
+            format!("{low} values of freq_hz are not positive, the first on line {line}"),
+        );
+    }
+    (c.median() < 200.0).then(|| {
+        Warning::on(
+            "frequency_in_kilohertz",
+            c.name,
+            format!(
+                "freq_hz is about {:.6}: no gyro resonates so low; kHz, or an offset from a \
+                 reference, rather than Hz?",
+                c.median()
+            ),
+        )
+    })
+}
+
+/// The drive gain is relative to nominal, so it is about 1.
+fn gain(c: &Column<'_>) -> Option<Warning> {
+    (!(0.02..=50.0).contains(&c.median())).then(|| {
+        Warning::on(
+            "agc_not_relative",
+            c.name,
+            format!(
+                "agc is about {:.6}; it is the drive gain relative to nominal, so about 1: divide \
+                 by its nominal value",
+                c.median()
+            ),
+        )
+    })
+}
+
+/// Supplies are volts, below 100.
+fn supply(c: &Column<'_>) -> Option<Warning> {
+    let (beyond, line) = c.count(|v| !v.is_nan() && !(0.0..=100.0).contains(&v));
+    (beyond > 0).then(|| {
+        Warning::on(
+            "supply_out_of_range",
+            c.name,
+            format!(
+                "{beyond} values of supply_v lie outside 0..100 V (range {:.3} to {:.3}), the \
+                 first on line {line}: millivolts?",
+                c.min(),
+                c.max()
+            ),
+        )
+    })
+}
+
+/// A steady 9.8 is gravity in m/s^2; a gyro under more than 20 000 g is no gyro any more.
+fn acceleration(c: &Column<'_>) -> Option<Warning> {
+    let steady = c.quantile(0.75) - c.quantile(0.25) < 0.5;
+    if steady && (9.5..=10.1).contains(&c.median().abs()) {
+        return c.warn(
+            "acceleration_in_m_per_s2",
+            format!(
+                "accel_g is about {:.3}: gravity in m/s^2? Divide by 9.80665",
+                c.median()
+            ),
+        );
+    }
+    let (beyond, line) = c.count(|v| v.abs() > 20_000.0);
+    (beyond > 0).then(|| {
+        Warning::on(
+            "acceleration_out_of_range",
+            c.name,
+            format!("{beyond} values of accel_g lie beyond 20000 g, the first on line {line}"),
+        )
+    })
+}
+
+/// Where a rate was applied, the output follows it with a slope near 1 (nominal scale factor).
+fn scale(record: &ThermalRecord) -> Option<Warning> {
+    let applied = record.column("rate_dps")?;
+    let out = record.column("rate_out_dps")?;
+    let pairs: Vec<(f64, f64)> = applied
+        .iter()
+        .zip(out)
+        .map(|(a, b)| (*a, *b))
+        .filter(|(a, b)| !a.is_nan() && !b.is_nan())
+        .collect();
+    let n = pairs.len() as f64;
+    let mean = |f: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(f).sum::<f64>() / n;
+    let (ma, mb) = (mean(&|p| p.0), mean(&|p| p.1));
+    let saa = mean(&|p| (p.0 - ma).powi(2));
+    let sab = mean(&|p| (p.0 - ma) * (p.1 - mb));
+    let sbb = mean(&|p| (p.1 - mb).powi(2));
+    // Judged only where the applied rate decides the output; a drift of 100 deg/s hides 1 deg/s.
+    if pairs.len() < 10 || saa.sqrt() < 1e-3 || sab * sab < 0.5 * saa * sbb {
+        return None;
+    }
+    let slope = sab / saa;
+    let (code, what) = if (0.5..=2.0).contains(&slope) {
+        return None;
+    } else if (-2.0..=-0.5).contains(&slope) {
+        ("rate_sign_reversed", "one of the two has the opposite sign")
+    } else if (0.012..=0.023).contains(&slope.abs()) {
+        (
+            "rate_in_radians",
+            "rate_out_dps looks like rad/s: multiply by 57.29578",
+        )
+    } else if (43.0..=75.0).contains(&slope.abs()) {
+        (
+            "rate_in_radians",
+            "rate_dps looks like rad/s: multiply by 57.29578",
+        )
+    } else {
+        (
+            "scale_not_nominal",
+            "rate_out_dps is to be at nominal scale, so about 1 is expected",
+        )
+    };
+    Some(Warning::on(
+        code,
+        "rate_out_dps",
+        format!("rate_out_dps follows rate_dps with slope {slope:.5}: {what}"),
+    ))
+}
+
+/// Milliseconds for seconds, and calendar time for time since the start.
+fn time(record: &ThermalRecord) -> Option<Warning> {
+    let (first, last) = (*record.time_s.first()?, *record.time_s.last()?);
+    if first > 1e8 {
+        return Some(Warning::on(
+            "time_is_calendar_time",
+            "time_s",
+            format!(
+                "time_s starts at {first:.0} s: calendar time? It is to count from the record's \
+                 start (warm-up effects need that)"
+            ),
+        ));
+    }
+    let steps: Vec<f64> = record.time_s.windows(2).map(|w| w[1] - w[0]).collect();
+    let step = stats::median(&steps);
+    let days = (last - first) / 86_400.0;
+    (step > 3600.0 || days > 5.0).then(|| {
+        Warning::on(
+            "time_step_implausible",
+            "time_s",
+            format!(
+                "the record lasts {days:.1} days with {step} s between rows: milliseconds for \
+                 seconds? Divide by 1000 if so"
+            ),
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::thermal::parse;
+    use crate::design::RecordMapping;
+    use std::path::Path;
+
+    /// The codes for a record of 40 rows made by `row`.
+    fn codes(header: &str, row: impl Fn(f64) -> String) -> Vec<&'static str> {
+        let mut text = format!("{header}\n");
+        for k in 0..40 {
+            text.push_str(&row(f64::from(k)));
+            text.push('\n');
+        }
+        let mapping = RecordMapping::default();
+        let (_, warnings) = parse(text.as_bytes(), Path::new("r.csv"), &mapping).unwrap();
+        warnings.iter().map(|w| w.code).collect()
+    }
+
+    /// Something that moves like a reading.
+    fn wiggle(k: f64) -> f64 {
+        (k * 1.7).sin() * 0.01 + (k * 0.9).cos() * 0.013
+    }
+
+    #[test]
+    fn each_mistake_has_its_warning() {
+        // (column, values, warning)
+        type Case = (&'static str, fn(f64) -> f64, Option<&'static str>);
+        let cases: [Case; 26] = [
+            ("phase_rad", |k| -90.0 + k * 0.1, Some("phase_in_degrees")),
+            ("phase_rad", |k| -2.0 + k * 0.13, Some("phase_in_degrees")),
+            ("phase_rad", |k| -1.6 + k * 0.002, None),
+            (
+                "phase_rad",
+                |k| if k == 7.0 { 99.0 } else { -1.6 + k * 0.002 },
+                Some("phase_out_of_range"),
+            ),
+            (
+                "phase_rad",
+                |k| {
+                    let p = 3.1 + k * 0.002;
+                    if p > std::f64::consts::PI {
+                        p - std::f64::consts::TAU
+                    } else {
+                        p
+                    }
+                },
+                Some("phase_wraps"),
+            ),
+            (
+                "die_degc",
+                |k| 273.15 + 25.0 + k,
+                Some("temperature_in_kelvin"),
+            ),
+            (
+                "chamber_degc",
+                |k| 233.15 + k,
+                Some("temperature_in_kelvin"),
+            ),
+            ("board_degc", |k| 300.0 + k, Some("temperature_in_kelvin")),
+            ("die_degc", |k| 2500.0 + k, Some("temperature_out_of_range")),
+            ("die_degc", |k| -40.0 + 3.0 * k, None),
+            (
+                "die_degc",
+                |k| if k == 3.0 { -273.15 } else { 20.0 + k },
+                Some("temperature_out_of_range"),
+            ),
+            ("rate_out_dps", |k| 30_000.0 + k, Some("rate_out_of_range")),
+            ("rate_out_dps", |k| 1900.0 + k, None),
+            (
+                "freq_hz",
+                |k| 17.5 + k * 1e-4,
+                Some("frequency_in_kilohertz"),
+            ),
+            ("freq_hz", |k| 17_500.0 + k * 0.1, None),
+            ("freq_hz", |k| k * 100.0, Some("frequency_out_of_range")),
+            ("agc", |k| 20_000.0 + k, Some("agc_not_relative")),
+            ("agc", |k| 1.0 + k * 1e-3, None),
+            ("supply_v", |k| 3300.0 + k, Some("supply_out_of_range")),
+            ("supply_v", |k| 3.3 + k * 0.01, None),
+            (
+                "accel_g",
+                |k| 9.8 + k * 1e-4,
+                Some("acceleration_in_m_per_s2"),
+            ),
+            ("accel_g", |k| 1.0 + k * 1e-4, None),
+            ("time_s", |k| 1.7e9 + k, Some("time_is_calendar_time")),
+            ("time_s", |k| 15_000.0 * k, Some("time_step_implausible")),
+            ("time_s", |k| 1800.0 * k, None),
+            ("quad_dps", |k| 1e6 + k, Some("rate_out_of_range")),
+        ];
+        for (name, value, expected) in cases {
+            let found = match name {
+                "time_s" => codes("time_s,rate_out_dps", |k| {
+                    format!("{},{}", value(k), wiggle(k))
+                }),
+                "rate_out_dps" => codes("time_s,rate_out_dps", |k| format!("{k},{}", value(k))),
+                _ => codes(&format!("time_s,rate_out_dps,{name}"), |k| {
+                    format!("{k},{},{}", wiggle(k), value(k))
+                }),
+            };
+            let expected: Vec<&str> = expected.into_iter().collect();
+            assert_eq!(found, expected, "{name} {} .. {}", value(0.0), value(39.0));
+        }
+    }
+
+    #[test]
+    fn the_applied_rate_shows_sign_and_unit() {
+        let header = "time_s,rate_out_dps,rate_dps";
+        for (factor, expected) in [
+            (1.02, None),
+            (-1.0, Some("rate_sign_reversed")),
+            (0.017453, Some("rate_in_radians")),
+            (57.3, Some("rate_in_radians")),
+            (16.4, Some("scale_not_nominal")),
+        ] {
+            let found = codes(header, |k| {
+                let rate = (k - 20.0) * 5.0;
+                format!("{k},{},{rate}", factor * rate + wiggle(k))
+            });
+            let expected: Vec<&str> = expected.into_iter().collect();
+            assert_eq!(found, expected, "{factor}");
+        }
+        // A small rate under a large drift decides nothing.
+        let found = codes(header, |k| format!("{k},{},{}", k * 10.0, wiggle(k)));
+        assert!(found.is_empty(), "{found:?}");
+    }
+}

@@ -1,0 +1,159 @@
+//! Records that are read: what is tolerated, what is told, and that no damage makes a panic.
+
+use super::broken_tests::{HEADER, good_rows, mapping, try_parse, with_row};
+use crate::design::RecordMapping;
+use proptest::prelude::*;
+
+#[test]
+fn what_is_tolerated_reads_the_same() {
+    let plain = RecordMapping::default();
+    let text = format!("# made by hand\n\n{HEADER}\n{}\n", good_rows().join("\n"));
+    let (record, warnings) = try_parse(text.as_bytes(), &plain).unwrap();
+    assert!(warnings.is_empty(), "{warnings:?}");
+    assert_eq!(
+        (record.len(), record.lines[0], record.lines[19]),
+        (20, 4, 23)
+    );
+    assert_eq!(record.column("die_degc").unwrap()[3], 23.0);
+    let variants = [
+        format!("\u{feff}{text}"),
+        text.replace('\n', "\r\n"),
+        text.replace("\n\n", "\n# more\n").trim_end().to_owned(),
+        text.replace(HEADER, " time_s , \"rate_out_dps\",die_degc "),
+        text.replace(',', " , "),
+        text.replace("\n\n", "\n#\n").replace('\n', "\r"),
+    ];
+    for variant in variants {
+        let (other, warnings) = try_parse(variant.as_bytes(), &plain).unwrap();
+        assert!(warnings.is_empty(), "{warnings:?}");
+        assert_eq!(other, record, "{variant}");
+    }
+    // A spreadsheet's trailing commas.
+    let trailing: String = text.lines().map(|l| format!("{l},\n")).collect();
+    let trailing = trailing.replace("\n,\n", "\n\n");
+    assert_eq!(try_parse(trailing.as_bytes(), &plain).unwrap().0, record);
+}
+
+#[test]
+fn missing_cells_text_columns_and_repeated_times_are_told() {
+    let plain = RecordMapping::default();
+    let mut text = String::from("time_s,rate_out_dps,die_degc,session,humidity_pct\n");
+    for k in 0..20 {
+        let time = if k == 6 { 5 } else { k };
+        let rate = if k == 9 {
+            String::new()
+        } else {
+            format!("0.{k}")
+        };
+        text.push_str(&format!("{time},{rate},{},cold,\n", 20 + k));
+    }
+    text.push_str(",0.1,40,cold,\n");
+    let (record, warnings) = try_parse(text.as_bytes(), &plain).unwrap();
+    let codes: Vec<&str> = warnings.iter().map(|w| w.code).collect();
+    assert_eq!(
+        codes,
+        [
+            "text_column",
+            "empty_column",
+            "rows_without_time",
+            "repeated_times",
+            "rows_without_rate"
+        ]
+    );
+    assert!(warnings[2].message.contains("line 22"), "{:?}", warnings[2]);
+    assert!(
+        warnings[3]
+            .message
+            .contains("2 rows with repeated times were averaged (the first is line 7)")
+    );
+    assert_eq!(record.len(), 19);
+    assert!((record.column("rate_out_dps").unwrap()[5] - 0.55).abs() < 1e-12);
+    assert_eq!(record.column("die_degc").unwrap()[5], 25.5);
+    assert!(record.column("session").is_none() && record.column("humidity_pct").is_none());
+    assert_eq!(record.measured("rate_out_dps"), 18);
+    let json = serde_json::to_string(&warnings[0]).unwrap();
+    assert!(
+        json.starts_with(r#"{"code":"text_column","column":"session","message":"#),
+        "{json}"
+    );
+}
+
+#[test]
+fn repeated_times_with_different_rates_are_kept() {
+    let mut text = String::from("time_s,rate_out_dps,rate_dps\n");
+    for k in 0..20 {
+        let rate = if k % 2 == 0 { 50 } else { -50 };
+        text.push_str(&format!("{},{rate}.{k},{rate}\n", k / 2));
+    }
+    let (record, warnings) = try_parse(text.as_bytes(), &RecordMapping::default()).unwrap();
+    assert_eq!(record.len(), 20);
+    assert!(
+        warnings[0]
+            .message
+            .contains("20 rows with repeated times were kept"),
+        "{warnings:?}"
+    );
+    assert!((record.error_dps()[3] + 0.3).abs() < 1e-12);
+}
+
+#[test]
+fn a_record_without_a_clock_takes_the_row_period() {
+    let text: String = (0..20)
+        .map(|k| format!("{},{}\n", 0.01 * f64::from(k % 5), 20 + k))
+        .collect();
+    let text = format!("gyro_x_dps,temperature_degc\n{text}");
+    let mut mapping = mapping(&[
+        ("rate_out_dps", "gyro_x_dps"),
+        ("die_degc", "temperature_degc"),
+    ]);
+    mapping.row_period_s = Some(15.0);
+    let (record, warnings) = try_parse(text.as_bytes(), &mapping).unwrap();
+    assert!(warnings.is_empty(), "{warnings:?}");
+    assert_eq!(record.time_s[19], 285.0);
+    assert_eq!(record.renamed["die_degc"], "temperature_degc");
+    assert_eq!(record.column("time_s").unwrap().len(), record.len());
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+
+    #[test]
+    fn damaged_records_never_panic(
+        edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>(), 0u8..3), 0..12),
+        cut in any::<prop::sample::Index>(),
+        whole in any::<bool>(),
+    ) {
+        let mut bytes = with_row(5, "5,\"0.1\",25");
+        for (at, byte, kind) in edits {
+            let at = at.index(bytes.len());
+            // Half of the bytes come from those that mean something here.
+            let common = b"\",\n\r#-.e0 \tnif";
+            let byte = if byte < 128 { common[usize::from(byte) % 14] } else { byte };
+            match kind {
+                0 => bytes[at] = byte,
+                1 => bytes.insert(at, byte),
+                _ => { bytes.remove(at); }
+            }
+        }
+        if !whole {
+            bytes.truncate(cut.index(bytes.len()));
+        }
+        match try_parse(&bytes, &RecordMapping::default()) {
+            Ok((record, _)) => {
+                prop_assert!(record.len() >= 10);
+                prop_assert!(record.columns.values().all(|c| c.len() == record.len()));
+                prop_assert!(record.lines.len() == record.len());
+                prop_assert!(record.time_s.windows(2).all(|w| w[0] <= w[1]));
+            }
+            Err(e) => {
+                prop_assert!(e.line.is_some() && e.column.is_some() && e.help.is_some(), "{e}");
+                let _ = e.to_string();
+            }
+        }
+    }
+
+    #[test]
+    fn noise_never_panics(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
+        let _ = try_parse(&bytes, &RecordMapping::default());
+    }
+}

@@ -1,0 +1,182 @@
+//! Robust statistics of plain slices. NaN (not measured) is skipped; of nothing they are NaN.
+
+/// 1 / (the third quartile of the standard normal): makes a median absolute deviation an
+/// estimate of the standard deviation of normal data.
+pub const MAD_TO_STD: f64 = 1.482_602_218_505_602;
+
+/// The measured values, ascending.
+pub fn sorted(values: &[f64]) -> Vec<f64> {
+    let mut v: Vec<f64> = values.iter().copied().filter(|x| !x.is_nan()).collect();
+    v.sort_unstable_by(f64::total_cmp);
+    v
+}
+
+/// The `p`-quantile (0..=1) of ascending values, linear between order statistics.
+pub fn quantile_sorted(v: &[f64], p: f64) -> f64 {
+    let Some(last) = v.len().checked_sub(1) else {
+        return f64::NAN;
+    };
+    let at = p.clamp(0.0, 1.0) * last as f64;
+    let low = at.floor() as usize;
+    let high = (low + 1).min(last);
+    let part = at - low as f64;
+    if part == 0.0 {
+        v[low]
+    } else {
+        v[low] * (1.0 - part) + v[high] * part
+    }
+}
+
+/// The median.
+pub fn median(values: &[f64]) -> f64 {
+    quantile_sorted(&sorted(values), 0.5)
+}
+
+/// Median absolute deviation about the median, scaled to a standard deviation; 0 where more than
+/// half of the values are the same.
+pub fn mad_std(values: &[f64]) -> f64 {
+    let centre = median(values);
+    let deviations: Vec<f64> = values.iter().map(|v| (v - centre).abs()).collect();
+    MAD_TO_STD * median(&deviations)
+}
+
+/// As [`mad_std`], but where more than half of the values are the same (a coarse quantiser) the
+/// median of the deviations that are not zero; 0 only for constants.
+pub fn robust_std(values: &[f64]) -> f64 {
+    let s = mad_std(values);
+    if s > 0.0 || s.is_nan() {
+        return s;
+    }
+    let centre = median(values);
+    let moved: Vec<f64> = values
+        .iter()
+        .map(|v| (v - centre).abs())
+        .filter(|d| *d > 0.0)
+        .collect();
+    if moved.is_empty() {
+        0.0
+    } else {
+        MAD_TO_STD * median(&moved)
+    }
+}
+
+/// Root of the mean square of the measured values.
+pub fn rms(values: &[f64]) -> f64 {
+    let (sum, n) = values
+        .iter()
+        .filter(|v| !v.is_nan())
+        .fold((0.0, 0usize), |(s, n), v| (s + v * v, n + 1));
+    if n == 0 {
+        f64::NAN
+    } else {
+        (sum / n as f64).sqrt()
+    }
+}
+
+/// (least, greatest) of the measured values.
+pub fn extremes(values: &[f64]) -> Option<(f64, f64)> {
+    values
+        .iter()
+        .filter(|v| !v.is_nan())
+        .fold(None, |range, &v| match range {
+            None => Some((v, v)),
+            Some((low, high)) => Some((f64::min(low, v), f64::max(high, v))),
+        })
+}
+
+/// Noise of a slowly varying series: the standard deviation of its first differences / sqrt(2),
+/// differences further than five robust standard deviations from their median left out.
+///
+/// White noise gives its own standard deviation; noise with memory gives less (an AR(1) with
+/// coefficient r: sqrt(1 - r) of it); a trend gives nothing. Same unit as the values.
+pub fn difference_noise(values: &[f64]) -> f64 {
+    let measured: Vec<f64> = values.iter().copied().filter(|v| !v.is_nan()).collect();
+    let differences: Vec<f64> = measured.windows(2).map(|w| w[1] - w[0]).collect();
+    if differences.is_empty() {
+        return f64::NAN;
+    }
+    let centre = median(&differences);
+    let limit = 5.0 * robust_std(&differences);
+    let kept: Vec<f64> = differences
+        .iter()
+        .map(|d| d - centre)
+        .filter(|d| d.abs() <= limit)
+        .collect();
+    rms(&kept) / std::f64::consts::SQRT_2
+}
+
+/// As [`difference_noise`], from second differences / sqrt(6): blind to a slope that changes
+/// slowly or seldom, for series such as a thermometer's under ramps and steps.
+pub fn curvature_noise(values: &[f64]) -> f64 {
+    let measured: Vec<f64> = values.iter().copied().filter(|v| !v.is_nan()).collect();
+    let bends: Vec<f64> = measured
+        .windows(3)
+        .map(|w| w[0] - 2.0 * w[1] + w[2])
+        .collect();
+    if bends.is_empty() {
+        return f64::NAN;
+    }
+    let limit = 5.0 * mad_std(&bends);
+    let kept: Vec<f64> = bends.into_iter().filter(|d| d.abs() <= limit).collect();
+    rms(&kept) / 6f64.sqrt()
+}
+
+/// The step of a quantised channel: the smallest distance between two different values, if the
+/// values lie on a lattice of that step; `None` for continuous values and constants.
+pub fn lattice_step(values: &[f64]) -> Option<f64> {
+    let mut distinct = sorted(values);
+    let largest = distinct.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+    distinct.dedup_by(|a, b| (*a - *b).abs() <= 1e-9 * largest);
+    let step = distinct
+        .windows(2)
+        .map(|w| w[1] - w[0])
+        .fold(f64::INFINITY, f64::min);
+    if !step.is_finite() || distinct.len() < 2 {
+        return None;
+    }
+    let first = distinct[0];
+    let on = distinct
+        .iter()
+        .filter(|v| {
+            let k = (**v - first) / step;
+            (k - k.round()).abs() < 0.02 + 1e-9 * largest / step
+        })
+        .count();
+    (on as f64 >= 0.98 * distinct.len() as f64).then_some(step)
+}
+
+/// How many different values were measured.
+pub fn distinct(values: &[f64]) -> usize {
+    let mut v = sorted(values);
+    v.dedup();
+    v.len()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn medians_and_noise_of_known_series() {
+        assert_eq!(median(&[3.0, f64::NAN, 1.0, 2.0]), 2.0);
+        assert!(median(&[]).is_nan());
+        assert_eq!(mad_std(&[1.0, 1.0, 1.0, 9.0]), 0.0);
+        assert!(robust_std(&[1.0, 1.0, 1.0, 9.0]) > 8.0);
+        // A trend is no noise; an alternation of +-1 has differences of +-2.
+        let trend: Vec<f64> = (0..50).map(f64::from).collect();
+        assert_eq!(difference_noise(&trend), 0.0);
+        let alternating: Vec<f64> = (0..51).map(|k| f64::from(k % 2) * 2.0 - 1.0).collect();
+        assert!((difference_noise(&alternating) - 2f64.sqrt()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_lattice_is_told_from_a_continuum() {
+        let whole: Vec<f64> = (0..100).map(|k| f64::from(20 + (k / 7) % 11)).collect();
+        assert_eq!(lattice_step(&whole), Some(1.0));
+        let tenths: Vec<f64> = (0..300).map(|k| f64::from(k) / 10.0 + 22.8).collect();
+        assert!((lattice_step(&tenths).unwrap() - 0.1).abs() < 1e-9);
+        let continuous: Vec<f64> = (0..100).map(|k| (f64::from(k) * 0.7).sin()).collect();
+        assert_eq!(lattice_step(&continuous), None);
+        assert_eq!(lattice_step(&[1.0, 1.0]), None);
+    }
+}

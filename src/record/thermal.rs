@@ -1,0 +1,314 @@
+//! The thermal record: one row per averaged reading (`contracts/record.md` section 1).
+
+use super::cells::{self, BadNumber};
+use super::columns::{self, Line, Roles};
+use super::warning::Warning;
+use super::{clock, frozen, plausibility};
+use crate::design::RecordMapping;
+use crate::error::{InputError, Result, io_error};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Fewer rows with a rate than this are no record.
+pub const LEAST_ROWS: usize = 10;
+
+/// A thermal record, read and checked. All columns have [`ThermalRecord::len`] rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ThermalRecord {
+    /// The file as the user named it.
+    pub source: PathBuf,
+    /// s; always measured, never decreasing, and strictly increasing unless a warning
+    /// `repeated_times` says that rows were kept.
+    pub time_s: Vec<f64>,
+    /// All other columns by contract name (auxiliary ones by the file's name), in the unit that
+    /// the name carries; NaN = not measured.
+    pub columns: BTreeMap<String, Vec<f64>>,
+    /// 1-based line of the file for each row (of the first where rows were averaged).
+    pub lines: Vec<usize>,
+    /// Contract name -> column of the file, where they differ.
+    pub renamed: BTreeMap<String, String>,
+}
+
+impl ThermalRecord {
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.time_s.len()
+    }
+
+    /// True without rows; [`read`] gives no such record.
+    pub fn is_empty(&self) -> bool {
+        self.time_s.is_empty()
+    }
+
+    /// A column by contract name, `time_s` included; `None` if the file lacks it.
+    pub fn column(&self, name: &str) -> Option<&[f64]> {
+        if name == "time_s" {
+            return Some(&self.time_s);
+        }
+        self.columns.get(name).map(Vec::as_slice)
+    }
+
+    /// How many rows of a column are measured; 0 if there is none of that name.
+    pub fn measured(&self, name: &str) -> usize {
+        self.column(name)
+            .map_or(0, |c| c.iter().filter(|v| !v.is_nan()).count())
+    }
+
+    /// The error signal, deg/s: `rate_out_dps - rate_dps`, an absent column or cell of applied
+    /// rate counting as 0 (at rest). NaN where the output was not measured.
+    pub fn error_dps(&self) -> Vec<f64> {
+        let applied = self.column("rate_dps").unwrap_or(&[]);
+        self.column("rate_out_dps")
+            .unwrap_or(&[])
+            .iter()
+            .enumerate()
+            .map(|(i, out)| match applied.get(i) {
+                Some(rate) if !rate.is_nan() => out - rate,
+                _ => *out,
+            })
+            .collect()
+    }
+}
+
+/// Reads a thermal record.
+///
+/// # Errors
+/// What `contracts/record.md` calls unusable, with line, column and remedy; see the table in the
+/// tests. What is usable but implausible comes back as warnings.
+pub fn read(path: &Path, mapping: &RecordMapping) -> Result<(ThermalRecord, Vec<Warning>)> {
+    let bytes = std::fs::read(path).map_err(|e| io_error(path, "read the record", &e))?;
+    parse(&bytes, path, mapping)
+}
+
+/// As [`read`], from bytes; `path` is for the messages.
+///
+/// # Errors
+/// As [`read`].
+pub fn parse(
+    bytes: &[u8],
+    path: &Path,
+    mapping: &RecordMapping,
+) -> Result<(ThermalRecord, Vec<Warning>)> {
+    if let Some(period) = mapping.row_period_s
+        && !(period.is_finite() && period > 0.0)
+    {
+        return Err(
+            InputError::new(format!("row_period_s = {period} is no period"))
+                .help("give the seconds from one row to the next, such as row_period_s = 15")
+                .into(),
+        );
+    }
+    let text = decode(bytes, path)?;
+    let ending = if text.contains('\n') { '\n' } else { '\r' };
+    let mut lines = text
+        .split(ending)
+        .enumerate()
+        .map(|(i, line)| Line {
+            path,
+            number: i + 1,
+            text: line.trim_end_matches('\r'),
+        })
+        .filter(|line| !line.text.trim().is_empty());
+    let header = lines
+        .find(|line| !line.text.trim_start().starts_with('#'))
+        .ok_or_else(|| {
+            InputError::new("the record is empty")
+                .in_file(path)
+                .at(1, 1)
+                .help("a record is a header row, such as time_s,rate_out_dps,die_degc, and rows")
+        })?;
+    let roles = columns::resolve(header, mapping)?;
+    let rows: Vec<Line<'_>> = lines.collect();
+    if rows.is_empty() {
+        return Err(header
+            .error(
+                1,
+                "the record has a header row and nothing after it".to_owned(),
+                format!("at least {LEAST_ROWS} rows are needed"),
+            )
+            .into());
+    }
+    let (values, mut warnings) = numbers(&rows, &roles)?;
+    warnings.splice(0..0, roles.warnings.iter().cloned());
+    let mut record = ThermalRecord {
+        source: path.to_path_buf(),
+        time_s: Vec::new(),
+        columns: BTreeMap::new(),
+        lines: rows.iter().map(|r| r.number).collect(),
+        renamed: BTreeMap::new(),
+    };
+    for ((file_name, names), column) in roles.columns.iter().zip(&values) {
+        let Some(column) = column else { continue };
+        for name in names {
+            if name != file_name {
+                record.renamed.insert(name.clone(), file_name.clone());
+            }
+            record.columns.insert(name.clone(), column.clone());
+        }
+    }
+    clock::take(&mut record, &rows, &roles, mapping, &mut warnings)?;
+    clock::merge_repeated(&mut record, &mut warnings);
+    enough(&record, &rows, &mut warnings)?;
+    plausibility::check(&record, &mut warnings);
+    frozen::check(&record, &mut warnings);
+    Ok((record, warnings))
+}
+
+/// UTF-8, with or without a byte order mark.
+fn decode<'a>(bytes: &'a [u8], path: &Path) -> Result<&'a str> {
+    if bytes.starts_with(&[0xFF, 0xFE]) || bytes.starts_with(&[0xFE, 0xFF]) {
+        return Err(InputError::new("the record is UTF-16, not UTF-8")
+            .in_file(path)
+            .at(1, 1)
+            .help("export it as UTF-8 (\"CSV UTF-8\")")
+            .into());
+    }
+    let bytes = bytes.strip_prefix(&[0xEF, 0xBB, 0xBF]).unwrap_or(bytes);
+    std::str::from_utf8(bytes).map_err(|e| {
+        let good = std::str::from_utf8(&bytes[..e.valid_up_to()]).unwrap_or("");
+        let byte = bytes.get(e.valid_up_to()).copied().unwrap_or(0);
+        let mut error = InputError::new(format!("byte 0x{byte:02X} is not UTF-8"))
+            .in_file(path)
+            .at_offset(good, good.len())
+            .help("export the record as UTF-8; a degree sign in Latin-1 is a frequent cause");
+        error.source_line = None;
+        error.into()
+    })
+}
+
+/// The numbers, by column of the file; `None` for a column that is left out.
+type Values = Vec<Option<Vec<f64>>>;
+
+/// Reads all cells.
+fn numbers(rows: &[Line<'_>], roles: &Roles) -> Result<(Values, Vec<Warning>)> {
+    let width = roles.columns.len();
+    let mut values = vec![Vec::with_capacity(rows.len()); width];
+    let mut first_bad: Vec<Option<InputError>> = vec![None; width];
+    for line in rows {
+        if line.text.trim_start().starts_with('#') {
+            return Err(line
+                .error(
+                    1,
+                    "a comment among the rows".to_owned(),
+                    "comments stand before the header; move or remove it".to_owned(),
+                )
+                .into());
+        }
+        let cells = match cells::split(line.text) {
+            Ok(cells) => cells,
+            Err(column) => return Err(columns::open_quote(*line, column).into()),
+        };
+        if cells.len() != width {
+            return Err(wrong_width(line, &cells, roles).into());
+        }
+        for (i, cell) in cells.iter().enumerate() {
+            let (name, names) = &roles.columns[i];
+            let value = cells::number(&cell.text).unwrap_or_else(|why| {
+                if first_bad[i].is_none() {
+                    let what = if why == BadNumber::Infinite {
+                        "is not finite"
+                    } else {
+                        "is no number"
+                    };
+                    let shown: String = cell.text.chars().take(40).collect();
+                    first_bad[i] = Some(line.error(
+                        cell.column,
+                        format!("\"{shown}\" in column {name} {what}"),
+                        why.help().to_owned(),
+                    ));
+                }
+                f64::NAN
+            });
+            values[i].push(value);
+            if names.iter().any(|n| columns::is_known(n))
+                && let Some(e) = first_bad[i].take()
+            {
+                return Err(e.into());
+            }
+        }
+    }
+    let mut warnings = Vec::new();
+    let mut kept = Vec::with_capacity(width);
+    for ((column, (name, names)), bad) in values.into_iter().zip(&roles.columns).zip(first_bad) {
+        let any = column.iter().any(|v| !v.is_nan());
+        if name.is_empty() && (any || bad.is_some()) {
+            return Err(rows[0]
+                .error(
+                    1,
+                    "a column with values has no name in the header".to_owned(),
+                    "name it, with its unit, or remove it".to_owned(),
+                )
+                .into());
+        }
+        match bad {
+            Some(e) if any || e.message.ends_with("finite") => return Err(e.into()),
+            Some(_) => warnings.push(Warning::on(
+                "text_column",
+                name,
+                format!("column {name} holds text, not numbers: left out"),
+            )),
+            None if !any && !name.is_empty() => {
+                for name in names {
+                    warnings.push(Warning::on(
+                        "empty_column",
+                        name,
+                        format!("column {name} holds no measured value: left out"),
+                    ));
+                }
+            }
+            None => {}
+        }
+        kept.push((any && !names.is_empty()).then_some(column));
+    }
+    Ok((kept, warnings))
+}
+
+/// A row whose number of cells is not the header's.
+fn wrong_width(line: &Line<'_>, cells: &[cells::Cell<'_>], roles: &Roles) -> InputError {
+    let width = roles.columns.len();
+    let (column, help) = match cells.get(width) {
+        Some(extra) => (
+            extra.column,
+            "remove what is too much; if it is a decimal comma, export with decimal points"
+                .to_owned(),
+        ),
+        None => (
+            line.text.chars().count() + 1,
+            format!(
+                "an empty cell still needs its comma; the first missing one is column {}",
+                roles.columns[cells.len()].0
+            ),
+        ),
+    };
+    line.error(
+        column,
+        format!("{} cells, and the header has {width}", cells.len()),
+        help,
+    )
+}
+
+/// Enough rows with a rate, and a word on those without.
+fn enough(record: &ThermalRecord, rows: &[Line<'_>], warnings: &mut Vec<Warning>) -> Result<()> {
+    let measured = record.measured("rate_out_dps");
+    if measured < LEAST_ROWS {
+        return Err(rows[rows.len() - 1]
+            .error(
+                1,
+                format!("only {measured} rows have a time and a rate_out_dps"),
+                format!("at least {LEAST_ROWS} are needed; record longer, or average less"),
+            )
+            .into());
+    }
+    let without = record.len() - measured;
+    if without > 0 {
+        warnings.push(Warning::on(
+            "rows_without_rate",
+            "rate_out_dps",
+            format!(
+                "{without} of {} rows have no rate_out_dps; they take no part in any fit",
+                record.len()
+            ),
+        ));
+    }
+    Ok(())
+}

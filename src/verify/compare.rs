@@ -1,0 +1,246 @@
+//! Runs emitted code beside the model and finds the first difference.
+
+use super::model::{self, Model};
+use super::stimulus;
+use super::toolchain::Harness;
+use crate::circuit::engine::{self, ArithmeticKind};
+use crate::design::Design;
+use crate::emit::bundle::Bundle;
+use crate::emit::files::{SEED, saturating_rows};
+use crate::emit::views::{self, Language};
+use crate::error::Result;
+use serde::Serialize;
+
+/// Inputs of at most this many bits are compared exhaustively.
+pub const EXHAUSTIVE_BITS: u32 = 24;
+/// Random inputs of a function that is not compared exhaustively.
+const RANDOM_INPUTS: usize = 1 << 18;
+/// ADC samples of the chain's comparison.
+pub const CHAIN_SAMPLES: usize = 1 << 20;
+
+/// The outcome for one table, function or chain.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Compared {
+    /// `c` or `rust`.
+    pub language: &'static str,
+    /// Name without prefix.
+    pub name: String,
+    /// Inputs (ADC samples of a chain, entries of a table).
+    pub inputs: u64,
+    /// Every input there is.
+    pub exhaustive: bool,
+    /// Output words that were compared.
+    pub compared: u64,
+    /// Inputs (rows of a chain) with a difference.
+    pub mismatches: u64,
+    /// The first difference, in words.
+    pub first: Option<String>,
+}
+
+/// Compares everything that a bundle holds with the model of `design`.
+///
+/// # Errors
+/// A test driver that cannot be run.
+pub fn with_model(design: &Design, bundle: &Bundle, language: Language, harness: &Harness) -> Result<Vec<Compared>> {
+    let mut all = Vec::new();
+    for table in views::tables(bundle, language) {
+        let expected: Vec<i128> = table.entries.iter().map(|v| i128::from(*v)).collect();
+        all.push(self::table(language, harness, &table.name, &expected)?);
+    }
+    for model in model::models(design, &bundle.program) {
+        all.push(function(language, harness, &model)?);
+    }
+    if bundle.has_chain {
+        let ratio = bundle.ratio as usize;
+        let samples = CHAIN_SAMPLES.div_ceil(ratio) * ratio;
+        let (drive, sense) = stimulus::capture(design, samples, SEED + 2);
+        all.push(chain(design, language, harness, &drive, &sense)?);
+    }
+    Ok(all)
+}
+
+/// The language's name in results.
+pub fn language_name(language: Language) -> &'static str {
+    match language {
+        Language::C => "c",
+        Language::Rust => "rust",
+    }
+}
+
+/// Notes a difference and keeps the first.
+struct Tally {
+    outcome: Compared,
+}
+
+impl Tally {
+    fn new(language: Language, name: &str) -> Self {
+        Tally {
+            outcome: Compared {
+                language: language_name(language),
+                name: name.to_owned(),
+                inputs: 0,
+                exhaustive: false,
+                compared: 0,
+                mismatches: 0,
+                first: None,
+            },
+        }
+    }
+
+    fn note(&mut self, got: &[u64], expected: &[i128], place: impl FnOnce() -> String) {
+        self.outcome.inputs += 1;
+        self.outcome.compared += expected.len() as u64;
+        let same = got.len() == expected.len()
+            && got.iter().zip(expected).all(|(g, e)| *g == *e as u64);
+        if !same {
+            self.outcome.mismatches += 1;
+            if self.outcome.first.is_none() {
+                let got: Vec<i64> = got.iter().map(|w| *w as i64).collect();
+                self.outcome.first =
+                    Some(format!("{}: emitted {got:?}, model {expected:?}", place()));
+            }
+        }
+    }
+
+    /// `count` inputs were due; what is missing is a difference.
+    fn finish(mut self, count: u64) -> Compared {
+        if self.outcome.inputs < count {
+            self.outcome.mismatches += count - self.outcome.inputs;
+            let seen = self.outcome.inputs;
+            let missing = || format!("the emitted code stopped after {seen} of {count}");
+            self.outcome.first.get_or_insert_with(missing);
+            self.outcome.inputs = count;
+        }
+        self.outcome
+    }
+}
+
+/// Compares a table entry by entry.
+///
+/// # Errors
+/// A test driver that cannot be run.
+pub fn table(language: Language, harness: &Harness, name: &str, expected: &[i128]) -> Result<Compared> {
+    let mut tally = Tally::new(language, name);
+    tally.outcome.exhaustive = true;
+    let mut k = 0;
+    let arguments = ["table".to_owned(), name.to_owned()];
+    harness.run(&arguments, Vec::new(), 1, &mut |words| {
+        tally.note(words, expected.get(k..=k).unwrap_or(&[]), || format!("entry {k}"));
+        k += 1;
+    })?;
+    Ok(tally.finish(expected.len() as u64))
+}
+
+/// Compares a function: exhaustively if it has one input of at most [`EXHAUSTIVE_BITS`] bits, else
+/// on corners and random words.
+///
+/// # Errors
+/// A test driver that cannot be run.
+pub fn function(language: Language, harness: &Harness, model: &Model) -> Result<Compared> {
+    if let [range] = model.inputs.as_slice()
+        && range.high - range.low < 1 << EXHAUSTIVE_BITS
+    {
+        let count = (range.high - range.low + 1) as u64;
+        let arguments = ["range".to_owned(), model.name.clone(), range.low.to_string(), count.to_string()];
+        let mut tally = Tally::new(language, &model.name);
+        tally.outcome.exhaustive = true;
+        let mut input = range.low;
+        let mut expected = vec![0; model.outputs + 1];
+        harness.run(&arguments, Vec::new(), model.outputs + 1, &mut |words| {
+            expected[model.outputs] = i128::from(model.call(&[input], &mut expected[..model.outputs]));
+            tally.note(words, &expected, || format!("input {input}"));
+            input += 1;
+        })?;
+        return Ok(tally.finish(count));
+    }
+    let inputs = stimulus::inputs(&model.inputs, RANDOM_INPUTS, SEED + 3);
+    let expected = inputs.iter().map(|input| {
+        let mut outputs = vec![0; model.outputs + 1];
+        outputs[model.outputs] = i128::from(model.call(input, &mut outputs[..model.outputs]));
+        outputs
+    });
+    calls(language, harness, &model.name, &inputs, &expected.collect::<Vec<_>>())
+}
+
+/// Compares a function on given inputs; the last expected word is the fault.
+///
+/// # Errors
+/// A test driver that cannot be run.
+pub fn calls(
+    language: Language,
+    harness: &Harness,
+    name: &str,
+    inputs: &[Vec<i128>],
+    expected: &[Vec<i128>],
+) -> Result<Compared> {
+    let words = inputs.iter().flatten().map(|w| *w as i64);
+    let bytes: Vec<u8> = words.flat_map(i64::to_ne_bytes).collect();
+    let record = expected.first().map_or(1, Vec::len);
+    let mut tally = Tally::new(language, name);
+    let mut k = 0;
+    harness.run(&["call".to_owned(), name.to_owned()], bytes, record, &mut |words| {
+        let due = expected.get(k).map_or(&[][..], Vec::as_slice);
+        tally.note(words, due, || format!("input {:?}", inputs.get(k)));
+        k += 1;
+    })?;
+    Ok(tally.finish(expected.len() as u64))
+}
+
+/// Compares the chain row by row on captured codes.
+///
+/// # Errors
+/// A test driver that cannot be run.
+pub fn chain(
+    design: &Design,
+    language: Language,
+    harness: &Harness,
+    drive: &[i32],
+    sense: &[i32],
+) -> Result<Compared> {
+    let rows = expected_rows(design, drive, sense);
+    let mut compared = chain_rows(language, harness, drive, sense, &rows)?;
+    compared.inputs = drive.len() as u64;
+    Ok(compared)
+}
+
+/// The model's rows, each with the number of the fault so far as its last word.
+pub fn expected_rows(design: &Design, drive: &[i32], sense: &[i32]) -> Vec<Vec<i128>> {
+    let columns = engine::columns(design).len();
+    let ratio = design.circuit.decimator.ratio as u64;
+    let mut watching = engine::engine(design, ArithmeticKind::Fixed);
+    let mut rows = watching.no_rows();
+    let stopped = watching.process(drive, sense, &mut rows).err();
+    saturating_rows(design, drive, sense)
+        .chunks_exact(columns)
+        .enumerate()
+        .map(|(k, row)| {
+            let end = (k as u64 + 1) * ratio;
+            let fault = stopped.filter(|o| o.sample < end).map_or(0, |o| o.cast + 1);
+            row.iter().copied().chain([fault as i128]).collect()
+        })
+        .collect()
+}
+
+/// Compares the chain with given rows, each with the fault as its last word.
+///
+/// # Errors
+/// A test driver that cannot be run.
+pub fn chain_rows(
+    language: Language,
+    harness: &Harness,
+    drive: &[i32],
+    sense: &[i32],
+    rows: &[Vec<i128>],
+) -> Result<Compared> {
+    let pairs = drive.iter().zip(sense);
+    let bytes: Vec<u8> = pairs.flat_map(|(d, s)| [d.to_ne_bytes(), s.to_ne_bytes()]).flatten().collect();
+    let record = rows.first().map_or(1, Vec::len);
+    let mut tally = Tally::new(language, "chain");
+    let mut k = 0;
+    harness.run(&["chain".to_owned()], bytes, record, &mut |words| {
+        let due = rows.get(k).map_or(&[][..], Vec::as_slice);
+        tally.note(words, due, || format!("row {k}"));
+        k += 1;
+    })?;
+    Ok(tally.finish(rows.len() as u64))
+}

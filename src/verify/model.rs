@@ -1,0 +1,142 @@
+//! The bit-accurate model of each emitted function without state, as something that can be called.
+
+use crate::circuit::chain::Chain;
+use crate::circuit::compensation::Bias;
+use crate::design::Design;
+use crate::emit::bundle::Compensate;
+use crate::numeric::arithmetic::Block;
+use crate::numeric::fixed::Fixed;
+use crate::numeric::trace::ir::{Function, Interval, Program};
+
+/// A function of the model.
+pub struct Model {
+    /// The emitted function's name.
+    pub name: String,
+    /// Range of each input.
+    pub inputs: Vec<Interval>,
+    /// Number of outputs.
+    pub outputs: usize,
+    call: Box<Evaluate>,
+}
+
+/// Inputs, outputs; gives the number of the fault, 0 = none.
+type Evaluate = dyn Fn(&[i128], &mut [i128]) -> u32;
+
+impl Model {
+    /// Evaluates; `inputs` and `outputs` have the model's lengths. Gives the number of the first
+    /// overflow where the design says `error`, 0 = none.
+    pub fn call(&self, inputs: &[i128], outputs: &mut [i128]) -> u32 {
+        (self.call)(inputs, outputs)
+    }
+
+    fn new<const I: usize, const O: usize, B>(function: &Function, block: B, narrow: bool) -> Self
+    where
+        B: Block<Fixed<i64, i64>, I, O, State = ()> + Block<Fixed<i128, i128>, I, O, State = ()>,
+        B: 'static,
+    {
+        let call: Box<Evaluate> = if narrow {
+            Box::new(move |inputs, outputs| {
+                let ar = Fixed::<i64, i64>::new();
+                let words = std::array::from_fn(|k| inputs[k] as i64);
+                let results = Block::<_, I, O>::step(&block, &ar, &mut (), words);
+                for (output, word) in outputs.iter_mut().zip(results) {
+                    *output = i128::from(word);
+                }
+                ar.overflowed().map_or(0, |o| o.cast as u32 + 1)
+            })
+        } else {
+            Box::new(move |inputs, outputs| {
+                let ar = Fixed::<i128, i128>::new();
+                let words = std::array::from_fn(|k| inputs[k]);
+                let results = Block::<_, I, O>::step(&block, &ar, &mut (), words);
+                outputs[..O].copy_from_slice(&results);
+                ar.overflowed().map_or(0, |o| o.cast as u32 + 1)
+            })
+        };
+        Model {
+            name: function.name.clone(),
+            inputs: function.inputs.iter().map(|(_, range)| *range).collect(),
+            outputs: O,
+            call,
+        }
+    }
+}
+
+/// Models of the functions without state that a program has, in the program's order.
+///
+/// Functions with inputs of more than 64 bits are left out: only the chain reaches them.
+pub fn models(design: &Design, program: &Program) -> Vec<Model> {
+    match design.circuit.decimator.stages {
+        1 => of_chain(&Chain::<1>::new(design), design, program),
+        2 => of_chain(&Chain::<2>::new(design), design, program),
+        3 => of_chain(&Chain::<3>::new(design), design, program),
+        4 => of_chain(&Chain::<4>::new(design), design, program),
+        5 => of_chain(&Chain::<5>::new(design), design, program),
+        _ => of_chain(&Chain::<6>::new(design), design, program),
+    }
+}
+
+fn of_chain<const N: usize>(chain: &Chain<N>, design: &Design, program: &Program) -> Vec<Model> {
+    let alone = crate::emit::bundle::compensation_alone(design);
+    let compensation = chain.compensation.clone().or(alone);
+    let variants = program
+        .functions
+        .iter()
+        .filter(|f| f.name.starts_with("demodulate"))
+        .count();
+    let mut models = Vec::new();
+    for function in &program.functions {
+        let fits = |range: &Interval| range.bits() <= 64;
+        if !function.inputs.iter().all(|(_, range)| fits(range)) {
+            continue;
+        }
+        let narrow = program.word_bits(function) <= 64;
+        let base = function.name.trim_end_matches(|c: char| c == '_' || c.is_ascii_digit());
+        let model = match (base, &compensation) {
+            ("demodulate", _) => {
+                // One for all channels, or one for each in the channels' order.
+                let variant = function.name.trim_start_matches("demodulate_");
+                let channel = variant.parse::<usize>().map_or(0, |k| k - 1);
+                let channel = if variants > 1 { channel.min(3) } else { 0 };
+                Model::new(function, chain.mixers[channel].clone(), narrow)
+            }
+            ("cordic", _) => Model::new(function, chain.cordic.clone(), narrow),
+            ("bias", Some((bias, _))) => Model::new(function, bias.clone(), narrow),
+            ("rate", Some((_, rate))) => Model::new(function, rate.clone(), narrow),
+            ("compensate", Some((bias, rate))) => {
+                let (bias, rate) = (bias.clone(), rate.clone());
+                // The callees' words count too.
+                let narrow = program.functions.iter().all(|f| program.word_bits(f) <= 64);
+                Model::new(function, Compensate { bias, rate }, narrow)
+            }
+            _ => continue,
+        };
+        models.push(model);
+    }
+    models
+}
+
+/// For each coefficient of the polynomial, inputs at which the model's output changes if the
+/// coefficient moves by one LSB: vectors that catch such damage.
+pub fn sensitive_inputs(design: &Design, candidates: &[i128]) -> Vec<i128> {
+    const EACH: usize = 4;
+    let Some(compensation) = &design.compensation else {
+        return Vec::new();
+    };
+    let evaluate = |bias: &Bias, input: i128| {
+        let ar = Fixed::<i128, i128>::new();
+        Block::<_, 1, 1>::step(bias, &ar, &mut (), [input])
+    };
+    let nominal = Bias::new(&design.circuit, compensation);
+    let mut inputs = Vec::new();
+    for k in 0..compensation.coefficients_raw.len() {
+        for step in [-1, 1] {
+            let mut damaged = compensation.clone();
+            damaged.coefficients_raw[k] += step;
+            let damaged = Bias::new(&design.circuit, &damaged);
+            let differs = |x: &&i128| evaluate(&damaged, **x) != evaluate(&nominal, **x);
+            inputs.extend(candidates.iter().filter(differs).take(EACH));
+        }
+    }
+    inputs
+}
