@@ -24,7 +24,6 @@ enum Target {
     Straight(Box<dyn Write + Send>),
 }
 
-
 impl OutputFile {
     /// Opens the output.
     ///

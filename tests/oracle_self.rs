@@ -268,14 +268,18 @@ fn generated_designs_run() {
     for key in casts {
         assert!(keys.contains(key), "{key} is never too wide");
     }
-    for channel in fixed::CHANNELS {
-        for (key, operands) in [(casts[0], 2), (casts[1], 1)] {
-            let node = (format!("{key} {channel}"), operands);
-            assert!(nodes.contains(&node), "{node:?} never stops");
-        }
+    for (key, operands) in [
+        (casts[0], 2),
+        (casts[1], 1),
+        (casts[2], 2),
+        (casts[3], 1),
+        (casts[3], 2),
+    ] {
+        let stops = |(node, count): &(String, usize)| node.starts_with(key) && *count == operands;
+        assert!(nodes.iter().any(stops), "{key} never stops");
     }
-    for (key, operands) in [(casts[2], 2), (casts[3], 1), (casts[3], 2)] {
-        let node = (key.to_owned(), operands);
-        assert!(nodes.contains(&node), "{node:?} never stops");
+    for channel in fixed::CHANNELS {
+        let stops = nodes.iter().any(|(node, _)| node.ends_with(channel));
+        assert!(stops, "{channel} never stops");
     }
 }

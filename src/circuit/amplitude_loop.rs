@@ -32,7 +32,14 @@ impl AmplitudeLoop {
     pub fn new(design: &design::AmplitudeLoop, magnitude_fraction_bits: u32) -> Self {
         let shift = |key, count: u32| {
             let exact = Target::signed(127, 0);
-            Cast::new(Label::of(key), 0, -(count as i32), exact, Rounding::Floor, None)
+            Cast::new(
+                Label::of(key),
+                0,
+                -(count as i32),
+                exact,
+                Rounding::Floor,
+                None,
+            )
         };
         AmplitudeLoop {
             setpoint: i128::from(design.setpoint_raw),
@@ -69,7 +76,10 @@ impl<A: Arithmetic> Block<A, 1, 1> for AmplitudeLoop {
 
     fn outputs(&self) -> [Port; 1] {
         let shift = self.gain_bits - 1;
-        [Port::new("gain", format!("drive gain in units of 2^-{shift}"))]
+        [Port::new(
+            "gain",
+            format!("drive gain in units of 2^-{shift}"),
+        )]
     }
 
     #[inline(always)]
@@ -91,6 +101,11 @@ impl<A: Arithmetic> Block<A, 1, 1> for AmplitudeLoop {
     }
 
     fn visit(&self, state: &mut AmplitudeLoopState<A::Word>, visitor: &mut dyn StateVisitor<A>) {
-        visitor.word("integrator", &mut state.integrator, 0, self.integrator_limit);
+        visitor.word(
+            "integrator",
+            &mut state.integrator,
+            0,
+            self.integrator_limit,
+        );
     }
 }

@@ -1,5 +1,6 @@
 //! The wiring of the blocks: what happens at every sample, and what after every R samples.
 
+use super::CHANNELS;
 use super::amplitude_loop::{AmplitudeLoop, AmplitudeLoopState};
 use super::compensation::{Bias, Rate};
 use super::cordic::Vectoring;
@@ -7,12 +8,11 @@ use super::decimator::{Cic, CicState, Decimate, Integrate};
 use super::demodulator::Mixer;
 use super::nco::{Oscillator, OscillatorState, Retune};
 use super::phase_loop::{PhaseLoop, PhaseLoopState};
-use super::CHANNELS;
 use crate::design::{Circuit, Compensation, CompensationInput, Design};
 use crate::numeric::arithmetic::{Arithmetic, Block, Port};
 use crate::numeric::cast::Cast;
-use crate::numeric::trace::ir::{Interval, Program};
 use crate::numeric::trace::Trace;
+use crate::numeric::trace::ir::{Interval, Program};
 
 /// A chain with N-stage decimators.
 #[derive(Debug, Clone)]
@@ -99,7 +99,11 @@ impl<const N: usize> Chain<N> {
         let carrier = Interval::new(-i128::from(peak), i128::from(peak));
         let mixers = CHANNELS.map(|channel| Mixer::new(circuit, channel));
         let cics = std::array::from_fn(|k| {
-            Cic::new(circuit, CHANNELS[k], mixers[k].product_range(code_range, carrier))
+            Cic::new(
+                circuit,
+                CHANNELS[k],
+                mixers[k].product_range(code_range, carrier),
+            )
         });
         let on_phase = compensation.filter(|c| c.input == CompensationInput::Phase);
         let angle_bits = circuit.cordic.angle_bits;
@@ -153,14 +157,20 @@ impl<const N: usize> Chain<N> {
         // Words of the pattern state are never looked at.
         let state = ChainState {
             fast: FastState {
-                oscillator: OscillatorState { phase: 0, tuning: 0 },
+                oscillator: OscillatorState {
+                    phase: 0,
+                    tuning: 0,
+                },
                 cics: [CicState {
                     integrators: [0; N],
                     delays: [[0; 2]; N],
                 }; 4],
             },
             slow: SlowState {
-                phase_loop: self.phase_loop.as_ref().map(|_| PhaseLoopState { integral: 0 }),
+                phase_loop: self
+                    .phase_loop
+                    .as_ref()
+                    .map(|_| PhaseLoopState { integral: 0 }),
                 amplitude_loop: self
                     .amplitude_loop
                     .as_ref()
@@ -197,7 +207,12 @@ impl<const N: usize> Chain<N> {
         [drive, sense]: [A::Word; 2],
     ) {
         let [sine, cosine] = ar.call(&self.nco, "nco", &mut state.oscillator, []);
-        let inputs = [[drive, sine], [drive, cosine], [sense, sine], [sense, cosine]];
+        let inputs = [
+            [drive, sine],
+            [drive, cosine],
+            [sense, sine],
+            [sense, cosine],
+        ];
         // All four products first: the order in which an overflow is the earliest.
         let mut products = [sine; 4];
         for k in 0..4 {
@@ -231,7 +246,12 @@ impl<const N: usize> Chain<N> {
         });
         if let (Some(block), Some(state)) = (&self.phase_loop, &mut slow.phase_loop) {
             let [correction] = ar.call(block, "phase_loop", state, [phase]);
-            let [] = ar.call(&Retune(&self.nco), "nco", &mut fast.oscillator, [correction]);
+            let [] = ar.call(
+                &Retune(&self.nco),
+                "nco",
+                &mut fast.oscillator,
+                [correction],
+            );
         }
         let gain = match (&self.amplitude_loop, &mut slow.amplitude_loop) {
             (Some(block), Some(state)) => {
@@ -253,7 +273,12 @@ impl<const N: usize> Chain<N> {
 impl Bias {
     /// Every cast, in a fixed order.
     pub fn casts_mut(&mut self) -> [&mut Cast; 4] {
-        [&mut self.first, &mut self.inner, &mut self.outer, &mut self.output]
+        [
+            &mut self.first,
+            &mut self.inner,
+            &mut self.outer,
+            &mut self.output,
+        ]
     }
 }
 
@@ -273,19 +298,31 @@ fn meanings(circuit: &Circuit, compensation: Option<&Compensation>) -> Vec<Port>
         .map(|name| Port::new(name, format!("decimated, {output}")))
         .collect();
     let angle = circuit.cordic.angle_bits;
-    ports.push(Port::new("phase", format!("drive phase in units of 2^-{angle} turn")));
+    ports.push(Port::new(
+        "phase",
+        format!("drive phase in units of 2^-{angle} turn"),
+    ));
     let lsb = output.format.fraction_bits;
-    ports.push(Port::new("magnitude", format!("drive magnitude in units of 2^-{lsb}")));
+    ports.push(Port::new(
+        "magnitude",
+        format!("drive magnitude in units of 2^-{lsb}"),
+    ));
     let absent = Port::new("", "");
     match compensation {
         Some(c) => {
             ports.push(Port::new("bias", format!("bias in deg/s, {}", c.output)));
-            ports.push(Port::new("rate", format!("compensated rate in deg/s, {}", c.output)));
+            ports.push(Port::new(
+                "rate",
+                format!("compensated rate in deg/s, {}", c.output),
+            ));
         }
         None => ports.extend([absent.clone(), absent.clone()]),
     }
     ports.push(match &circuit.amplitude_loop {
-        Some(l) => Port::new("gain", format!("drive gain in units of 2^-{}", l.gain_bits - 1)),
+        Some(l) => Port::new(
+            "gain",
+            format!("drive gain in units of 2^-{}", l.gain_bits - 1),
+        ),
         None => absent,
     });
     ports
@@ -312,7 +349,10 @@ impl<A: Arithmetic, const N: usize> Block<A, 2, 0> for Sample<'_, N> {
     const STATE: &'static str = "chain";
 
     fn inputs(&self) -> [Port; 2] {
-        [Port::new("drive", "ADC code"), Port::new("sense", "ADC code")]
+        [
+            Port::new("drive", "ADC code"),
+            Port::new("sense", "ADC code"),
+        ]
     }
 
     fn outputs(&self) -> [Port; 0] {

@@ -116,17 +116,27 @@ impl<A: Arithmetic> Block<A, 1, 1> for Bias {
         };
         let p = ar.read_as(from_centre, self.read_exponent);
 
-        let (fine, coarse) = (self.accumulator_fraction_bits, self.coefficient_fraction_bits);
+        let (fine, coarse) = (
+            self.accumulator_fraction_bits,
+            self.coefficient_fraction_bits,
+        );
         let mut orders = self.coefficients.iter().enumerate().rev();
         let mut t = match orders.next() {
             Some((_, highest)) => ar.constant(*highest, coarse),
             None => ar.constant(0, coarse),
         };
         let highest = self.coefficients.len().saturating_sub(1);
-        let aligned = self.coefficients.last().map_or(0, |c| c << (fine - coarse).max(0));
+        let aligned = self
+            .coefficients
+            .last()
+            .map_or(0, |c| c << (fine - coarse).max(0));
         let mut reported = ar.constant(aligned, fine);
         for (order, coefficient) in orders {
-            let cast = if order + 1 == highest { &self.first } else { &self.inner };
+            let cast = if order + 1 == highest {
+                &self.first
+            } else {
+                &self.inner
+            };
             // An overflow is reported with all words in the accumulator's LSB.
             let inner = ar.cast(ar.mul(t, p), cast, &[reported, p]);
             // Exact: the accumulator has at least the coefficients' fraction bits.

@@ -102,7 +102,11 @@ impl<A: Arithmetic> Block<A, 2, 2> for Vectoring {
         let minus_y = ar.wrap(ar.neg(y), self.width, self.fraction_bits);
         let angle = self.angle_bits as i32;
         let quarter = 1i128 << (self.angle_bits - 2);
-        let z_left = ar.select(below, ar.constant(-quarter, angle), ar.constant(quarter, angle));
+        let z_left = ar.select(
+            below,
+            ar.constant(-quarter, angle),
+            ar.constant(quarter, angle),
+        );
         let start = [
             ar.select(left, ar.select(below, minus_y, y), x),
             ar.select(left, ar.select(below, x, minus_x), y),

@@ -86,7 +86,9 @@ impl<const N: usize> Cic<N> {
         state: &mut CicState<A::Residue, N>,
         visitor: &mut dyn StateVisitor<A>,
     ) {
-        const NAMES: [&str; 6] = ["delay_1", "delay_2", "delay_3", "delay_4", "delay_5", "delay_6"];
+        const NAMES: [&str; 6] = [
+            "delay_1", "delay_2", "delay_3", "delay_4", "delay_5", "delay_6",
+        ];
         visitor.residues("integrator", &mut state.integrators, &self.ring);
         for (name, delays) in NAMES.iter().zip(&mut state.delays) {
             visitor.residues(name, &mut delays[..self.delay], &self.ring);
@@ -116,7 +118,12 @@ impl<A: Arithmetic, const N: usize> Block<A, 1, 0> for Integrate<'_, N> {
     }
 
     #[inline(always)]
-    fn step(&self, ar: &A, state: &mut CicState<A::Residue, N>, [product]: [A::Word; 1]) -> [A::Word; 0] {
+    fn step(
+        &self,
+        ar: &A,
+        state: &mut CicState<A::Residue, N>,
+        [product]: [A::Word; 1],
+    ) -> [A::Word; 0] {
         let mut carried = ar.residue(product, &self.0.ring);
         for integrator in &mut state.integrators {
             *integrator = ar.residue_add(*integrator, carried, &self.0.ring);

@@ -184,13 +184,7 @@ impl<W: HasKernel, R: Lane> Ends for Fixed<W, R> {
     fn no_rows() -> Rows {
         Rows::Integer(Vec::new())
     }
-    fn put(
-        row: &Row<W>,
-        tuning: Option<R>,
-        phase_bits: u32,
-        _scale: &FloatScale,
-        rows: &mut Rows,
-    ) {
+    fn put(row: &Row<W>, tuning: Option<R>, phase_bits: u32, _scale: &FloatScale, rows: &mut Rows) {
         let Rows::Integer(rows) = rows else { return };
         rows.extend(row.channels.iter().map(|w| w.wide()));
         rows.extend([row.phase.wide(), row.magnitude.wide()]);

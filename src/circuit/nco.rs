@@ -62,7 +62,11 @@ impl Oscillator {
         visitor: &mut dyn StateVisitor<A>,
     ) {
         visitor.residues("phase", std::slice::from_mut(&mut state.phase), &self.ring);
-        visitor.residues("tuning_word", std::slice::from_mut(&mut state.tuning), &self.ring);
+        visitor.residues(
+            "tuning_word",
+            std::slice::from_mut(&mut state.tuning),
+            &self.ring,
+        );
     }
 }
 
@@ -81,7 +85,12 @@ impl<A: Arithmetic> Block<A, 0, 2> for Oscillator {
     }
 
     #[inline(always)]
-    fn step(&self, ar: &A, state: &mut OscillatorState<A::Residue>, []: [A::Word; 0]) -> [A::Word; 2] {
+    fn step(
+        &self,
+        ar: &A,
+        state: &mut OscillatorState<A::Residue>,
+        []: [A::Word; 0],
+    ) -> [A::Word; 2] {
         state.phase = ar.residue_add(state.phase, state.tuning, &self.ring);
         let quarter = ar.residue_constant(1i128 << (self.ring.bits - 2), &self.ring);
         let ahead = ar.residue_add(state.phase, quarter, &self.ring);

@@ -33,7 +33,14 @@ impl PhaseLoop {
     pub fn new(design: &design::PhaseLoop, angle_bits: u32) -> Self {
         let shift = |key, gain: design::LoopGain| {
             let exact = Target::signed(127, 0);
-            Cast::new(Label::of(key), 0, -(gain.shift as i32), exact, Rounding::Floor, None)
+            Cast::new(
+                Label::of(key),
+                0,
+                -(gain.shift as i32),
+                exact,
+                Rounding::Floor,
+                None,
+            )
         };
         PhaseLoop {
             setpoint: i128::from(design.setpoint_raw),
@@ -68,7 +75,10 @@ impl<A: Arithmetic> Block<A, 1, 1> for PhaseLoop {
     const STATE: &'static str = "phase_loop";
 
     fn inputs(&self) -> [Port; 1] {
-        [Port::new("phase", format!("units of 2^-{} turn", self.angle_bits))]
+        [Port::new(
+            "phase",
+            format!("units of 2^-{} turn", self.angle_bits),
+        )]
     }
 
     fn outputs(&self) -> [Port; 1] {

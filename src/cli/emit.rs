@@ -39,6 +39,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     );
     let bundle = files::emit(&design, arguments.part, arguments.lang, &command)?;
     files::write(&bundle, &arguments.out)?;
-    eprintln!("wrote {} files to {}", bundle.len(), arguments.out.display());
+    eprintln!(
+        "wrote {} files to {}",
+        bundle.len(),
+        arguments.out.display()
+    );
     Ok(())
 }

@@ -5,6 +5,7 @@
 
 mod emit;
 mod replay;
+mod run;
 mod verify;
 
 use crate::error::{Error, Result};
@@ -24,6 +25,7 @@ struct Cli {
 enum Command {
     Emit(emit::Arguments),
     Replay(replay::Arguments),
+    Run(run::Arguments),
     Verify(verify::Arguments),
 }
 
@@ -43,6 +45,7 @@ pub fn main() -> ExitCode {
     let result = match &cli.command {
         Command::Emit(arguments) => emit::run(arguments),
         Command::Replay(arguments) => replay::run(arguments),
+        Command::Run(arguments) => run::run(arguments),
         Command::Verify(arguments) => verify::run(arguments),
     };
     match result {
@@ -77,14 +80,20 @@ fn make_folder(folder: &std::path::Path) -> Result<()> {
 /// A table of numbers for the terminal.
 fn table(header: &[&str]) -> comfy_table::Table {
     let mut table = comfy_table::Table::new();
-    table.load_preset(comfy_table::presets::UTF8_HORIZONTAL_ONLY);
+    table.load_style(comfy_table::presets::UTF8_HORIZONTAL_ONLY);
     table.set_header(header);
     table
 }
 
 /// Emitted code against the model, a line each.
 fn comparison_table(compared: &[Compared]) -> comfy_table::Table {
-    let mut table = table(&["emitted", "language", "inputs", "words compared", "mismatches"]);
+    let mut table = table(&[
+        "emitted",
+        "language",
+        "inputs",
+        "words compared",
+        "mismatches",
+    ]);
     for c in compared {
         let inputs = if c.exhaustive {
             format!("{} (all)", c.inputs)

@@ -58,7 +58,10 @@ fn reasons(v: &Verification) -> Vec<String> {
     let mut reasons = Vec::new();
     for f in v.functions.iter().filter(|f| f.mismatches > 0) {
         let first = f.first.as_deref().unwrap_or("");
-        reasons.push(format!("{} ({}): first difference at {first}", f.name, f.language));
+        reasons.push(format!(
+            "{} ({}): first difference at {first}",
+            f.name, f.language
+        ));
     }
     if !v.selftest {
         reasons.push("the self-test fails".into());

@@ -78,7 +78,11 @@ impl Bundle {
             prefix: design.name.clone(),
             lowered: lower(&program),
             states: states(&program),
-            initial: if has_chain { initial(design) } else { Vec::new() },
+            initial: if has_chain {
+                initial(design)
+            } else {
+                Vec::new()
+            },
             program,
             has_chain,
             ratio: design.circuit.decimator.ratio,
@@ -163,7 +167,11 @@ fn states(program: &Program) -> Vec<StateType> {
         });
         let state = &mut states[k];
         for slot in &function.slots {
-            if !state.variables.iter().any(|(name, _, _)| *name == slot.name) {
+            if !state
+                .variables
+                .iter()
+                .any(|(name, _, _)| *name == slot.name)
+            {
                 let ty = match slot.kind {
                     SlotKind::Word(range) => word_type(range),
                     SlotKind::Residue(bits) => residue_type(bits),

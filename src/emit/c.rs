@@ -61,7 +61,11 @@ pub fn signature(bundle: &Bundle, number: usize) -> String {
         parameters.push("void".into());
     }
     let name = &function.name;
-    format!("{} {p}_{name}({})", result_type(bundle, number), parameters.join(", "))
+    format!(
+        "{} {p}_{name}({})",
+        result_type(bundle, number),
+        parameters.join(", ")
+    )
 }
 
 /// The type that a function returns.
@@ -221,9 +225,7 @@ impl Printer<'_> {
         match expr {
             Expr::Convert(a) if bits(a) == 128 && wide => v(a),
             Expr::Convert(a) if wide => format!("{p}_w128_from_s64((int64_t){})", v(a)),
-            Expr::Convert(a) if bits(a) == 128 => {
-                cast(format!("{p}_w128_to_s64({})", v(a)))
-            }
+            Expr::Convert(a) if bits(a) == 128 => cast(format!("{p}_w128_to_s64({})", v(a))),
             Expr::Convert(a) => cast(v(a)),
             Expr::Low(a) if bits(a) == 128 && wide => v(a),
             Expr::Low(a) if wide && matches!(a.ty, Type::Signed(_)) => {

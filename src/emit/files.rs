@@ -87,7 +87,12 @@ page!(RustHarness, "rust/harness.rs");
 ///
 /// # Errors
 /// A design without what the part needs.
-pub fn emit(design: &Design, part: Part, language: Language, command: &str) -> Result<Vec<EmittedFile>> {
+pub fn emit(
+    design: &Design,
+    part: Part,
+    language: Language,
+    command: &str,
+) -> Result<Vec<EmittedFile>> {
     if part == Part::Compensation && design.compensation.is_none() {
         return Err(InputError::new("the design has no [compensation] to emit")
             .help("add a [compensation] table, or emit `--part chain`")
@@ -101,7 +106,16 @@ pub fn emit(design: &Design, part: Part, language: Language, command: &str) -> R
         files.extend(vectors(design, &bundle, &models));
     }
     files.push(table_vectors(&view.tables));
-    let manifest = Manifest::new(design, &bundle, &view.tables, &view.functions, part, language, command, &files);
+    let manifest = Manifest::new(
+        design,
+        &bundle,
+        &view.tables,
+        &view.functions,
+        part,
+        language,
+        command,
+        &files,
+    );
     files.push(EmittedFile {
         path: manifest::NAME.into(),
         text: manifest.to_json(),
@@ -159,7 +173,13 @@ fn sources(view: &View, part: Part, language: Language) -> Result<Vec<EmittedFil
 }
 
 impl View {
-    fn new(design: &Design, bundle: &Bundle, models: &[Model], language: Language, command: &str) -> Self {
+    fn new(
+        design: &Design,
+        bundle: &Bundle,
+        models: &[Model],
+        language: Language,
+        command: &str,
+    ) -> Self {
         let tables = views::tables(bundle, language);
         let mut functions = views::functions(bundle, language);
         let mut number = tables.len() as u32;
@@ -222,7 +242,12 @@ impl View {
 
 /// The columns of a row as unsigned 64-bit words, in the order of `replay`.
 fn row(design: &Design, bundle: &Bundle, language: Language, detector: &str) -> Vec<String> {
-    let Some(k) = bundle.program.functions.iter().position(|f| f.name == "period") else {
+    let Some(k) = bundle
+        .program
+        .functions
+        .iter()
+        .position(|f| f.name == "period")
+    else {
         return Vec::new();
     };
     let outputs = &bundle.lowered[k].outputs;
@@ -230,15 +255,19 @@ fn row(design: &Design, bundle: &Bundle, language: Language, detector: &str) -> 
     let mask = u64::MAX >> (64 - bits);
     engine::columns(design)
         .iter()
-        .map(|column| match outputs.iter().find(|(name, _)| name == column) {
-            Some((name, v)) => views::word_64(&format!("row.{name}"), v.ty, language),
-            None => match language {
-                Language::C => format!(
-                    "(uint64_t){detector}.chain.nco.tuning_word & UINT64_C({mask})"
-                ),
-                Language::Rust => format!("u64::from({detector}.chain.nco.tuning_word) & {mask}"),
+        .map(
+            |column| match outputs.iter().find(|(name, _)| name == column) {
+                Some((name, v)) => views::word_64(&format!("row.{name}"), v.ty, language),
+                None => match language {
+                    Language::C => {
+                        format!("(uint64_t){detector}.chain.nco.tuning_word & UINT64_C({mask})")
+                    }
+                    Language::Rust => {
+                        format!("u64::from({detector}.chain.nco.tuning_word) & {mask}")
+                    }
+                },
             },
-        })
+        )
         .collect()
 }
 
@@ -310,7 +339,9 @@ fn chain_checksum(design: &Design, bundle: &Bundle) -> u64 {
         sense.push(lcg.word(code) as i32);
     }
     let words = saturating_rows(design, &drive, &sense);
-    words.iter().fold(views::BASIS, |h, word| mix(h, *word as u64))
+    words
+        .iter()
+        .fold(views::BASIS, |h, word| mix(h, *word as u64))
 }
 
 /// Rows of the model, where `error` saturates and goes on as the emitted code does.
@@ -387,7 +418,9 @@ fn chain_vectors(design: &Design, bundle: &Bundle) -> [EmittedFile; 2] {
     // A little of every segment of the stimulus.
     let (all_drive, all_sense) = stimulus::capture(design, 6 << 12, SEED);
     let pick = |all: &[i32]| -> Vec<i32> {
-        (0..samples).map(|n| all[(n * all.len() / samples + n % 61) % all.len()]).collect()
+        (0..samples)
+            .map(|n| all[(n * all.len() / samples + n % 61) % all.len()])
+            .collect()
     };
     let (drive, sense) = (pick(&all_drive), pick(&all_sense));
     let mut input = String::from("drive_code,sense_code\n");

@@ -4,7 +4,7 @@
 //! rounding constants and limits, and vanish where ranges prove them idle. A printer then only
 //! has to spell the operations.
 
-use crate::numeric::cast::{Cast, rounding_intermediate, round_shift};
+use crate::numeric::cast::{Cast, round_shift, rounding_intermediate};
 use crate::numeric::format::{Overflow, Rounding};
 use crate::numeric::trace::ir::{Function, Id, Interval, Op, Program};
 use crate::numeric::trace::lanes::is_word;
@@ -222,7 +222,12 @@ impl<'a> Lowering<'a> {
         let mut body = self.blocks.pop().unwrap_or_default();
         drop_unused(&mut body, &outputs);
         Lowered {
-            inputs: self.function.inputs.iter().map(|(_, r)| word_type(*r)).collect(),
+            inputs: self
+                .function
+                .inputs
+                .iter()
+                .map(|(_, r)| word_type(*r))
+                .collect(),
             outputs,
             body,
             may_fault: self.may_fault || called,
@@ -317,7 +322,9 @@ impl<'a> Lowering<'a> {
         for (k, init) in l.inits.iter().enumerate() {
             let (phi, out) = (l.start + k, l.outs[k]);
             // The variable holds the first value, every value between, and the last.
-            let range = self.function.nodes[phi].range.join(self.function.nodes[out].range);
+            let range = self.function.nodes[phi]
+                .range
+                .join(self.function.nodes[out].range);
             let ty = word_type(range);
             let init = self.value(*init);
             let init = self.convert(init, ty);
@@ -486,10 +493,12 @@ impl<'a> Lowering<'a> {
         }
         // A range narrowed by a proof may be smaller than its operands'.
         let range = self.function.nodes[id].range;
-        let width = [a.ty, b.ty].iter().fold(Width::of_range(range), |w, ty| match ty {
-            Type::Signed(x) => w.max(*x),
-            _ => w,
-        });
+        let width = [a.ty, b.ty]
+            .iter()
+            .fold(Width::of_range(range), |w, ty| match ty {
+                Type::Signed(x) => w.max(*x),
+                _ => w,
+            });
         let working = Type::Signed(width);
         let (a, b) = (self.convert(a, working), self.convert(b, working));
         let sum = self.bind(working, make(a, b), Some(range));
@@ -586,8 +595,7 @@ impl<'a> Lowering<'a> {
                 let working = word_type(rounded_range.join(Interval::new(low, high)));
                 let v = self.convert(rounded, working);
                 let fault = cast.id as u32 + 1;
-                let checked =
-                    self.bind(working, Expr::Check(v, low, high, fault), Some(range));
+                let checked = self.bind(working, Expr::Check(v, low, high, fault), Some(range));
                 self.convert(checked, ty)
             }
         }

@@ -95,7 +95,10 @@ pub struct FileEntry {
 
 /// SHA-256 in lower-case hexadecimal.
 pub fn sha256(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect()
+    Sha256::digest(bytes)
+        .iter()
+        .map(|b| format!("{b:02x}"))
+        .collect()
 }
 
 /// The first line of every emitted file.
@@ -165,7 +168,9 @@ pub fn facts(design: &Design, bundle: &Bundle) -> Vec<String> {
     }
     facts.push("words are two's complement; ranges beside them are proved, not observed".into());
     if bundle.may_fault() {
-        facts.push("an overflow where the design says `error` saturates and is noted as a fault".into());
+        facts.push(
+            "an overflow where the design says `error` saturates and is noted as a fault".into(),
+        );
     }
     facts
 }

@@ -124,7 +124,11 @@ impl Printer<'_> {
                         Some(r) => format!(" // {} .. {}", r.low, r.high),
                         None => String::new(),
                     };
-                    _ = writeln!(text, "{indent}let t{k}: {} = {expr};{comment}", type_name(*ty));
+                    _ = writeln!(
+                        text,
+                        "{indent}let t{k}: {} = {expr};{comment}",
+                        type_name(*ty)
+                    );
                 }
                 Statement::Carry(k, ty, init) => {
                     let init = self.value(init);
@@ -202,7 +206,10 @@ impl Printer<'_> {
                 };
                 match width.bits() - bits {
                     0 => format!("{} as {name}", v(a)),
-                    spare => format!("({}.wrapping_shl({spare}) as {name}) >> {spare}", receiver(a)),
+                    spare => format!(
+                        "({}.wrapping_shl({spare}) as {name}) >> {spare}",
+                        receiver(a)
+                    ),
                 }
             }
             Expr::Add(a, b) => format!("{}.wrapping_add({})", receiver(a), v(b)),
@@ -231,7 +238,10 @@ impl Printer<'_> {
                 constant(*high, ty)
             ),
             Expr::Sine(k, index) => {
-                format!("SINE_{k}.get({} as usize).copied().unwrap_or(0) as {name}", v(index))
+                format!(
+                    "SINE_{k}.get({} as usize).copied().unwrap_or(0) as {name}",
+                    v(index)
+                )
             }
             Expr::Entry(k) => {
                 let table = self.bundle.program.index_tables[*k].name.to_uppercase();

@@ -128,13 +128,7 @@ pub fn tables(bundle: &Bundle, language: Language) -> Vec<TableView> {
         .collect()
 }
 
-fn table(
-    k: usize,
-    name: String,
-    note: String,
-    entries: Vec<i64>,
-    language: Language,
-) -> TableView {
+fn table(k: usize, name: String, note: String, entries: Vec<i64>, language: Language) -> TableView {
     let largest = entries.iter().map(|v| v.unsigned_abs()).max().unwrap_or(0);
     let (c_type, rust_type) = match largest {
         0..=0x7fff => ("int16_t", "i16"),
@@ -146,23 +140,40 @@ fn table(
         (Language::C, "int32_t") => format!("INT32_C({v})"),
         _ => v.to_string(),
     };
-    let line = |chunk: &[i64]| chunk.iter().map(|v| entry(v) + ",").collect::<Vec<_>>().join(" ");
+    let line = |chunk: &[i64]| {
+        chunk
+            .iter()
+            .map(|v| entry(v) + ",")
+            .collect::<Vec<_>>()
+            .join(" ")
+    };
     TableView {
         upper: name.to_uppercase(),
         name,
-        ty: if language == Language::C { c_type } else { rust_type },
+        ty: if language == Language::C {
+            c_type
+        } else {
+            rust_type
+        },
         len: entries.len(),
         note,
         lines: entries.chunks(10).map(line).collect(),
         number: k as u32 + 1,
-        checksum: format!("{:#x}", entries.iter().fold(BASIS, |h, v| mix(h, *v as u64))),
+        checksum: format!(
+            "{:#x}",
+            entries.iter().fold(BASIS, |h, v| mix(h, *v as u64))
+        ),
         entries,
     }
 }
 
 /// The states of a bundle.
 pub fn states(bundle: &Bundle, language: Language) -> Vec<StateView> {
-    bundle.states.iter().map(|s| state(bundle, s, language)).collect()
+    bundle
+        .states
+        .iter()
+        .map(|s| state(bundle, s, language))
+        .collect()
 }
 
 fn state(bundle: &Bundle, s: &StateType, language: Language) -> StateView {
@@ -196,7 +207,10 @@ pub fn structs(bundle: &Bundle, language: Language) -> Vec<StructView> {
         if lowered.outputs.len() < 2 {
             continue;
         }
-        let ports = function.outputs.iter().filter(|(port, _)| !port.name.is_empty());
+        let ports = function
+            .outputs
+            .iter()
+            .filter(|(port, _)| !port.name.is_empty());
         let members = ports.zip(&lowered.outputs).map(|((port, _), (name, v))| {
             let declaration = match language {
                 Language::C => format!("{} {name}", c::type_name(&bundle.prefix, v.ty)),
@@ -282,7 +296,9 @@ fn function(bundle: &Bundle, k: usize, language: Language) -> FunctionView {
         },
         faults: lowered.may_fault,
         tested: false,
-        inputs: inputs.map(|((_, range), t)| input(*range, ty(t), language)).collect(),
+        inputs: inputs
+            .map(|((_, range), t)| input(*range, ty(t), language))
+            .collect(),
         arguments: arguments.join(", ") + fault,
         harness_arguments: from_array.join(", ") + fault,
         outputs,
@@ -332,7 +348,9 @@ fn guarantee(function: &str) -> Option<&'static str> {
         "cordic" => {
             "error: residual angle at most atan(2^-(n-1)), and half a unit for each of n table angles"
         }
-        "bias" => "error: see the budget in the report; each step one rounding to the accumulator's LSB",
+        "bias" => {
+            "error: see the budget in the report; each step one rounding to the accumulator's LSB"
+        }
         "rate" => "error: one rounding of the input to the output's LSB; the difference is exact",
         _ => return None,
     })

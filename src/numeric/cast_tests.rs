@@ -72,8 +72,7 @@ fn check_all<L: HasKernel>(bits: u32) -> u64 {
                             expected,
                             "{v} / 2^{shift} {rounding:?} {overflow:?} signed {signed}"
                         );
-                        let outside =
-                            rounded < target.min_raw() || rounded > target.max_raw();
+                        let outside = rounded < target.min_raw() || rounded > target.max_raw();
                         let report = (overflow == Overflow::Error && outside).then_some(rounded);
                         assert_eq!(reported, report);
                         compared += 1;

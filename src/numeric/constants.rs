@@ -14,7 +14,9 @@ type Real = FBig<HalfEven, 2>;
 const PRECISION: usize = 256;
 
 fn real(value: i128) -> Real {
-    Real::from(IBig::from(value)).with_precision(PRECISION).value()
+    Real::from(IBig::from(value))
+        .with_precision(PRECISION)
+        .value()
 }
 
 fn nearest(value: &Real) -> i128 {
@@ -47,7 +49,11 @@ pub fn sine_table(address_bits: u32, bits: u32) -> Vec<i64> {
         .map(|k| {
             let (half, rest) = (k / (count / 2), k % (count / 2));
             let folded = rest.min(count / 2 - rest);
-            if half == 0 { quarter[folded] } else { -quarter[folded] }
+            if half == 0 {
+                quarter[folded]
+            } else {
+                -quarter[folded]
+            }
         })
         .collect()
 }
@@ -104,7 +110,10 @@ mod tests {
             for k in 0..n {
                 assert_eq!(table[k], -table[(k + n / 2) % n]);
                 let exact = peak * (std::f64::consts::TAU * k as f64 / n as f64).sin();
-                assert!((table[k] as f64 - exact).abs() < 0.5 + peak * 1e-15, "{a} {bits} {k}");
+                assert!(
+                    (table[k] as f64 - exact).abs() < 0.5 + peak * 1e-15,
+                    "{a} {bits} {k}"
+                );
             }
         }
     }
@@ -131,7 +140,8 @@ mod tests {
         assert_eq!(angles[0], 1 << 61);
         // pi/4 = atan(1/2) + atan(1/3) = 2 atan(1/2) - atan(1/7); compare through doubles first.
         for (i, a) in angles.iter().enumerate() {
-            let exact = f64::powi(2.0, -(i as i32)).atan() / std::f64::consts::TAU * f64::powi(2.0, 64);
+            let exact =
+                f64::powi(2.0, -(i as i32)).atan() / std::f64::consts::TAU * f64::powi(2.0, 64);
             assert!((*a as f64 - exact).abs() <= exact * 4e-16 + 1.0, "{i}");
         }
         // pi/4 = 12 atan(1/18) + 8 atan(1/57) - 5 atan(1/239) needs no table angle; the duplication

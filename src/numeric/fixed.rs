@@ -27,7 +27,12 @@ pub struct Overflowed {
 impl std::fmt::Display for Overflowed {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "overflow at sample {} in {}", self.sample, self.label)?;
-        let operands: Vec<String> = self.operands.iter().flatten().map(i128::to_string).collect();
+        let operands: Vec<String> = self
+            .operands
+            .iter()
+            .flatten()
+            .map(i128::to_string)
+            .collect();
         write!(
             f,
             ": raw value {} does not fit (operands {}",

@@ -31,7 +31,8 @@ enum Source {
 
 /// A file that calls itself NPY is read as nothing else.
 fn is_named_npy(path: &Path) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy"))
+    path.extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("npy"))
 }
 
 impl CaptureReader {

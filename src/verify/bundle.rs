@@ -82,14 +82,26 @@ pub fn verify(folder: &Path, command: &str) -> Result<Verification> {
                     (row, outputs)
                 })
                 .unzip();
-            functions.push(compare::calls(language, &harness, &function.name, &split.0, &split.1)?);
+            functions.push(compare::calls(
+                language,
+                &harness,
+                &function.name,
+                &split.0,
+                &split.1,
+            )?);
         }
         if let Some(chain) = &manifest.chain {
             let codes = read_words(&folder.join("vectors/chain_input.csv"), 2)?;
             let path = folder.join("vectors/chain_output.csv");
             let rows = read_words(&path, chain.columns.len() + 1)?;
             let column = |k: usize| codes.iter().map(|row| row[k] as i32).collect::<Vec<_>>();
-            functions.push(compare::chain_rows(language, &harness, &column(0), &column(1), &rows)?);
+            functions.push(compare::chain_rows(
+                language,
+                &harness,
+                &column(0),
+                &column(1),
+                &rows,
+            )?);
         }
     }
     let vectors = Vectors {
@@ -123,7 +135,9 @@ fn read_manifest(folder: &Path) -> Result<Manifest> {
     })?;
     let inside = |path: &str| {
         let parts = Path::new(path).components();
-        parts.into_iter().all(|c| matches!(c, std::path::Component::Normal(_)))
+        parts
+            .into_iter()
+            .all(|c| matches!(c, std::path::Component::Normal(_)))
     };
     if manifest.schema != "gyrogen.bundle/1" || !manifest.files.iter().all(|f| inside(&f.path)) {
         return Err(InputError::new(format!(
@@ -156,11 +170,13 @@ fn read_words(path: &Path, columns: usize) -> Result<Vec<Vec<i128>>> {
         match words {
             Ok(words) if words.len() == columns => rows.push(words),
             _ => {
-                return Err(InputError::new(format!("`{line}` is no row of {columns} integers"))
-                    .in_file(path)
-                    .at(number + 1, 1)
-                    .help("the vectors were damaged; emit the bundle again")
-                    .into());
+                return Err(
+                    InputError::new(format!("`{line}` is no row of {columns} integers"))
+                        .in_file(path)
+                        .at(number + 1, 1)
+                        .help("the vectors were damaged; emit the bundle again")
+                        .into(),
+                );
             }
         }
     }
@@ -169,12 +185,18 @@ fn read_words(path: &Path, columns: usize) -> Result<Vec<Vec<i128>>> {
 
 fn read_tables(folder: &Path) -> Result<BTreeMap<String, Vec<i128>>> {
     let path = folder.join("vectors/tables.csv");
-    let text = std::fs::read_to_string(&path).map_err(|e| io_error(&path, "read the tables", &e))?;
+    let text =
+        std::fs::read_to_string(&path).map_err(|e| io_error(&path, "read the tables", &e))?;
     let mut tables: BTreeMap<String, Vec<i128>> = BTreeMap::new();
     for (number, line) in text.lines().enumerate().skip(1) {
         let cells: Vec<&str> = line.split(',').collect();
-        match (cells.as_slice(), cells.last().and_then(|v| v.parse::<i128>().ok())) {
-            ([name, _, _], Some(value)) => tables.entry((*name).to_owned()).or_default().push(value),
+        match (
+            cells.as_slice(),
+            cells.last().and_then(|v| v.parse::<i128>().ok()),
+        ) {
+            ([name, _, _], Some(value)) => {
+                tables.entry((*name).to_owned()).or_default().push(value)
+            }
             _ => {
                 return Err(InputError::new(format!("`{line}` is no entry of a table"))
                     .in_file(&path)

@@ -41,7 +41,12 @@ pub struct Compared {
 ///
 /// # Errors
 /// A test driver that cannot be run.
-pub fn with_model(design: &Design, bundle: &Bundle, language: Language, harness: &Harness) -> Result<Vec<Compared>> {
+pub fn with_model(
+    design: &Design,
+    bundle: &Bundle,
+    language: Language,
+    harness: &Harness,
+) -> Result<Vec<Compared>> {
     let mut all = Vec::new();
     for table in views::tables(bundle, language) {
         let expected: Vec<i128> = table.entries.iter().map(|v| i128::from(*v)).collect();
@@ -90,8 +95,8 @@ impl Tally {
     fn note(&mut self, got: &[u64], expected: &[i128], place: impl FnOnce() -> String) {
         self.outcome.inputs += 1;
         self.outcome.compared += expected.len() as u64;
-        let same = got.len() == expected.len()
-            && got.iter().zip(expected).all(|(g, e)| *g == *e as u64);
+        let same =
+            got.len() == expected.len() && got.iter().zip(expected).all(|(g, e)| *g == *e as u64);
         if !same {
             self.outcome.mismatches += 1;
             if self.outcome.first.is_none() {
@@ -119,13 +124,20 @@ impl Tally {
 ///
 /// # Errors
 /// A test driver that cannot be run.
-pub fn table(language: Language, harness: &Harness, name: &str, expected: &[i128]) -> Result<Compared> {
+pub fn table(
+    language: Language,
+    harness: &Harness,
+    name: &str,
+    expected: &[i128],
+) -> Result<Compared> {
     let mut tally = Tally::new(language, name);
     tally.outcome.exhaustive = true;
     let mut k = 0;
     let arguments = ["table".to_owned(), name.to_owned()];
     harness.run(&arguments, Vec::new(), 1, &mut |words| {
-        tally.note(words, expected.get(k..=k).unwrap_or(&[]), || format!("entry {k}"));
+        tally.note(words, expected.get(k..=k).unwrap_or(&[]), || {
+            format!("entry {k}")
+        });
         k += 1;
     })?;
     Ok(tally.finish(expected.len() as u64))
@@ -141,13 +153,19 @@ pub fn function(language: Language, harness: &Harness, model: &Model) -> Result<
         && range.high - range.low < 1 << EXHAUSTIVE_BITS
     {
         let count = (range.high - range.low + 1) as u64;
-        let arguments = ["range".to_owned(), model.name.clone(), range.low.to_string(), count.to_string()];
+        let arguments = [
+            "range".to_owned(),
+            model.name.clone(),
+            range.low.to_string(),
+            count.to_string(),
+        ];
         let mut tally = Tally::new(language, &model.name);
         tally.outcome.exhaustive = true;
         let mut input = range.low;
         let mut expected = vec![0; model.outputs + 1];
         harness.run(&arguments, Vec::new(), model.outputs + 1, &mut |words| {
-            expected[model.outputs] = i128::from(model.call(&[input], &mut expected[..model.outputs]));
+            expected[model.outputs] =
+                i128::from(model.call(&[input], &mut expected[..model.outputs]));
             tally.note(words, &expected, || format!("input {input}"));
             input += 1;
         })?;
@@ -159,7 +177,13 @@ pub fn function(language: Language, harness: &Harness, model: &Model) -> Result<
         outputs[model.outputs] = i128::from(model.call(input, &mut outputs[..model.outputs]));
         outputs
     });
-    calls(language, harness, &model.name, &inputs, &expected.collect::<Vec<_>>())
+    calls(
+        language,
+        harness,
+        &model.name,
+        &inputs,
+        &expected.collect::<Vec<_>>(),
+    )
 }
 
 /// Compares a function on given inputs; the last expected word is the fault.
@@ -178,11 +202,16 @@ pub fn calls(
     let record = expected.first().map_or(1, Vec::len);
     let mut tally = Tally::new(language, name);
     let mut k = 0;
-    harness.run(&["call".to_owned(), name.to_owned()], bytes, record, &mut |words| {
-        let due = expected.get(k).map_or(&[][..], Vec::as_slice);
-        tally.note(words, due, || format!("input {:?}", inputs.get(k)));
-        k += 1;
-    })?;
+    harness.run(
+        &["call".to_owned(), name.to_owned()],
+        bytes,
+        record,
+        &mut |words| {
+            let due = expected.get(k).map_or(&[][..], Vec::as_slice);
+            tally.note(words, due, || format!("input {:?}", inputs.get(k)));
+            k += 1;
+        },
+    )?;
     Ok(tally.finish(expected.len() as u64))
 }
 
@@ -233,7 +262,10 @@ pub fn chain_rows(
     rows: &[Vec<i128>],
 ) -> Result<Compared> {
     let pairs = drive.iter().zip(sense);
-    let bytes: Vec<u8> = pairs.flat_map(|(d, s)| [d.to_ne_bytes(), s.to_ne_bytes()]).flatten().collect();
+    let bytes: Vec<u8> = pairs
+        .flat_map(|(d, s)| [d.to_ne_bytes(), s.to_ne_bytes()])
+        .flatten()
+        .collect();
     let record = rows.first().map_or(1, Vec::len);
     let mut tally = Tally::new(language, "chain");
     let mut k = 0;

@@ -91,7 +91,9 @@ fn of_chain<const N: usize>(chain: &Chain<N>, design: &Design, program: &Program
             continue;
         }
         let narrow = program.word_bits(function) <= 64;
-        let base = function.name.trim_end_matches(|c: char| c == '_' || c.is_ascii_digit());
+        let base = function
+            .name
+            .trim_end_matches(|c: char| c == '_' || c.is_ascii_digit());
         let model = match (base, &compensation) {
             ("demodulate", _) => {
                 // One for all channels, or one for each in the channels' order.

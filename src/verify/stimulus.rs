@@ -33,10 +33,18 @@ impl Lcg {
 /// Inputs of a function: every combination of ends, zero and their neighbours, then `random` draws.
 pub fn inputs(ranges: &[Interval], random: usize, seed: u64) -> Vec<Vec<i128>> {
     let corners = |range: &Interval| {
-        let mut values: Vec<i128> = [range.low, range.low + 1, -1, 0, 1, range.high - 1, range.high]
-            .into_iter()
-            .filter(|v| range.is_within(*v, *v) || (range.low..=range.high).contains(v))
-            .collect();
+        let mut values: Vec<i128> = [
+            range.low,
+            range.low + 1,
+            -1,
+            0,
+            1,
+            range.high - 1,
+            range.high,
+        ]
+        .into_iter()
+        .filter(|v| range.is_within(*v, *v) || (range.low..=range.high).contains(v))
+        .collect();
         values.dedup();
         values
     };
@@ -58,7 +66,11 @@ pub fn inputs(ranges: &[Interval], random: usize, seed: u64) -> Vec<Vec<i128>> {
         let draw = ranges.iter().map(|range| {
             let word = lcg.word(*range);
             // A third of the draws are small words: rounding near zero.
-            if k % 3 == 2 { (word >> (lcg.next() >> 59)).clamp(range.low, range.high) } else { word }
+            if k % 3 == 2 {
+                (word >> (lcg.next() >> 59)).clamp(range.low, range.high)
+            } else {
+                word
+            }
         });
         all.push(draw.collect());
     }
@@ -80,7 +92,8 @@ pub fn capture(design: &Design, samples: usize, seed: u64) -> (Vec<i32>, Vec<i32
     for n in 0..samples {
         let segment = n / SEGMENT;
         let full = f64::from(high);
-        let angle = std::f64::consts::TAU * (turns * n as f64 * (1.0 + 1e-5 * segment as f64)).fract();
+        let angle =
+            std::f64::consts::TAU * (turns * n as f64 * (1.0 + 1e-5 * segment as f64)).fract();
         let noise = |lcg: &mut Lcg| (lcg.next() >> 40) as f64 / f64::from(1 << 24) - 0.5;
         let (d, s) = match segment % 6 {
             0 | 1 => {
@@ -97,7 +110,10 @@ pub fn capture(design: &Design, samples: usize, seed: u64) -> (Vec<i32>, Vec<i32
             4 => {
                 let level = lcg.word(range) as i32;
                 let held = *drive.last().unwrap_or(&level);
-                (if n % 97 == 0 { level } else { held }, if n % 53 == 0 { high } else { 0 })
+                (
+                    if n % 97 == 0 { level } else { held },
+                    if n % 53 == 0 { high } else { 0 },
+                )
             }
             _ => (lcg.word(range) as i32, lcg.word(range) as i32),
         };

@@ -36,7 +36,12 @@ pub struct Harness {
 ///
 /// # Errors
 /// No compiler on this machine (exit 2); sources that do not compile (a check that does not hold).
-pub fn build(language: Language, prefix: &str, folder: &Path, sources: &[String]) -> Result<Harness> {
+pub fn build(
+    language: Language,
+    prefix: &str,
+    folder: &Path,
+    sources: &[String],
+) -> Result<Harness> {
     let made = tempfile::Builder::new()
         .prefix("gyrogen-build-")
         .tempdir()
@@ -56,14 +61,25 @@ pub fn build(language: Language, prefix: &str, folder: &Path, sources: &[String]
         Language::Rust => {
             let library = made.path().join(format!("lib{prefix}.rlib"));
             let mut command = Command::new(&compiler);
-            command.args(RUST_FLAGS).args(["--crate-type", "rlib", "--crate-name", prefix]);
-            command.arg(folder.join("src/lib.rs")).arg("-o").arg(&library);
+            command
+                .args(RUST_FLAGS)
+                .args(["--crate-type", "rlib", "--crate-name", prefix]);
+            command
+                .arg(folder.join("src/lib.rs"))
+                .arg("-o")
+                .arg(&library);
             compile(command, "the emitted Rust")?;
             let mut command = Command::new(&compiler);
             let mut library_argument = std::ffi::OsString::from(format!("{prefix}="));
             library_argument.push(&library);
-            command.args(RUST_FLAGS).arg("--extern").arg(library_argument);
-            command.arg(folder.join("src/bin/harness.rs")).arg("-o").arg(&program);
+            command
+                .args(RUST_FLAGS)
+                .arg("--extern")
+                .arg(library_argument);
+            command
+                .arg(folder.join("src/bin/harness.rs"))
+                .arg("-o")
+                .arg(&program);
             compile(command, "the emitted Rust")?;
             format!("{}; {}", version(&compiler), RUST_FLAGS.join(" "))
         }
@@ -88,7 +104,10 @@ fn compiler(language: Language) -> Result<String> {
     };
     let answers = |name: &&String| {
         let mut command = Command::new(name);
-        command.arg("--version").stdout(Stdio::null()).stderr(Stdio::null());
+        command
+            .arg("--version")
+            .stdout(Stdio::null())
+            .stderr(Stdio::null());
         command.status().is_ok_and(|status| status.success())
     };
     match candidates.iter().find(answers) {
@@ -97,7 +116,9 @@ fn compiler(language: Language) -> Result<String> {
             "there is no compiler to build the emitted code with (tried {})",
             candidates.join(", ")
         ))
-        .help(format!("install one, or name it in the environment variable {variable}"))
+        .help(format!(
+            "install one, or name it in the environment variable {variable}"
+        ))
         .into()),
     }
 }
@@ -105,8 +126,17 @@ fn compiler(language: Language) -> Result<String> {
 fn version(compiler: &str) -> String {
     let output = Command::new(compiler).arg("--version").output();
     let text = output.map(|o| String::from_utf8_lossy(&o.stdout).into_owned());
-    let line = text.unwrap_or_default().lines().next().unwrap_or("").to_owned();
-    if line.is_empty() { compiler.to_owned() } else { line }
+    let line = text
+        .unwrap_or_default()
+        .lines()
+        .next()
+        .unwrap_or("")
+        .to_owned();
+    if line.is_empty() {
+        compiler.to_owned()
+    } else {
+        line
+    }
 }
 
 fn compile(mut command: Command, what: &str) -> Result<()> {

@@ -126,10 +126,11 @@ impl RandomCase {
         if !stderr.contains(&stop.node) {
             return Err(format!("the node of {stop:?} is not named:\n{stderr}"));
         }
-        let mut wanted = stop.operands.clone();
-        wanted.push(stop.sample as i128);
-        for number in wanted {
-            if !numbers.contains(&number) {
+        let sample = stop.sample as i128;
+        for (at, &number) in stop.operands.iter().chain([&sample]).enumerate() {
+            let other = stop.as_coefficient.filter(|_| at == 0);
+            let given = numbers.contains(&number) || other.is_some_and(|it| numbers.contains(&it));
+            if !given {
                 return Err(format!("{number} of {stop:?} is not named:\n{stderr}"));
             }
         }
@@ -166,6 +167,7 @@ impl RandomCase {
         let (mut compared, mut left_out) = (0, 0);
         for (index, (cells, row)) in found.iter().zip(wanted).enumerate() {
             let values = row.values(index);
+            let mut astray = false;
             for (column, scale) in scales.iter().enumerate() {
                 let value = values[column];
                 let moved = disturbed
@@ -174,6 +176,7 @@ impl RandomCase {
                     .fold(0.0f64, f64::max);
                 if moved > 0.1 * scale.tolerance {
                     left_out += 1;
+                    astray |= matches!(columns[column], "phase" | "tuning_word");
                     continue;
                 }
                 compared += 1;
@@ -192,6 +195,11 @@ impl RandomCase {
                 if name == "phase" && !(-0.5..0.5).contains(&cell) {
                     return Err(format!("row {index}: phase {cell:?} is not in [-1/2, 1/2)"));
                 }
+            }
+            if astray && self.design.phase_loop.is_some() {
+                // from here on each engine is on a way of its own
+                left_out += (found.len() - index - 1) * scales.len();
+                break;
             }
         }
         Ok((compared, left_out))

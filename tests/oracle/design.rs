@@ -149,7 +149,7 @@ impl Design {
         );
         if let Some(compensation) = &self.compensation {
             let accumulator = compensation.accumulator.format;
-            if compensation.coefficients_raw.len() > 1 {
+            if compensation.coefficients_raw.len() > 2 {
                 let angle_bits = self.cordic.angle_bits;
                 add(
                     "compensation.accumulator",
@@ -206,7 +206,14 @@ impl Design {
                     .format
                     .n
                     .saturating_sub(compensation.coefficient_format.n);
-            if reasons.is_empty() && (sum_at_the_edge || coefficient_bits >= WIDEST) {
+            // With two coefficients the only product is c_1 p, "exact": the
+            // text does not say in which of the two formats it is counted.
+            let only_product =
+                compensation.accumulator.format.operand_bits() + self.cordic.angle_bits;
+            let product_at_the_edge =
+                compensation.coefficients_raw.len() == 2 && only_product > WIDEST;
+            let undecided = sum_at_the_edge || product_at_the_edge || coefficient_bits >= WIDEST;
+            if reasons.is_empty() && undecided {
                 return Verdict::Undecided;
             }
         }

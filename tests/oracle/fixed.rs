@@ -38,8 +38,11 @@ pub struct Stop {
     pub sample: usize,
     /// Dotted key, with the channel where there is one.
     pub node: String,
-    /// Raw operands.
+    /// Raw operands; t is a raw value of the accumulator's format.
     pub operands: Vec<i128>,
+    /// Where t is still c_n, "exact" and not cast: its raw value in
+    /// `coefficient_format`, which serves as well for the first operand.
+    pub as_coefficient: Option<i128>,
 }
 
 /// Names of the channels, in the order of the text.
@@ -117,37 +120,46 @@ fn cordic(design: &Design, constants: &CordicConstants, i: i128, q: i128) -> (i1
     (z, wrap(magnitude, 64))
 }
 
+/// An overflow in step 6: node, operands, and c_n where it is the first of them.
+type CompensationStop = (&'static str, Vec<i128>, Option<i128>);
+
 /// Step 6: the rate, or the node and operands of an overflow.
 fn compensate(
     design: &Design,
     compensation: &Compensation,
     p: i128,
     sense_i: i128,
-) -> Result<i128, (&'static str, Vec<i128>)> {
+) -> Result<i128, CompensationStop> {
     let accumulator = &compensation.accumulator;
     let fraction = i64::from(accumulator.format.n);
     let align = accumulator.format.n - compensation.coefficient_format.n;
     let mut coefficients = compensation.coefficients_raw.iter().rev();
     let last = *coefficients.next().expect("at least one coefficient");
     let mut t = i128::from(last) << align;
+    let mut exact = Some(i128::from(last));
     for &c in coefficients {
         let c = i128::from(c);
         let node = "compensation.accumulator";
         let product_fraction = fraction + i64::from(design.cordic.angle_bits) - 1;
         let inner = accumulator
             .cast(t * p, product_fraction)
-            .map_err(|_| (node, vec![t, p]))?;
+            .map_err(|_| (node, vec![t, p], exact))?;
         t = accumulator
             .cast((c << align) + inner, fraction)
-            .map_err(|_| (node, vec![c, inner]))?;
+            .map_err(|_| (node, vec![c, inner], None))?;
+        exact = None;
     }
     let node = "compensation.output";
     let output = &compensation.output;
-    let bias = output.cast(t, fraction).map_err(|_| (node, vec![t]))?;
+    let bias = output
+        .cast(t, fraction)
+        .map_err(|_| (node, vec![t], exact))?;
     let scaled_fraction =
         i64::from(design.output.format.n) - i64::from(compensation.rate_full_scale_log2);
     let q = output.round(sense_i, scaled_fraction);
-    output.overflow(q - bias).map_err(|_| (node, vec![q, bias]))
+    output
+        .overflow(q - bias)
+        .map_err(|_| (node, vec![q, bias], None))
 }
 
 /// The top a bits of the phase, after the optional half step.
@@ -172,6 +184,7 @@ fn cast_channel(
         sample,
         node: format!("{node} {}", CHANNELS[channel]),
         operands: operands.to_vec(),
+        as_coefficient: None,
     })
 }
 
@@ -238,10 +251,11 @@ pub fn replay(design: &Design, capture: &[(i64, i64)]) -> Result<Vec<Row>, Stop>
         let rate = match &design.compensation {
             Some(compensation) => {
                 let result = compensate(design, compensation, angle, channels[2]);
-                Some(result.map_err(|(node, operands)| Stop {
+                Some(result.map_err(|(node, operands, as_coefficient)| Stop {
                     sample: n,
                     node: node.to_owned(),
                     operands,
+                    as_coefficient,
                 })?)
             }
             None => None,

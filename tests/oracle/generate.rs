@@ -347,8 +347,10 @@ fn widen(rng: &mut Rng, design: &mut Design, aim: Aim) {
     match rng.range(0, 3) {
         0 => {
             // product: a wide word shifted left by the cast
-            let least = i64::from(design.adc.m + design.nco.table.m);
-            let n = over - least;
+            let (adc_n, table_n) = (rng.bits(0, 3), rng.bits(0, 3));
+            design.adc = Format::q(32 - adc_n, adc_n);
+            design.nco.table = Format::q(40 - table_n, table_n);
+            let n = over - i64::from(design.adc.m + design.nco.table.m);
             if (0..=63).contains(&n) {
                 design.product.format = Format::q(1.max(rng.bits(0, 64 - n as u32)), n as u32);
             }

@@ -238,7 +238,10 @@ impl Function {
         let mut modular = vec![false; self.nodes.len()];
         let kept = self.outputs.iter().map(|(_, id)| *id);
         let kept = kept.chain(self.stores.iter().map(|(_, _, id)| *id));
-        let carried = self.loops.iter().flat_map(|l| l.inits.iter().chain(&l.outs));
+        let carried = self
+            .loops
+            .iter()
+            .flat_map(|l| l.inits.iter().chain(&l.outs));
         for id in kept.chain(carried.copied()) {
             uses[id] += 1;
         }

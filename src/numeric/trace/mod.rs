@@ -64,7 +64,13 @@ impl Trace {
         block.visit(&mut state, &mut Loader { trace: self });
         let inputs = std::array::from_fn(|k| self.push(Op::Input(k), ranges[k]));
         let outputs = block.step(self, &mut state, inputs);
-        block.visit(&mut state, &mut Storer { trace: self, slot: 0 });
+        block.visit(
+            &mut state,
+            &mut Storer {
+                trace: self,
+                slot: 0,
+            },
+        );
         self.close(block.outputs(), outputs)
     }
 
@@ -231,7 +237,8 @@ impl Storer<'_> {
         self.trace.with(|frame| {
             for (k, id) in ids.iter().enumerate() {
                 let node = &frame.function.nodes[*id];
-                let unchanged = node.op == Op::LoadWord(slot, k) || node.op == Op::LoadResidue(slot, k);
+                let unchanged =
+                    node.op == Op::LoadWord(slot, k) || node.op == Op::LoadResidue(slot, k);
                 if !unchanged {
                     if let SlotKind::Word(declared) = frame.function.slots[slot].kind {
                         assert!(
@@ -286,7 +293,9 @@ impl Arithmetic for Trace {
         ];
         let range = products[1..]
             .iter()
-            .fold(Interval::point(products[0]), |r, p| r.join(Interval::point(*p)));
+            .fold(Interval::point(products[0]), |r, p| {
+                r.join(Interval::point(*p))
+            });
         self.push(Op::Mul(a, b), range)
     }
     fn neg(&self, a: Id) -> Id {
@@ -317,7 +326,11 @@ impl Arithmetic for Trace {
     fn wrap(&self, a: Id, bits: u32, _fraction_bits: i32) -> Id {
         let x = self.range(a);
         let all = Interval::of_bits(bits);
-        let range = if x.is_within(all.low, all.high) { x } else { all };
+        let range = if x.is_within(all.low, all.high) {
+            x
+        } else {
+            all
+        };
         self.push(Op::Wrap(a, bits), range)
     }
     fn limit(&self, a: Id, low: i128, high: i128, _fraction_bits: i32) -> Id {
@@ -471,9 +484,7 @@ impl Arithmetic for Trace {
                 .collect()
         };
         let number = self.with(|frame| {
-            if !B::STATE.is_empty()
-                && !frame.function.members.iter().any(|(m, _)| *m == instance)
-            {
+            if !B::STATE.is_empty() && !frame.function.members.iter().any(|(m, _)| *m == instance) {
                 frame.function.members.push((instance, B::STATE));
             }
             frame.function.calls.push(CallSite {

@@ -1,0 +1,124 @@
+//! `gyrogen run`: the main job, end to end.
+
+use super::OutputFormat;
+use crate::error::{Error, Result};
+use crate::job;
+use crate::job::outcome::{Drift, Outcome};
+use std::io::IsTerminal;
+use std::path::PathBuf;
+
+/// Fit, co-simulate float and fixed, emit C and Rust, build and compare them, report.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Design file; the embedded default if left out.
+    design: Option<PathBuf>,
+    /// A measured thermal record (CSV); the design's own thermal run if left out.
+    #[arg(long)]
+    record: Option<PathBuf>,
+    /// Folder for the results; made if it does not exist.
+    #[arg(long, default_value = "gyrogen-out")]
+    out: PathBuf,
+    /// How the result is printed.
+    #[arg(long, value_enum, default_value = "text")]
+    format: OutputFormat,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// An unusable design or record (exit 2); emitted code that differs from the model (exit 1).
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let design = super::design(arguments.design.as_deref())?;
+    let mut command = String::from("gyrogen run");
+    if let Some(path) = &arguments.design {
+        command += &format!(" {}", path.display());
+    }
+    if let Some(path) = &arguments.record {
+        command += &format!(" --record {}", path.display());
+    }
+    let loud = std::io::stderr().is_terminal();
+    let say = |step: &str| {
+        if loud {
+            eprintln!("{step} ...");
+        }
+    };
+    let outcome = job::run(&design, arguments.record.as_deref(), &command, &say)?;
+    let html = crate::report::html(&outcome)?;
+    let json = super::json(&outcome.summary);
+    let out = &arguments.out;
+    super::make_folder(out)?;
+    outcome.parts.firmware.write(out)?;
+    if let Some(record) = &outcome.parts.record_csv {
+        crate::output::write_whole(&out.join("record.csv"), record.as_bytes())?;
+    }
+    crate::output::write_whole(&out.join("report.html"), html.as_bytes())?;
+    crate::output::write_whole(&out.join("summary.json"), json.as_bytes())?;
+    match arguments.format {
+        OutputFormat::Json => print!("{json}"),
+        OutputFormat::Text => print(&outcome, out),
+    }
+    for warning in &outcome.summary.warnings {
+        eprintln!("warning: {} [{}]", warning.message, warning.code);
+    }
+    if outcome.holds() {
+        return Ok(());
+    }
+    Err(Error::Check(format!(
+        "emitted code differs from the model: {}",
+        outcome.differences().join("; ")
+    )))
+}
+
+fn print(outcome: &Outcome, out: &std::path::Path) {
+    let s = &outcome.summary;
+    println!("{}", super::comparison_table(&s.equivalence.functions));
+    let mut table = super::table(&[
+        "rate output at rest",
+        "drift pp, deg/s",
+        "rms, deg/s",
+        "of before",
+    ]);
+    let before = s.before.drift_pp_dps;
+    let mut row = |name: &str, drift: Drift| {
+        table.add_row([
+            name.to_owned(),
+            format!("{:.4}", drift.drift_pp_dps),
+            format!("{:.4}", drift.rms_dps),
+            format!(
+                "{:.2} %",
+                100.0 * drift.drift_pp_dps / before.max(f64::MIN_POSITIVE)
+            ),
+        ]);
+    };
+    row("before compensation", s.before);
+    row("after, float model", s.after.float);
+    row("after, fixed-point model", s.after.fixed);
+    row("after, emitted C", s.after.c);
+    row("after, emitted Rust", s.after.rust);
+    for column in table.column_iter_mut().skip(1) {
+        column.set_cell_alignment(comfy_table::CellAlignment::Right);
+    }
+    println!("{table}");
+    println!(
+        "fit: order {} in {}, {}; held-out rms {:.4} deg/s (noise floor {:.4})",
+        s.fit.order,
+        s.fit.thermometer,
+        s.fit.reason,
+        s.fit.heldout_rms_dps,
+        s.fit.noise_floor_rms_dps
+    );
+    println!(
+        "budget: firmware within {:.5} deg/s of the fitted polynomial (bound); \
+         calibration and fit {:.4} deg/s (estimate)",
+        s.budget.bound_dps, s.budget.estimate_dps
+    );
+    println!(
+        "outside {:.6} .. {:.6} {} the compensation's input is clamped",
+        s.fit.range.0, s.fit.range.1, s.fit.unit
+    );
+    println!(
+        "model against emitted C and Rust: {} words compared, {} mismatches",
+        s.equivalence.compared, s.equivalence.mismatches
+    );
+    println!("wrote {} ({:.1} s)", out.display(), s.seconds);
+}

@@ -1,0 +1,107 @@
+//! One budget for the compensation: what each step may add to the bias, in deg/s and in output LSB.
+
+use super::coefficients::{Rounded, variable};
+use crate::closure::BaselineFit;
+use crate::design::{CompensationInput, Design};
+use crate::numeric::format::{Rounding, pow2};
+use serde::Serialize;
+
+/// One contribution.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Line {
+    /// What it is.
+    pub what: String,
+    /// deg/s.
+    pub dps: f64,
+    /// In LSB of the output.
+    pub output_lsb: f64,
+    /// `bound` = never more; `estimate` = one standard deviation or rms.
+    pub kind: &'static str,
+}
+
+/// All contributions.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Budget {
+    /// Estimates first, then bounds.
+    pub lines: Vec<Line>,
+    /// Sum of the bounds, deg/s: how far the firmware may be from the fitted polynomial.
+    pub bound_dps: f64,
+    /// Root of the sum of the squared estimates, deg/s.
+    pub estimate_dps: f64,
+}
+
+/// The budget of a design whose coefficients have been rounded.
+pub fn budget(design: &Design, fit: &BaselineFit, rounded: &Rounded) -> Budget {
+    let Some(c) = &design.compensation else {
+        return Budget {
+            lines: Vec::new(),
+            bound_dps: 0.0,
+            estimate_dps: 0.0,
+        };
+    };
+    let output_lsb = c.output.format.lsb();
+    let line = |what: &str, dps: f64, kind| Line {
+        what: what.to_owned(),
+        dps,
+        output_lsb: dps / output_lsb,
+        kind,
+    };
+    let (_, scale) = variable(c);
+    let input_step = match &c.input {
+        CompensationInput::Phase => 2.0 * pow2(-(design.circuit.cordic.angle_bits as i32)),
+        CompensationInput::Channel(channel) => pow2(-(channel.scale_bits as i32)),
+    };
+    let slope = (0..=100)
+        .map(|k| fit.centre + fit.half_span * (f64::from(k) / 50.0 - 1.0))
+        .map(|t| fit.slope_dps(t).abs())
+        .fold(0.0, f64::max);
+    let p_max = rounded.p_range.0.abs().max(rounded.p_range.1.abs());
+    let step = one_rounding(c.accumulator.rounding) * c.accumulator.format.lsb();
+    // Each step's rounding is multiplied by p in every later step.
+    let evaluation = (1..rounded.exact.len()).fold(0.0, |e, _| e * p_max + step);
+    let lines = vec![
+        line(
+            "calibration: noise of the fit",
+            fit.std_max_dps(),
+            "estimate",
+        ),
+        line("fit: held-out rms", fit.heldout_rms_dps, "estimate"),
+        line(
+            "thermometer: half a step of its word",
+            slope * scale * input_step / 2.0,
+            "bound",
+        ),
+        line(
+            "coefficients: rounding to their format",
+            rounded.cost_dps,
+            "bound",
+        ),
+        line(
+            "evaluation: rounding of each Horner step",
+            evaluation,
+            "bound",
+        ),
+        line(
+            "output: rounding of bias and of rate",
+            2.0 * one_rounding(c.output.rounding) * output_lsb,
+            "bound",
+        ),
+    ];
+    let of = |kind: &str| {
+        let chosen = lines.iter().filter(|l| l.kind == kind);
+        chosen.map(|l| l.dps).collect::<Vec<_>>()
+    };
+    Budget {
+        bound_dps: of("bound").iter().sum(),
+        estimate_dps: of("estimate").iter().map(|v| v * v).sum::<f64>().sqrt(),
+        lines,
+    }
+}
+
+/// The largest error of one rounding, LSB.
+fn one_rounding(rounding: Rounding) -> f64 {
+    match rounding {
+        Rounding::HalfUp | Rounding::HalfEven | Rounding::HalfAway => 0.5,
+        Rounding::Floor | Rounding::TowardZero | Rounding::Ceil => 1.0,
+    }
+}

@@ -1,0 +1,98 @@
+//! The fitted polynomial in the firmware's variable and formats, and what the rounding costs.
+
+use super::{compensation, thermometer_raw};
+use crate::closure::BaselineFit;
+use crate::closure::polynomial;
+use crate::design::{Compensation, CompensationInput, Design};
+use crate::error::{InputError, Result};
+use crate::numeric::format::{Format, pow2};
+
+/// Rounded coefficients.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rounded {
+    /// In the firmware's variable p, before rounding, deg/s.
+    pub exact: Vec<f64>,
+    /// The range of p.
+    pub p_range: (f64, f64),
+    /// Largest change of the bias over the calibrated range that rounding makes, deg/s.
+    pub cost_dps: f64,
+}
+
+/// The firmware's variable: T = offset + scale * p.
+pub fn variable(c: &Compensation) -> (f64, f64) {
+    match &c.input {
+        // p counts half turns.
+        CompensationInput::Phase => (0.0, std::f64::consts::PI),
+        CompensationInput::Channel(channel) => {
+            let lsb = channel.format.lsb();
+            (
+                channel.offset_raw as f64 * lsb,
+                pow2(channel.scale_bits as i32) * lsb,
+            )
+        }
+    }
+}
+
+/// Puts the fit into the design: coefficients, and the calibrated range as the input's limits.
+///
+/// # Errors
+/// A coefficient that its format cannot hold; a phase beyond half a turn.
+pub fn round(design: &mut Design, fit: &BaselineFit) -> Result<Rounded> {
+    let c = compensation(design)?;
+    let (offset, scale) = variable(c);
+    let p = |t: f64| (t - offset) / scale;
+    let p_range = (p(fit.range.0), p(fit.range.1));
+    if c.input == CompensationInput::Phase && (p_range.0 < -1.0 || p_range.1 >= 1.0) {
+        return Err(InputError::new(format!(
+            "the record's phase runs from {} to {} rad, beyond the half turn that a phase word holds",
+            fit.range.0, fit.range.1
+        ))
+        .help("wrap the phase into [-pi, pi), or move the demodulation phase away from the wrap")
+        .into());
+    }
+    let exact = fit.scaled_to(offset, scale);
+    let format = c.coefficient_format;
+    let mut raw = Vec::new();
+    for (order, value) in exact.iter().enumerate() {
+        raw.push(quantise(order, *value, format)?);
+    }
+    let errors: Vec<f64> = raw
+        .iter()
+        .zip(&exact)
+        .map(|(r, e)| *r as f64 * format.lsb() - e)
+        .collect();
+    let at = |k: u32| p_range.0 + (p_range.1 - p_range.0) * f64::from(k) / 1000.0;
+    let cost_dps = (0..=1000)
+        .map(|k| polynomial::evaluate(&errors, at(k)).abs())
+        .fold(0.0, f64::max);
+    let clamp = (
+        thermometer_raw(design, c, fit.range.0),
+        thermometer_raw(design, c, fit.range.1),
+    );
+    if let Some(c) = &mut design.compensation {
+        c.coefficients_raw = raw;
+        c.clamp_raw = (clamp.0 < clamp.1).then_some(clamp);
+    }
+    Ok(Rounded {
+        exact,
+        p_range,
+        cost_dps,
+    })
+}
+
+/// Nearest, ties up.
+fn quantise(order: usize, value: f64, format: Format) -> Result<i128> {
+    let raw = (value / format.lsb() + 0.5).floor();
+    let held = raw.is_finite() && format.contains(raw as i128);
+    if !held {
+        let needed = (value.abs() + 1.0).log2().ceil() as i32 + 1;
+        return Err(InputError::new(format!(
+            "the fitted coefficient of order {order} is {value}, which {format} cannot hold"
+        ))
+        .help(format!(
+            "give `compensation.coefficient_format` at least {needed} integer bits, or fit a lower order"
+        ))
+        .into());
+    }
+    Ok(raw as i128)
+}

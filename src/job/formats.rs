@@ -1,0 +1,180 @@
+//! The thermometer of the firmware, and formats where the design leaves them open.
+
+use crate::closure::BaselineFit;
+use crate::design::{ChannelInput, Compensation, CompensationInput, Design, RecordMapping};
+use crate::error::{InputError, Result};
+use crate::numeric::format::{Format, Overflow, Quantizer, Rounding};
+use crate::record::ThermalRecord;
+
+/// Bits of a chosen coefficient and of a chosen output.
+const WORD_BITS: u32 = 32;
+/// A chosen thermometer word has 16 to 24 bits (2^24 codes can be compared one by one).
+const INPUT_BITS: std::ops::RangeInclusive<u32> = 16..=24;
+
+/// Settles which column the bias is fitted in: the design's own compensation decides if it has one.
+///
+/// # Errors
+/// A compensation whose input the record does not have.
+pub fn choose_thermometer(
+    design: &Design,
+    record: &ThermalRecord,
+    mapping: &mut RecordMapping,
+) -> Result<()> {
+    let own = design
+        .compensation
+        .as_ref()
+        .filter(|_| design.compensation_is_own);
+    let Some(own) = own else {
+        return Ok(());
+    };
+    let column = column_of(own);
+    let named = mapping.thermometer.as_deref().unwrap_or(column);
+    if named != column {
+        return Err(InputError::new(format!(
+            "the record's thermometer is {named}, the compensation's input is {column}"
+        ))
+        .help("make `record.thermometer` and `compensation.input` agree, or leave one out")
+        .into());
+    }
+    if record.column(column).is_none() {
+        let has: Vec<&str> = record.columns.keys().map(String::as_str).collect();
+        return Err(InputError::new(format!(
+            "the compensation's input is {column}, which the record does not have"
+        ))
+        .in_file(&record.source)
+        .help(format!(
+            "the record has: {}; map one with [record.columns], change `compensation.input`, or leave \
+             [compensation] out to have it chosen",
+            has.join(", ")
+        ))
+        .into());
+    }
+    mapping.thermometer = Some(column.to_owned());
+    Ok(())
+}
+
+/// The record's column that a compensation reads.
+pub fn column_of(compensation: &Compensation) -> &str {
+    match &compensation.input {
+        CompensationInput::Phase => "phase_rad",
+        CompensationInput::Channel(channel) => &channel.column,
+    }
+}
+
+/// Gives the design a compensation for the fit's thermometer if it has none for it; says what was
+/// chosen and why.
+///
+/// # Errors
+/// Ranges that no word holds.
+pub fn fill(design: &mut Design, fit: &BaselineFit, record: &ThermalRecord) -> Result<Vec<String>> {
+    let fits = design
+        .compensation
+        .as_ref()
+        .is_some_and(|c| column_of(c) == fit.thermometer);
+    if fits {
+        return Ok(Vec::new());
+    }
+    let rate = record.column("rate_out_dps").unwrap_or(&[]);
+    let greatest = rate
+        .iter()
+        .copied()
+        .filter(|v| !v.is_nan())
+        .fold(0.0, |m: f64, v| m.max(v.abs()));
+    // Rate and bias, and their difference, with a factor of two to spare.
+    let output = signed_for(4.0 * greatest, WORD_BITS)?;
+    let (input, mut said) = if fit.thermometer == "phase_rad" {
+        (CompensationInput::Phase, Vec::new())
+    } else {
+        channel(fit, output)?
+    };
+    let mut compensation = Compensation {
+        input,
+        coefficients_raw: vec![0],
+        coefficient_format: output,
+        accumulator: Quantizer::default_of(output),
+        rate_full_scale_dps: 1.0,
+        output: Quantizer::default_of(output),
+        clamp_raw: None,
+    };
+    if fit.thermometer == "phase_rad" {
+        let full_scale = 2.0 * design.thermal_run.sense_full_scale_dps;
+        compensation.rate_full_scale_dps = f64::powf(2.0, full_scale.log2().round());
+    }
+    let (offset, scale) = super::coefficients::variable(&compensation);
+    let exact = fit.scaled_to(offset, scale);
+    let largest = exact.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+    let sum: f64 = exact.iter().map(|v| v.abs()).sum();
+    let coefficient = signed_for(2.0 * largest, WORD_BITS)?;
+    let wide = signed_for(2.0 * sum, WORD_BITS)?;
+    // The accumulator keeps the coefficients' LSB and has room for the sum of all terms.
+    let accumulator = Format::q(wide.integer_bits, coefficient.fraction_bits);
+    compensation.coefficient_format = coefficient;
+    compensation.accumulator = Quantizer {
+        format: accumulator,
+        rounding: Rounding::HalfUp,
+        overflow: Overflow::Saturate,
+    };
+    said.push(format!(
+        "coefficients {coefficient}: the largest is {largest:.4} deg/s, the rest of {WORD_BITS} bits \
+         are fraction"
+    ));
+    said.push(format!(
+        "accumulator {accumulator}: holds all terms at once, {sum:.4} deg/s"
+    ));
+    said.push(format!(
+        "output {output}: rates up to {greatest:.4} deg/s, with a factor of four to spare"
+    ));
+    design.compensation = Some(compensation);
+    Ok(said)
+}
+
+/// The narrowest signed format of `bits` bits whose values reach `peak`.
+fn signed_for(peak: f64, bits: u32) -> Result<Format> {
+    let integer_bits = (peak.max(f64::MIN_POSITIVE).log2().floor() as i32 + 2).max(1);
+    if integer_bits as u32 > bits {
+        return Err(
+            InputError::new(format!("values up to {peak} fit no word of {bits} bits"))
+                .help("give a [compensation] with formats of your own")
+                .into(),
+        );
+    }
+    Ok(Format::q(integer_bits as u32, bits - integer_bits as u32))
+}
+
+/// A word for the thermometer: one LSB moves the bias by at most a sixteenth of the noise floor.
+fn channel(fit: &BaselineFit, rate_format: Format) -> Result<(CompensationInput, Vec<String>)> {
+    let reach = fit.range.0.abs().max(fit.range.1.abs());
+    let margin = 0.25 * (fit.range.1 - fit.range.0);
+    let slope = (0..=100)
+        .map(|k| fit.centre + fit.half_span * (f64::from(k) / 50.0 - 1.0))
+        .map(|t| fit.slope_dps(t).abs())
+        .fold(0.0, f64::max);
+    let floor = fit.noise_floor_rms_dps.max(1e-9);
+    let enough = |format: &Format| slope * format.lsb() <= floor / 16.0;
+    let mut format = signed_for(reach + margin, *INPUT_BITS.start())?;
+    for bits in INPUT_BITS {
+        format = signed_for(reach + margin, bits)?;
+        if enough(&format) {
+            break;
+        }
+    }
+    let lsb = format.lsb();
+    let offset_raw = (fit.centre / lsb).round() as i128;
+    let half_range = (fit.half_span / lsb).max(1.0);
+    let scale_bits = (half_range.log2().ceil() as u32).clamp(1, 64);
+    let said = vec![format!(
+        "input {format} of {}: one LSB moves the bias by {:.2e} deg/s, the noise floor is {floor:.2e}",
+        fit.thermometer,
+        slope * lsb
+    )];
+    Ok((
+        CompensationInput::Channel(ChannelInput {
+            column: fit.thermometer.clone(),
+            format,
+            offset_raw,
+            scale_bits,
+            rate_format,
+        }),
+        said,
+    ))
+}

@@ -1,0 +1,187 @@
+//! The main job, end to end: a record (measured, or of the design's own thermal run) becomes a bias
+//! polynomial, the polynomial becomes coefficients in their formats, the circuit becomes C and
+//! Rust, and all of them are run beside each other.
+//!
+//! [`own_run`] is the design's own thermal run through the circuit, [`from_record`] a measured
+//! record through the compensation alone; [`formats`] chooses formats that the design leaves open,
+//! [`coefficients`] rounds the fit into them, [`budget`] adds up what each step costs; [`firmware`]
+//! emits, builds and compares; [`outcome`] is what comes of it.
+
+pub mod budget;
+pub mod coefficients;
+pub mod firmware;
+pub mod formats;
+pub mod from_record;
+pub mod outcome;
+pub mod own_run;
+
+use crate::closure::{self, BaselineFit};
+use crate::design::{Compensation, CompensationInput, Design};
+use crate::error::Result;
+use crate::record::{self, Warning};
+use outcome::{Outcome, Point};
+use std::path::Path;
+use std::time::Instant;
+
+/// What a job says while it runs: a step's name.
+pub type Say<'a> = &'a dyn Fn(&str);
+
+/// Runs the main job. Nothing is written but what a temporary folder holds.
+///
+/// # Errors
+/// A design or record that cannot be used; emitted code that does not compile. Differences between
+/// model and emitted code are not errors here: they are in the outcome.
+pub fn run(
+    design: &Design,
+    record_path: Option<&Path>,
+    command: &str,
+    say: Say,
+) -> Result<Outcome> {
+    let started = Instant::now();
+    let mut design = design.clone();
+    let simulated = match record_path {
+        Some(_) => None,
+        None => {
+            say("simulating the design's own thermal run");
+            Some(own_run::OwnRun::simulate(&design)?)
+        }
+    };
+    let (record, mut warnings) = match (&simulated, record_path) {
+        (Some(run), _) => record::thermal::parse(
+            run.record_csv().as_bytes(),
+            Path::new("record.csv"),
+            &Default::default(),
+        )?,
+        (None, Some(path)) => record::read(path, &design.record)?,
+        (None, None) => unreachable!("either a record or an own run"),
+    };
+    if let Some(run) = &simulated {
+        warnings.extend(run.warnings(&design));
+    }
+
+    say("fitting the bias polynomial");
+    let mut mapping = if simulated.is_some() {
+        Default::default()
+    } else {
+        design.record.clone()
+    };
+    formats::choose_thermometer(&design, &record, &mut mapping)?;
+    let fit = closure::fit(&record, &mapping, &design.fit)?;
+    warnings.extend(fit.warnings.iter().cloned());
+    let chosen = formats::fill(&mut design, &fit, &record)?;
+    let rounded = coefficients::round(&mut design, &fit)?;
+    // A fit of another order than the file's has other products.
+    crate::design::limits::check(&design).map_err(|excess| {
+        let message = format!(
+            "{} needs {} bits, more than 127: {}",
+            excess.key, excess.bits, excess.sum
+        );
+        crate::error::InputError::new(message).help(excess.remedy())
+    })?;
+    let budget = budget::budget(&design, &fit, &rounded);
+
+    say("emitting, building and comparing C and Rust");
+    let firmware = firmware::Firmware::make(&design, command)?;
+    let compared = firmware.compare(&design)?;
+
+    say("running the record through float, fixed, C and Rust");
+    let points = match &simulated {
+        Some(run) => run.points(&design, &fit, &firmware)?,
+        None => from_record::points(&design, &fit, &record, &firmware)?,
+    };
+    let record_csv = simulated.map(|run| run.record_csv());
+    Ok(Outcome::new(outcome::Parts {
+        design,
+        command: command.to_owned(),
+        record_path: record_path.map(Path::to_path_buf),
+        record_csv,
+        fit,
+        warnings,
+        chosen,
+        rounded,
+        budget,
+        firmware,
+        compared,
+        points,
+        seconds: started.elapsed().as_secs_f64(),
+    }))
+}
+
+/// The compensation of a design that has been filled in.
+fn compensation(design: &Design) -> Result<&Compensation> {
+    design.compensation.as_ref().ok_or_else(|| {
+        crate::error::InputError::new("the design has no [compensation]")
+            .help("add one, or leave [circuit] out to use the default's")
+            .into()
+    })
+}
+
+/// Raw input of the compensation for a reading of the thermometer, rounded and limited as a driver
+/// of the firmware would: phase in rad, or the channel's own unit.
+fn thermometer_raw(design: &Design, compensation: &Compensation, reading: f64) -> i128 {
+    let to_raw =
+        |value: f64, low: i128, high: i128| ((value + 0.5).floor() as i128).clamp(low, high);
+    match &compensation.input {
+        CompensationInput::Phase => {
+            let bits = design.circuit.cordic.angle_bits;
+            let half = 1i128 << (bits - 1);
+            let turns = reading / std::f64::consts::TAU;
+            to_raw(
+                turns * crate::numeric::format::pow2(bits as i32),
+                -half,
+                half - 1,
+            )
+        }
+        CompensationInput::Channel(channel) => {
+            let format = channel.format;
+            to_raw(reading / format.lsb(), format.min_raw(), format.max_raw())
+        }
+    }
+}
+
+/// Points' drift: greatest minus least of the means over bins of the thermometer.
+pub fn drift_pp(points: &[Point], of: impl Fn(&Point) -> f64) -> f64 {
+    /// Bins over the thermometer's range.
+    const BINS: usize = 24;
+    let readings = || points.iter().map(|p| p.thermometer);
+    let low = readings().fold(f64::INFINITY, f64::min);
+    let high = readings().fold(f64::NEG_INFINITY, f64::max);
+    let width = (high - low).max(f64::MIN_POSITIVE) / BINS as f64;
+    let mut sums = [(0.0, 0usize); BINS];
+    for point in points {
+        let bin = (((point.thermometer - low) / width) as usize).min(BINS - 1);
+        sums[bin].0 += of(point);
+        sums[bin].1 += 1;
+    }
+    // Bins with a third of the usual number of points and more: the others are noise.
+    let filled = sums.iter().filter(|b| b.1 > 0).count().max(1);
+    let least = (points.len() / filled / 3).max(1);
+    let means: Vec<f64> = sums
+        .iter()
+        .filter(|b| b.1 >= least)
+        .map(|b| b.0 / b.1 as f64)
+        .collect();
+    let greatest = means.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let smallest = means.iter().copied().fold(f64::INFINITY, f64::min);
+    if means.is_empty() {
+        0.0
+    } else {
+        greatest - smallest
+    }
+}
+
+/// Root mean square.
+pub fn rms(points: &[Point], of: impl Fn(&Point) -> f64) -> f64 {
+    let sum: f64 = points.iter().map(|p| of(p).powi(2)).sum();
+    (sum / points.len().max(1) as f64).sqrt()
+}
+
+/// A warning that is not about one column.
+fn warning(code: &'static str, message: String) -> Warning {
+    Warning::general(code, message)
+}
+
+/// The fit's bias at a reading limited to the calibrated range, deg/s.
+fn clamped_bias(fit: &BaselineFit, reading: f64) -> f64 {
+    fit.bias_dps(reading.clamp(fit.range.0, fit.range.1))
+}

@@ -1,0 +1,289 @@
+//! What the main job comes to: `summary.json` and everything that the report shows.
+
+use super::budget::Budget;
+use super::coefficients::Rounded;
+use super::firmware::Firmware;
+use super::{drift_pp, rms};
+use crate::closure::BaselineFit;
+use crate::design::Design;
+use crate::emit::manifest::sha256;
+use crate::record::Warning;
+use crate::verify::compare::Compared;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// One reading: the same rate through every path, deg/s. The applied rate is subtracted.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Point {
+    /// s.
+    pub time_s: f64,
+    /// In the thermometer's unit.
+    pub thermometer: f64,
+    /// Chamber or die, degC; NaN where nobody knows.
+    pub temperature_degc: f64,
+    /// True while the thermometer's trend is that of heating.
+    pub heating: bool,
+    /// Not compensated.
+    pub before_dps: f64,
+    /// Compensated in `f64` with the fit's own coefficients.
+    pub float_dps: f64,
+    /// Compensated by the bit-accurate model.
+    pub fixed_dps: f64,
+    /// Compensated by the emitted C.
+    pub c_dps: f64,
+    /// Compensated by the emitted Rust.
+    pub rust_dps: f64,
+}
+
+/// What an outcome is made of.
+#[derive(Debug)]
+pub struct Parts {
+    /// With coefficients, formats and calibrated range filled in.
+    pub design: Design,
+    /// The command.
+    pub command: String,
+    /// The record, if it was measured.
+    pub record_path: Option<PathBuf>,
+    /// The record, if it was simulated.
+    pub record_csv: Option<String>,
+    /// The fit.
+    pub fit: BaselineFit,
+    /// Of record and fit.
+    pub warnings: Vec<Warning>,
+    /// Formats that were chosen for the design, with the reason; empty if it had its own.
+    pub chosen: Vec<String>,
+    /// The coefficients in their formats.
+    pub rounded: Rounded,
+    /// What each step costs.
+    pub budget: Budget,
+    /// Emitted and built.
+    pub firmware: Firmware,
+    /// Against the model.
+    pub compared: Vec<Compared>,
+    /// Readings.
+    pub points: Vec<Point>,
+    /// Wall time.
+    pub seconds: f64,
+}
+
+/// `summary.json` (`gyrogen.run/1`).
+#[derive(Debug, Clone, Serialize)]
+pub struct Summary {
+    /// `gyrogen.run/1`.
+    pub schema: &'static str,
+    /// Of the tool.
+    pub version: &'static str,
+    /// Of the design's text.
+    pub design_sha256: String,
+    /// The command.
+    pub command: String,
+    /// The record's file; null for the design's own run.
+    pub record: Option<String>,
+    /// Not compensated.
+    pub before: Drift,
+    /// Compensated.
+    pub after: After,
+    /// after.fixed / before, peak to peak.
+    pub ratio: f64,
+    /// The fit.
+    pub fit: FitSummary,
+    /// What each step costs.
+    pub budget: Budget,
+    /// Emitted code against the model.
+    pub equivalence: Equivalence,
+    /// The firmware's files.
+    pub emitted: Vec<Emitted>,
+    /// What the user should know of.
+    pub warnings: Vec<Warning>,
+    /// Wall time, s.
+    pub seconds: f64,
+}
+
+/// How far the rate output drifts over the record.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Drift {
+    /// Greatest minus least mean over bins of the thermometer, deg/s.
+    pub drift_pp_dps: f64,
+    /// Root mean square over all readings, deg/s.
+    pub rms_dps: f64,
+}
+
+/// After compensation, by path.
+#[derive(Debug, Clone, Serialize)]
+pub struct After {
+    /// `f64`, the fit's own coefficients.
+    pub float: Drift,
+    /// Bit-accurate model.
+    pub fixed: Drift,
+    /// Emitted code (C and Rust, the larger figure).
+    pub emitted: Drift,
+    /// Emitted C.
+    pub c: Drift,
+    /// Emitted Rust.
+    pub rust: Drift,
+}
+
+/// The fit in numbers.
+#[derive(Debug, Clone, Serialize)]
+pub struct FitSummary {
+    /// The record's column.
+    pub thermometer: String,
+    /// Its unit.
+    pub unit: String,
+    /// Calibrated range in that unit.
+    pub range: (f64, f64),
+    /// Of the polynomial.
+    pub order: usize,
+    /// Why this order.
+    pub reason: String,
+    /// Lowest first, deg/s over powers of the thermometer's unit.
+    pub coefficients: Vec<f64>,
+    /// In the firmware's variable and formats.
+    pub coefficients_raw: Vec<i128>,
+    /// Of those.
+    pub coefficient_format: String,
+    /// Over the rows that were fitted, deg/s.
+    pub in_sample_rms_dps: f64,
+    /// Over held-out blocks, deg/s.
+    pub heldout_rms_dps: f64,
+    /// Over held-out blocks, deg/s.
+    pub heldout_max_abs_dps: f64,
+    /// What no smooth model can remove, deg/s.
+    pub noise_floor_rms_dps: f64,
+    /// Rows with a spike.
+    pub outliers: usize,
+}
+
+/// Emitted code against the model.
+#[derive(Debug, Clone, Serialize)]
+pub struct Equivalence {
+    /// Output words.
+    pub compared: u64,
+    /// Inputs with a difference.
+    pub mismatches: u64,
+    /// By table, function and chain.
+    pub functions: Vec<Compared>,
+    /// Largest distance of the fixed from the float path over the record, deg/s.
+    pub fixed_minus_float_max_dps: f64,
+}
+
+/// An emitted file.
+#[derive(Debug, Clone, Serialize)]
+pub struct Emitted {
+    /// Inside the output folder.
+    pub path: String,
+    /// Lower-case hexadecimal.
+    pub sha256: String,
+}
+
+/// The main job's result.
+#[derive(Debug)]
+pub struct Outcome {
+    /// For machines.
+    pub summary: Summary,
+    /// For the report.
+    pub parts: Parts,
+}
+
+impl Outcome {
+    /// Draws the conclusions.
+    pub fn new(parts: Parts) -> Self {
+        let drift = |of: &dyn Fn(&Point) -> f64| Drift {
+            drift_pp_dps: drift_pp(&parts.points, of),
+            rms_dps: rms(&parts.points, of),
+        };
+        let before = drift(&|p| p.before_dps);
+        let (c, rust) = (drift(&|p| p.c_dps), drift(&|p| p.rust_dps));
+        let after = After {
+            float: drift(&|p| p.float_dps),
+            fixed: drift(&|p| p.fixed_dps),
+            emitted: if c.drift_pp_dps >= rust.drift_pp_dps {
+                c
+            } else {
+                rust
+            },
+            c,
+            rust,
+        };
+        let points = &parts.points;
+        let apart = points.iter().map(|p| (p.fixed_dps - p.float_dps).abs());
+        let differing = |p: &&Point| p.c_dps != p.fixed_dps || p.rust_dps != p.fixed_dps;
+        let on_record = points.iter().filter(differing).count() as u64;
+        let compensation = parts.design.compensation.as_ref();
+        let fit = &parts.fit;
+        let summary = Summary {
+            schema: "gyrogen.run/1",
+            version: env!("CARGO_PKG_VERSION"),
+            design_sha256: parts.design.source.sha256.clone(),
+            command: parts.command.clone(),
+            record: parts.record_path.as_ref().map(|p| p.display().to_string()),
+            ratio: after.fixed.drift_pp_dps / before.drift_pp_dps.max(f64::MIN_POSITIVE),
+            before,
+            after,
+            fit: FitSummary {
+                thermometer: fit.thermometer.clone(),
+                unit: fit.unit.to_owned(),
+                range: fit.range,
+                order: fit.order,
+                reason: fit.reason.clone(),
+                coefficients: fit.coefficients.clone(),
+                coefficients_raw: compensation.map_or(Vec::new(), |c| c.coefficients_raw.clone()),
+                coefficient_format: compensation
+                    .map_or(String::new(), |c| c.coefficient_format.to_string()),
+                in_sample_rms_dps: fit.in_sample_rms_dps,
+                heldout_rms_dps: fit.heldout_rms_dps,
+                heldout_max_abs_dps: fit.heldout_max_abs_dps,
+                noise_floor_rms_dps: fit.noise_floor_rms_dps,
+                outliers: fit.outliers.len(),
+            },
+            budget: parts.budget.clone(),
+            equivalence: Equivalence {
+                compared: parts.compared.iter().map(|c| c.compared).sum(),
+                mismatches: parts.compared.iter().map(|c| c.mismatches).sum::<u64>() + on_record,
+                functions: parts.compared.clone(),
+                fixed_minus_float_max_dps: apart.fold(0.0, f64::max),
+            },
+            emitted: parts
+                .firmware
+                .files()
+                .map(|(path, text)| Emitted {
+                    path,
+                    sha256: sha256(text.as_bytes()),
+                })
+                .collect(),
+            warnings: parts.warnings.clone(),
+            seconds: parts.seconds,
+        };
+        Outcome { summary, parts }
+    }
+
+    /// True if emitted code and model agree everywhere.
+    pub fn holds(&self) -> bool {
+        self.summary.equivalence.mismatches == 0
+    }
+
+    /// The first difference of each function that has one.
+    pub fn differences(&self) -> Vec<String> {
+        let functions = &self.summary.equivalence.functions;
+        let mut lines: Vec<String> = functions
+            .iter()
+            .filter_map(|c| {
+                Some(format!(
+                    "{} ({}): {}",
+                    c.name,
+                    c.language,
+                    c.first.as_ref()?
+                ))
+            })
+            .collect();
+        for p in &self.parts.points {
+            if lines.is_empty() && (p.c_dps != p.fixed_dps || p.rust_dps != p.fixed_dps) {
+                lines.push(format!(
+                    "record at {} s: fixed {}, C {}, Rust {} deg/s",
+                    p.time_s, p.fixed_dps, p.c_dps, p.rust_dps
+                ));
+            }
+        }
+        lines
+    }
+}

@@ -1,0 +1,163 @@
+//! Noise that is a function of (seed, stream, index) alone: neither threads nor the order of the
+//! calls can change it, and any sample can be made without those before it.
+//!
+//! The generator is counter-based: the finaliser of splitmix64 (Steele, Lea, Flood 2014; a
+//! bijection of 64 bits with full avalanche) is applied to the counter times the golden ratio under a
+//! key, and to the result under a second key. Both keys come from seed and stream. The second round keeps two
+//! streams apart even where their counters meet. Only integers and IEEE basic operations are used
+//! ([`super::turn`]), so the values are the same on every machine.
+
+use super::turn;
+
+/// 2^64 over the golden ratio, odd.
+const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
+
+/// The finaliser of splitmix64.
+#[inline(always)]
+const fn mix(z: u64) -> u64 {
+    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+/// One stream of noise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Noise {
+    inner: u64,
+    outer: u64,
+}
+
+impl Noise {
+    /// The stream `stream` of the noise of `seed`.
+    pub const fn new(seed: u64, stream: u64) -> Self {
+        let inner = mix(mix(seed.wrapping_add(GOLDEN)).wrapping_add(stream.wrapping_mul(GOLDEN)));
+        Noise {
+            inner,
+            outer: mix(inner ^ GOLDEN),
+        }
+    }
+
+    /// 64 random bits.
+    #[inline(always)]
+    pub const fn bits(&self, index: u64) -> u64 {
+        mix(mix(index.wrapping_mul(GOLDEN).wrapping_add(self.inner)) ^ self.outer)
+    }
+
+    /// Uniform in (0, 1): (k + 1/2) / 2^52 with k of 52 bits; neither end is taken.
+    #[inline(always)]
+    pub const fn uniform(&self, index: u64) -> f64 {
+        ((self.bits(index) >> 12) as f64 + 0.5) / (1u64 << 52) as f64
+    }
+
+    /// Two independent standard normal numbers, by Box and Muller: sqrt(-2 ln u) * (cos, sin)(2 pi v).
+    ///
+    /// Of the 64 bits, 40 make u = (k + 1/2) / 2^40 and 24 make v = j / 2^24, so no value is
+    /// beyond sqrt(2 * 41 * ln 2) = 7.54; a true normal is so in one of 2e13.
+    #[inline(always)]
+    pub fn gaussian_pair(&self, index: u64) -> (f64, f64) {
+        let bits = self.bits(index);
+        let u = ((bits >> 24) as f64 + 0.5) / (1u64 << 40) as f64;
+        let radius = (-2.0 * turn::ln(u)).sqrt();
+        let (sine, cosine) = turn::sin_cos(bits << 40);
+        (radius * cosine, radius * sine)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const COUNT: u64 = 1_000_000;
+
+    /// The means of x, x^2, x^3, x^4 and how many are beyond 3.
+    fn moments(values: impl Iterator<Item = f64>) -> ([f64; 4], f64, u64) {
+        let (mut sums, mut beyond, mut count) = ([0.0; 4], 0u64, 0u64);
+        for x in values {
+            let mut power = 1.0;
+            for sum in &mut sums {
+                power *= x;
+                *sum += power;
+            }
+            beyond += u64::from(x.abs() > 3.0);
+            count += 1;
+        }
+        (sums.map(|s| s / count as f64), count as f64, beyond)
+    }
+
+    #[test]
+    fn the_moments_are_those_of_a_normal() {
+        let noise = Noise::new(20_040_024, 7);
+        let pairs = || (0..COUNT).map(|i| noise.gaussian_pair(i));
+        for ([m1, m2, m3, m4], n, beyond) in
+            [moments(pairs().map(|p| p.0)), moments(pairs().map(|p| p.1))]
+        {
+            // Five standard errors: variances of the powers are 1, 2, 15, 96.
+            let within = |value: f64, expected: f64, variance: f64| {
+                assert!(
+                    (value - expected).abs() < 5.0 * (variance / n).sqrt(),
+                    "{value} {expected}"
+                );
+            };
+            within(m1, 0.0, 1.0);
+            within(m2, 1.0, 2.0);
+            within(m3, 0.0, 15.0);
+            within(m4, 3.0, 96.0);
+            within(beyond as f64 / n, 0.002_699_8, 0.002_7);
+        }
+        let cross: f64 = pairs().map(|(a, b)| a * b).sum::<f64>() / COUNT as f64;
+        let square: f64 = pairs()
+            .map(|(a, b)| (a * a - 1.0) * (b * b - 1.0))
+            .sum::<f64>();
+        assert!(cross.abs() < 5e-3 && (square / COUNT as f64).abs() < 1e-2);
+    }
+
+    #[test]
+    fn it_is_white_and_its_streams_are_independent() {
+        let correlate = |a: &dyn Fn(u64) -> f64, b: &dyn Fn(u64) -> f64| {
+            (0..200_000).map(|i| a(i) * b(i)).sum::<f64>() / 200_000.0
+        };
+        let stream = |seed, number| move |i| Noise::new(seed, number).gaussian_pair(i).0;
+        let first = stream(1, 0);
+        for lag in [1, 2, 3, 32, 1000] {
+            assert!(correlate(&first, &|i| first(i + lag)).abs() < 5.0 / 200_000f64.sqrt());
+        }
+        for other in [
+            stream(1, 1),
+            stream(2, 0),
+            stream(1, u64::MAX),
+            stream(0, 1),
+        ] {
+            assert!(correlate(&first, &other).abs() < 5.0 / 200_000f64.sqrt());
+        }
+    }
+
+    #[test]
+    fn uniforms_fill_the_interval_evenly() {
+        let noise = Noise::new(3, 3);
+        let mut bins = [0u32; 64];
+        for i in 0..640_000 {
+            bins[(noise.uniform(i) * 64.0) as usize] += 1;
+        }
+        let chi: f64 = bins
+            .iter()
+            .map(|&b| (f64::from(b) - 1e4).powi(2) / 1e4)
+            .sum();
+        // 63 degrees of freedom: mean 63, standard deviation 11.
+        assert!((20.0..120.0).contains(&chi), "{chi}");
+    }
+
+    #[test]
+    fn every_bit_of_seed_stream_and_index_matters() {
+        let base = Noise::new(0, 0).bits(0);
+        for bit in 0..64 {
+            let flips = [
+                Noise::new(1 << bit, 0).bits(0),
+                Noise::new(0, 1 << bit).bits(0),
+                Noise::new(0, 0).bits(1 << bit),
+            ];
+            for flipped in flips {
+                assert!((8..=56).contains(&(base ^ flipped).count_ones()));
+            }
+        }
+    }
+}
