@@ -35,7 +35,12 @@ pub trait Engine {
     ///
     /// # Errors
     /// The first overflow of a cast whose mode is `error`; the rows are then of no use.
-    fn process(&mut self, drive: &[i32], sense: &[i32], rows: &mut Rows) -> Result<(), Overflowed>;
+    fn process(
+        &mut self,
+        drive: &[i32],
+        sense: &[i32],
+        rows: &mut Rows,
+    ) -> Result<(), Box<Overflowed>>;
     /// No rows, of the kind that this engine makes.
     fn no_rows(&self) -> Rows;
 }
@@ -118,20 +123,26 @@ fn with_stages<const N: usize>(design: &Design, kind: ArithmeticKind) -> Box<dyn
         return Box::new(Running::new(chain, Float, Float, float_scale));
     }
     let bits = lane_bits(&chain, &chain.trace());
-    match (bits.fast <= 64, bits.residue <= 64, bits.slow <= 64) {
-        (true, true, true) => fixed::<i64, i64, i64, N>(chain, float_scale),
-        (true, true, false) => fixed::<i64, i64, i128, N>(chain, float_scale),
-        (true, false, _) => fixed::<i64, i128, i128, N>(chain, float_scale),
-        (false, _, _) => fixed::<i128, i128, i128, N>(chain, float_scale),
+    let narrow = bits.fast <= 64 && bits.residue <= 64;
+    let idle = chain.mixers.iter().all(|m| m.product.is_idle());
+    match (narrow, idle, bits.slow <= 64) {
+        (true, true, true) => fixed::<Fixed<i64, i64, true>, Fixed<i64, i64>, N>(chain, float_scale),
+        (true, true, false) => fixed::<Fixed<i64, i64, true>, Fixed<i128, i64>, N>(chain, float_scale),
+        (true, false, true) => fixed::<Fixed<i64, i64>, Fixed<i64, i64>, N>(chain, float_scale),
+        (true, false, false) => fixed::<Fixed<i64, i64>, Fixed<i128, i64>, N>(chain, float_scale),
+        _ if bits.fast <= 64 => {
+            fixed::<Fixed<i64, i128>, Fixed<i128, i128>, N>(chain, float_scale)
+        }
+        _ => fixed::<Fixed<i128, i128>, Fixed<i128, i128>, N>(chain, float_scale),
     }
 }
 
-fn fixed<W: HasKernel, R: Lane, S: HasKernel, const N: usize>(
-    chain: Chain<N>,
-    scale: FloatScale,
-) -> Box<dyn Engine> {
-    let (fast, slow) = (Fixed::<W, R>::new(), Fixed::<S, R>::new());
-    Box::new(Running::new(chain, fast, slow, scale))
+fn fixed<F, S, const N: usize>(chain: Chain<N>, scale: FloatScale) -> Box<dyn Engine>
+where
+    F: Ends + Default + 'static,
+    S: Ends + Default + Arithmetic<Residue = F::Residue> + 'static,
+{
+    Box::new(Running::new(chain, F::default(), S::default(), scale))
 }
 
 /// What turns a float row into the contract's units.
@@ -169,7 +180,7 @@ trait Ends: Arithmetic {
     );
 }
 
-impl<W: HasKernel, R: Lane> Ends for Fixed<W, R> {
+impl<W: HasKernel, R: Lane, const IDLE: bool> Ends for Fixed<W, R, IDLE> {
     #[inline(always)]
     fn code(&self, code: i32, _fraction_bits: i32) -> W {
         W::from_i32(code)
@@ -287,7 +298,12 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Runnin
 impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Engine
     for Running<F, S, N>
 {
-    fn process(&mut self, drive: &[i32], sense: &[i32], rows: &mut Rows) -> Result<(), Overflowed> {
+    fn process(
+        &mut self,
+        drive: &[i32],
+        sense: &[i32],
+        rows: &mut Rows,
+    ) -> Result<(), Box<Overflowed>> {
         let ratio = self.chain.cics[0].ratio as usize;
         let (mut drive, mut sense) = (drive, sense);
         while !drive.is_empty() {
@@ -298,14 +314,14 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Engine
             self.block(d, s);
             // The fast rate comes first in the order of steps; an overflow there is the earlier.
             if let Some(overflowed) = self.fast.stopped() {
-                return Err(overflowed);
+                return Err(Box::new(overflowed));
             }
             self.phase += count;
             if self.phase == ratio {
                 self.phase = 0;
                 self.end_of_period(rows);
                 if let Some(overflowed) = self.slow.stopped() {
-                    return Err(overflowed);
+                    return Err(Box::new(overflowed));
                 }
             }
         }

@@ -4,6 +4,7 @@
 //! 1 = a check does not hold, 2 = the input cannot be used (`contracts/cli.md`).
 
 mod emit;
+mod init;
 mod replay;
 mod run;
 mod verify;
@@ -24,6 +25,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Emit(emit::Arguments),
+    Init(init::Arguments),
     Replay(replay::Arguments),
     Run(run::Arguments),
     Verify(verify::Arguments),
@@ -44,6 +46,7 @@ pub fn main() -> ExitCode {
     let cli = Cli::parse();
     let result = match &cli.command {
         Command::Emit(arguments) => emit::run(arguments),
+        Command::Init(arguments) => init::run(arguments),
         Command::Replay(arguments) => replay::run(arguments),
         Command::Run(arguments) => run::run(arguments),
         Command::Verify(arguments) => verify::run(arguments),

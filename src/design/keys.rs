@@ -144,9 +144,9 @@ pub(super) const KEYS: &[(&str, &[(&str, &str)])] = &[
     (
         "gyro.effects.mode_crossing",
         &[
-            ("amplitude_dps", "4.6"),
-            ("center_degc", "43.0"),
-            ("half_width_k", "6.0"),
+            ("amplitude_dps", "4.5"),
+            ("center_degc", "37.5"),
+            ("half_width_k", "3.7"),
         ],
     ),
     (

@@ -163,7 +163,7 @@ fn what_a_file_leaves_out_is_the_defaults() {
     assert_eq!(d.gyro.effects, Effects::default());
     let d = parse("[gyro.effects.mode_crossing]\ncenter_degc = 20\n", None).unwrap();
     let crossing = d.gyro.effects.mode_crossing.unwrap();
-    assert_eq!((crossing.center_degc, crossing.half_width_k), (20.0, 6.0));
+    assert_eq!((crossing.center_degc, crossing.half_width_k), (20.0, 3.7));
 
     // A whole circuit without compensation has none; an own compensation is marked so.
     let at = DEFAULT.find("\n[compensation]").unwrap();

@@ -275,7 +275,7 @@ pub struct ModeCrossing {
     pub amplitude_dps: f64,
     /// Temperature of the crossing, degC.
     pub center_degc: f64,
-    /// Half width at half maximum, K.
+    /// From the centre to each extreme, K.
     pub half_width_k: f64,
 }
 

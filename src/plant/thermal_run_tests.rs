@@ -206,15 +206,3 @@ fn the_adc_takes_the_nearest_ties_up_and_saturates() {
     assert!(drive.iter().all(|c| (-32_768..=32_767).contains(c)));
     assert!(sense.contains(&32_767) && sense.contains(&-32_768));
 }
-
-#[test]
-#[ignore = "a measurement: run with --release -- --ignored --nocapture"]
-fn throughput() {
-    let plant = plant(false);
-    let reading = plant.readings(1.0)[0];
-    plant.codes(&reading, 0, 1 << 20);
-    let start = std::time::Instant::now();
-    let codes = plant.codes(&reading, 0, 1 << 24);
-    let rate = codes.0.len() as f64 / start.elapsed().as_secs_f64() / 1e6;
-    println!("{rate:.1} M samples/s of both channels, with noise");
-}

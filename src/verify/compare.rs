@@ -208,7 +208,11 @@ pub fn calls(
         record,
         &mut |words| {
             let due = expected.get(k).map_or(&[][..], Vec::as_slice);
-            tally.note(words, due, || format!("input {:?}", inputs.get(k)));
+            tally.note(words, due, || {
+                let input = inputs.get(k).map_or(&[][..], Vec::as_slice);
+                let words: Vec<String> = input.iter().map(i128::to_string).collect();
+                format!("input {}", words.join(", "))
+            });
             k += 1;
         },
     )?;
@@ -244,7 +248,8 @@ pub fn expected_rows(design: &Design, drive: &[i32], sense: &[i32]) -> Vec<Vec<i
         .enumerate()
         .map(|(k, row)| {
             let end = (k as u64 + 1) * ratio;
-            let fault = stopped.filter(|o| o.sample < end).map_or(0, |o| o.cast + 1);
+            let noted = stopped.as_ref().filter(|o| o.sample < end);
+            let fault = noted.map_or(0, |o| o.cast + 1);
             row.iter().copied().chain([fault as i128]).collect()
         })
         .collect()

@@ -13,7 +13,7 @@ pub struct Lcg(pub u64);
 
 impl Lcg {
     /// The next state.
-    pub fn next(&mut self) -> u64 {
+    pub fn draw(&mut self) -> u64 {
         self.0 = self.0.wrapping_mul(LCG.0).wrapping_add(LCG.1);
         self.0
     }
@@ -21,7 +21,7 @@ impl Lcg {
     /// A word of an interval of at most 2^64 values, as the emitted self-test draws it.
     pub fn word(&mut self, range: Interval) -> i128 {
         let span = (range.high - range.low) as u64;
-        let r = self.next() >> 1;
+        let r = self.draw() >> 1;
         let offset = match span.checked_add(1) {
             Some(n) => r % n,
             None => r,
@@ -67,7 +67,7 @@ pub fn inputs(ranges: &[Interval], random: usize, seed: u64) -> Vec<Vec<i128>> {
             let word = lcg.word(*range);
             // A third of the draws are small words: rounding near zero.
             if k % 3 == 2 {
-                (word >> (lcg.next() >> 59)).clamp(range.low, range.high)
+                (word >> (lcg.draw() >> 59)).clamp(range.low, range.high)
             } else {
                 word
             }
@@ -94,7 +94,7 @@ pub fn capture(design: &Design, samples: usize, seed: u64) -> (Vec<i32>, Vec<i32
         let full = f64::from(high);
         let angle =
             std::f64::consts::TAU * (turns * n as f64 * (1.0 + 1e-5 * segment as f64)).fract();
-        let noise = |lcg: &mut Lcg| (lcg.next() >> 40) as f64 / f64::from(1 << 24) - 0.5;
+        let noise = |lcg: &mut Lcg| (lcg.draw() >> 40) as f64 / f64::from(1 << 24) - 0.5;
         let (d, s) = match segment % 6 {
             0 | 1 => {
                 let phase = segment as f64;
