@@ -12,13 +12,18 @@ fn emitted(language: Language, name: &str) -> (PathBuf, Vec<EmittedFile>) {
     let design = gyrogen::design::reader::read(None).expect("the default design");
     let command = format!("gyrogen emit --lang {name} --part chain");
     let files = files::emit(&design, Part::Chain, language, &command).expect("emission");
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("generated").join(name);
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("generated")
+        .join(name);
     (folder, files)
 }
 
 fn files_under(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
-    for entry in std::fs::read_dir(folder).expect("generated/ exists").flatten() {
+    for entry in std::fs::read_dir(folder)
+        .expect("generated/ exists")
+        .flatten()
+    {
         if entry.path().is_dir() {
             found.extend(files_under(&entry.path()));
         } else {
@@ -37,7 +42,10 @@ fn check(language: Language, name: &str) {
     for file in &files {
         let path = folder.join(&file.path);
         let kept = std::fs::read_to_string(&path).unwrap_or_default();
-        let line = kept.lines().zip(file.text.lines()).position(|(a, b)| a != b);
+        let line = kept
+            .lines()
+            .zip(file.text.lines())
+            .position(|(a, b)| a != b);
         assert!(
             kept == file.text,
             "{} is not what today's code emits (first difference in line {:?}); if the change is meant, \
@@ -46,7 +54,11 @@ fn check(language: Language, name: &str) {
             line.map(|l| l + 1)
         );
     }
-    assert_eq!(files_under(&folder).len(), files.len(), "files that nothing emits");
+    assert_eq!(
+        files_under(&folder).len(),
+        files.len(),
+        "files that nothing emits"
+    );
 }
 
 #[test]

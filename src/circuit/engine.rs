@@ -126,13 +126,15 @@ fn with_stages<const N: usize>(design: &Design, kind: ArithmeticKind) -> Box<dyn
     let narrow = bits.fast <= 64 && bits.residue <= 64;
     let idle = chain.mixers.iter().all(|m| m.product.is_idle());
     match (narrow, idle, bits.slow <= 64) {
-        (true, true, true) => fixed::<Fixed<i64, i64, true>, Fixed<i64, i64>, N>(chain, float_scale),
-        (true, true, false) => fixed::<Fixed<i64, i64, true>, Fixed<i128, i64>, N>(chain, float_scale),
+        (true, true, true) => {
+            fixed::<Fixed<i64, i64, true>, Fixed<i64, i64>, N>(chain, float_scale)
+        }
+        (true, true, false) => {
+            fixed::<Fixed<i64, i64, true>, Fixed<i128, i64>, N>(chain, float_scale)
+        }
         (true, false, true) => fixed::<Fixed<i64, i64>, Fixed<i64, i64>, N>(chain, float_scale),
         (true, false, false) => fixed::<Fixed<i64, i64>, Fixed<i128, i64>, N>(chain, float_scale),
-        _ if bits.fast <= 64 => {
-            fixed::<Fixed<i64, i128>, Fixed<i128, i128>, N>(chain, float_scale)
-        }
+        _ if bits.fast <= 64 => fixed::<Fixed<i64, i128>, Fixed<i128, i128>, N>(chain, float_scale),
         _ => fixed::<Fixed<i128, i128>, Fixed<i128, i128>, N>(chain, float_scale),
     }
 }

@@ -414,7 +414,7 @@ fn most_order(sample: &Sample, wanted: FitOrder) -> usize {
     let different = stats::distinct(&t);
     match wanted {
         FitOrder::Fixed(_) => different.saturating_sub(1),
-        FitOrder::Auto => (different / 2).min(t.len() / 5).saturating_sub(1),
+        FitOrder::Auto | FitOrder::ByRecord => (different / 2).min(t.len() / 5).saturating_sub(1),
     }
 }
 

@@ -45,7 +45,7 @@ pub struct Choice {
 /// With a given order the others are tried too, for the table, up to [`HIGHEST_AUTO`].
 pub fn choose(sample: &Sample, wanted: FitOrder, most: usize, blocks: &[Range<usize>]) -> Choice {
     let highest = match wanted {
-        FitOrder::Auto => most.min(HIGHEST_AUTO),
+        FitOrder::Auto | FitOrder::ByRecord => most.min(HIGHEST_AUTO),
         FitOrder::Fixed(order) => (order as usize).max(HIGHEST_AUTO).min(most),
     };
     let whole = sample.problem(highest, |_| true);
@@ -87,11 +87,11 @@ pub fn choose(sample: &Sample, wanted: FitOrder, most: usize, blocks: &[Range<us
             most,
             format!("order {order} was asked for, but the record determines order {most} at most"),
         ),
-        FitOrder::Auto if smallest == best_order => (
+        FitOrder::Auto | FitOrder::ByRecord if smallest == best_order => (
             best_order,
             format!("order {best_order} has the least held-out error, {best_rms:.3e} deg/s rms"),
         ),
-        FitOrder::Auto => (
+        FitOrder::Auto | FitOrder::ByRecord => (
             smallest,
             format!(
                 "order {smallest} is the smallest whose held-out error is within one standard \

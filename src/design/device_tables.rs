@@ -322,9 +322,9 @@ pub(super) fn fit(t: &Table, base: Option<&FitOptions>) -> Result<FitOptions> {
     Ok(FitOptions {
         order: t.take("order", base.map(|f| f.order), |v| {
             if v.is_text() && v.text("auto")?.trim().parse::<i64>().is_err() {
-                return v.choice(&[("auto", FitOrder::Auto)]);
+                return v.choice(&[("auto", FitOrder::Auto), ("by_record", FitOrder::ByRecord)]);
             }
-            let order = v.integer(0..=8, "the polynomial's order, or \"auto\"")?;
+            let order = v.integer(0..=8, "the polynomial's order, \"auto\" or \"by_record\"")?;
             Ok(FitOrder::Fixed(order))
         })?,
         heldout_blocks: t.take("heldout_blocks", base.map(|f| f.heldout_blocks), |v| {

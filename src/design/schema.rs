@@ -323,7 +323,7 @@ pub struct RecordMapping {
 /// `[fit]`: how the compensation is fitted.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FitOptions {
-    /// `order`: an integer 0..=8, or "auto" (chosen by held-out error). Default 2.
+    /// `order`: an integer 0..=8, "auto" (chosen by held-out error) or "by_record" (the default).
     pub order: FitOrder,
     /// `heldout_blocks`: contiguous blocks of the cross-validation, 2..=50. Default 10.
     pub heldout_blocks: u32,
@@ -336,4 +336,6 @@ pub enum FitOrder {
     Fixed(u32),
     /// By held-out error.
     Auto,
+    /// 2 (eq. 9) for the design's own thermal run, by held-out error for a measured record.
+    ByRecord,
 }

@@ -24,7 +24,7 @@ fn the_default_is_what_it_says() {
         let exact = per_rad * std::f64::consts::PI.powi(power) * 2f64.powi(20);
         assert_eq!(*raw, exact.round() as i128);
     }
-    assert_eq!(d.fit.order, FitOrder::Fixed(2));
+    assert_eq!(d.fit.order, FitOrder::ByRecord);
     assert!(d.gyro.effects.mode_crossing.is_some());
 }
 

@@ -16,7 +16,7 @@ pub mod outcome;
 pub mod own_run;
 
 use crate::closure::{self, BaselineFit};
-use crate::design::{Compensation, CompensationInput, Design};
+use crate::design::{Compensation, CompensationInput, Design, FitOptions, FitOrder};
 use crate::error::Result;
 use crate::record::{self, Warning};
 use outcome::{Outcome, Point};
@@ -66,7 +66,15 @@ pub fn run(
         design.record.clone()
     };
     formats::choose_thermometer(&design, &record, &mut mapping)?;
-    let fit = closure::fit(&record, &mapping, &design.fit)?;
+    let options = FitOptions {
+        order: match (design.fit.order, &simulated) {
+            (FitOrder::ByRecord, Some(_)) => FitOrder::Fixed(2),
+            (FitOrder::ByRecord, None) => FitOrder::Auto,
+            (order, _) => order,
+        },
+        ..design.fit.clone()
+    };
+    let fit = closure::fit(&record, &mapping, &options)?;
     warnings.extend(fit.warnings.iter().cloned());
     let chosen = formats::fill(&mut design, &fit, &record)?;
     let rounded = coefficients::round(&mut design, &fit)?;

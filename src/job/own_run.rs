@@ -34,6 +34,14 @@ impl OwnRun {
     pub fn simulate(design: &Design) -> Result<Self> {
         let circuit = &design.circuit;
         let run = &design.thermal_run;
+        if circuit.phase_loop.is_some() {
+            return Err(InputError::new(
+                "the design has a phase loop, which holds the drive phase: it is no thermometer then, and \
+                 the own thermal run drives at a fixed frequency",
+            )
+            .help("leave [circuit.phase_loop] out, or give a measured record with --record")
+            .into());
+        }
         let plant = ThermalPlant::new(
             &design.gyro,
             run,

@@ -1,0 +1,235 @@
+//! The main job as a user runs it: the embedded default, and real records where they are at hand.
+
+use serde_json::Value;
+use sha2::{Digest, Sha256};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn gyrogen(arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_gyrogen"));
+    command.args(arguments).output().expect("gyrogen starts")
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().expect("UTF-8")
+}
+
+fn run(design: Option<&Path>, record: Option<&Path>, out: &Path) -> Value {
+    let mut arguments = vec!["run"];
+    arguments.extend(design.map(text));
+    if let Some(record) = record {
+        arguments.extend(["--record", text(record)]);
+    }
+    arguments.extend(["--out", text(out), "--format", "json"]);
+    let output = gyrogen(&arguments);
+    let talk = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{talk}");
+    let printed: Value = serde_json::from_slice(&output.stdout).expect("JSON on stdout");
+    let written = std::fs::read(out.join("summary.json")).expect("summary.json");
+    assert_eq!(output.stdout, written, "stdout and summary.json differ");
+    printed
+}
+
+fn number(value: &Value, path: &str) -> f64 {
+    let found = path.split('.').fold(value, |v, key| &v[key]);
+    found
+        .as_f64()
+        .unwrap_or_else(|| panic!("{path} is {found}"))
+}
+
+/// Section 6 of the design: 160 deg/s before, the published 5 % after, the same in every path.
+#[test]
+fn the_default_design_reproduces_the_published_figures_through_all_paths() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let summary = run(None, None, folder.path());
+    assert_eq!(summary["schema"], "gyrogen.run/1");
+    let before = number(&summary, "before.drift_pp_dps");
+    assert!((before - 160.0).abs() < 3.0, "{before}");
+    let ratio = number(&summary, "ratio");
+    assert!((0.045..0.055).contains(&ratio), "{ratio}");
+    let fixed = number(&summary, "after.fixed.drift_pp_dps");
+    assert!((fixed - number(&summary, "after.float.drift_pp_dps")).abs() < 0.02);
+    assert_eq!(fixed, number(&summary, "after.emitted.drift_pp_dps"));
+    assert!(number(&summary, "equivalence.fixed_minus_float_max_dps") < 0.02);
+    assert_eq!(number(&summary, "equivalence.mismatches"), 0.0);
+    assert!(number(&summary, "equivalence.compared") >= f64::from(1 << 20));
+    let bias = summary["equivalence"]["functions"]
+        .as_array()
+        .expect("functions");
+    let exhaustive = bias
+        .iter()
+        .filter(|f| f["name"] == "bias" && f["exhaustive"] == true);
+    assert!(
+        exhaustive.filter(|f| f["inputs"] == 1 << 24).count() == 2,
+        "C and Rust"
+    );
+
+    for file in summary["emitted"].as_array().expect("files") {
+        let path = folder.path().join(file["path"].as_str().expect("a path"));
+        let bytes = std::fs::read(&path).expect("an emitted file");
+        let sum: String = Sha256::digest(&bytes)
+            .iter()
+            .map(|b| format!("{b:02x}"))
+            .collect();
+        assert_eq!(file["sha256"], sum.as_str(), "{}", path.display());
+    }
+    let report = std::fs::read_to_string(folder.path().join("report.html")).expect("report.html");
+    assert!(
+        report.contains("<svg") && !report.contains("http://") && !report.contains("src=\"http")
+    );
+
+    // The bundles stand on their own.
+    for language in ["c", "rust"] {
+        let bundle = folder.path().join("firmware").join(language);
+        let output = gyrogen(&["verify", text(&bundle)]);
+        assert_eq!(output.status.code(), Some(0), "{language}");
+    }
+
+    // The record of the own run, read back as a measured one, gives the same compensation.
+    let design = folder.path().join("quadratic.toml");
+    std::fs::write(&design, "[fit]\norder = 2\n").expect("a design");
+    let again = folder.path().join("again");
+    let summary_again = run(
+        Some(&design),
+        Some(&folder.path().join("record.csv")),
+        &again,
+    );
+    assert_eq!(
+        summary["fit"]["coefficients_raw"],
+        summary_again["fit"]["coefficients_raw"]
+    );
+    let apart = fixed - number(&summary_again, "after.fixed.drift_pp_dps");
+    assert!(apart.abs() < 0.02, "{apart}");
+}
+
+#[test]
+fn the_same_run_gives_the_same_bytes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let of = |name: &str| {
+        let out = folder.path().join(name);
+        let mut summary = run(None, None, &out);
+        // The only thing that a second run may change.
+        summary["seconds"] = Value::Null;
+        let read = |file: &str| std::fs::read(out.join(file)).expect("a file");
+        (
+            summary,
+            read("record.csv"),
+            read("firmware/c/gyro.c"),
+            read("firmware/rust/src/lib.rs"),
+        )
+    };
+    assert_eq!(of("one"), of("two"));
+}
+
+/// Records of real chips, where the shared data is beside the project: the held-out error is no worse
+/// than the table in its README (polynomials of degree 1 to 5, both autopilots' cubics).
+#[test]
+fn real_chips_records_become_firmware() {
+    let data = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
+    if !data.is_dir() {
+        println!("no shared data here: nothing compared");
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    for (file, axis, best) in [
+        ("lego_hub_rb.csv", "x", 0.02655),
+        ("lego_hub_rb.csv", "y", 0.02655),
+        ("lego_hub_rb.csv", "z", 0.02145),
+        ("lego_hub_rx.csv", "x", 0.01725),
+        ("lego_hub_rx.csv", "y", 0.01985),
+        ("lego_hub_rx.csv", "z", 0.02235),
+    ] {
+        let design = folder.path().join("design.toml");
+        let mapping = format!(
+            "[record]\nrow_period_s = 15\n[record.columns]\nrate_out_dps = \"gyro_{axis}_dps\"\n\
+             die_degc = \"temperature_degc\"\n"
+        );
+        std::fs::write(&design, mapping).expect("a design");
+        let summary = run(
+            Some(&design),
+            Some(&data.join(file)),
+            &folder.path().join("out"),
+        );
+        let heldout = number(&summary, "fit.heldout_rms_dps");
+        assert!(heldout <= best, "{file} {axis}: {heldout}");
+        assert_eq!(number(&summary, "equivalence.mismatches"), 0.0);
+        let fixed = number(&summary, "after.fixed.rms_dps");
+        assert!((fixed / number(&summary, "after.float.rms_dps") - 1.0).abs() < 0.01);
+        // The bit-accurate compensation leaves what the fit leaves.
+        let left = fixed / number(&summary, "fit.in_sample_rms_dps");
+        assert!((left - 1.0).abs() < 0.02, "{file} {axis}: {left}");
+    }
+}
+
+#[test]
+fn init_writes_a_design_that_runs_and_never_overwrites() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let design = folder.path().join("design.toml");
+    assert_eq!(gyrogen(&["init", text(&design)]).status.code(), Some(0));
+    let before = std::fs::read(&design).expect("the design");
+    let second = gyrogen(&["init", text(&design)]);
+    assert_eq!(second.status.code(), Some(2));
+    assert_eq!(std::fs::read(&design).expect("the design"), before);
+    let out = folder.path().join("emitted");
+    let emit = ["emit", text(&design), "--lang", "c", "--out", text(&out)];
+    assert_eq!(gyrogen(&emit).status.code(), Some(0));
+}
+
+/// What cannot be used ends with status 2, says what to do, and writes nothing.
+#[test]
+fn unusable_input_writes_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).expect("a file");
+        path
+    };
+    let good = "time_s,phase_rad,rate_out_dps\n".to_owned()
+        + &(0..40)
+            .map(|k| format!("{k},{},{}\n", -1.5 - 0.01 * f64::from(k), k))
+            .collect::<String>();
+    let record = write("good.csv", &good);
+    let backwards = write("backwards.csv", &good.replace("\n20,", "\n2,"));
+    let no_rate = write("no_rate.csv", &good.replace("rate_out_dps", "rate"));
+    let short = write("short.csv", "time_s,phase_rad,rate_out_dps\n0,-1,2\n");
+    let bad_cell = write("bad_cell.csv", &good.replace("-1.6", "minus"));
+    let degrees = write("order.toml", "[fit]\norder = 99\n");
+    let unknown = write("unknown.toml", "[fitt]\norder = 2\n");
+    let other = write(
+        "other.toml",
+        "[compensation]\ninput = \"die_degc\"\ninput_format = \"Q8.8\"\nrate_input_format = \"Q12.20\"\n\
+         coefficients_raw = [1]\ncoefficient_format = \"Q12.20\"\naccumulator = \"Q13.27\"\n\
+         rate_full_scale_dps = 1\noutput = \"Q12.20\"\n",
+    );
+    let small = write(
+        "small.toml",
+        "[compensation]\ninput = \"phase\"\ncoefficients_raw = [1]\ncoefficient_format = \"Q2.20\"\n\
+         accumulator = \"Q13.27\"\nrate_full_scale_dps = 2048\noutput = \"Q12.12\"\n",
+    );
+    let missing = folder.path().join("missing.csv");
+    for (design, record, words) in [
+        (None, &backwards, "backwards.csv:22:1"),
+        (None, &no_rate, "rate_out_dps"),
+        (None, &short, "short.csv"),
+        (None, &bad_cell, "bad_cell.csv:12:4"),
+        (None, &missing, "missing.csv"),
+        (Some(&degrees), &record, "order.toml:2:9"),
+        (Some(&unknown), &record, "unknown.toml:1:"),
+        (Some(&other), &record, "die_degc"),
+        (Some(&small), &record, "integer bits"),
+    ] {
+        let out = folder.path().join("out");
+        let mut arguments = vec!["run"];
+        arguments.extend(design.map(|d: &PathBuf| text(d)));
+        arguments.extend(["--record", text(record), "--out", text(&out)]);
+        let output = gyrogen(&arguments);
+        let talk = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{words}: {talk}");
+        assert!(talk.contains(words), "{words}: {talk}");
+        assert!(
+            talk.contains("help:") && !talk.contains("panicked"),
+            "{talk}"
+        );
+        assert!(!out.exists(), "{words}: something was written");
+    }
+}
