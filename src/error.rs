@@ -19,7 +19,7 @@ pub enum Error {
 }
 
 impl Error {
-    /// The exit status of the process (`contracts/cli.md`): 1 = a check does not hold, 2 = the
+    /// The exit status of the process (`docs/manual.md`): 1 = a check does not hold, 2 = the
     /// input cannot be used.
     pub fn exit_status(&self) -> u8 {
         match self {
@@ -132,7 +132,7 @@ pub fn io_error(path: impl AsRef<Path>, doing: &str, e: &std::io::Error) -> Erro
     InputError::new(format!("cannot {doing}: {e}"))
         .in_file(path)
         .help(match e.kind() {
-            std::io::ErrorKind::NotFound => "check the path, or make the folder first",
+            std::io::ErrorKind::NotFound => "check the path",
             std::io::ErrorKind::PermissionDenied => "check the permissions",
             _ => "check the path and the disk",
         })

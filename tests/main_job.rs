@@ -175,6 +175,59 @@ fn init_writes_a_design_that_runs_and_never_overwrites() {
     assert_eq!(gyrogen(&emit).status.code(), Some(0));
 }
 
+/// A rate that was not measured in some rows counts as none, and the fitted design reproduces the
+/// firmware.
+#[test]
+fn gaps_in_the_applied_rate_and_the_fitted_design() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let record = folder.path().join("record.csv");
+    let mut csv = String::from("time_s,die_degc,rate_out_dps,rate_dps\n");
+    for k in 0..60 {
+        let t = 20.0 + 0.5 * f64::from(k);
+        let applied = if k % 3 == 0 {
+            String::new()
+        } else {
+            "1.5".to_owned()
+        };
+        let rate = if k % 3 == 0 { 0.0 } else { 1.5 };
+        let noise = 0.01 * f64::from(k * 7919 % 13 - 6);
+        csv += &format!("{k},{t},{},{applied}\n", 0.3 + 0.02 * t + rate + noise);
+    }
+    std::fs::write(&record, csv).expect("a record");
+    let out = folder.path().join("out");
+    let summary = run(None, Some(&record), &out);
+    assert_eq!(number(&summary, "equivalence.mismatches"), 0.0);
+    assert!(number(&summary, "after.fixed.rms_dps") < 0.1);
+    assert!(number(&summary, "before.rms_dps") > 0.5);
+
+    let again = folder.path().join("again");
+    let design = out.join("design.toml");
+    let emit = [
+        "emit",
+        text(&design),
+        "--lang",
+        "c",
+        "--part",
+        "compensation",
+        "--out",
+        text(&again),
+    ];
+    assert_eq!(gyrogen(&emit).status.code(), Some(0));
+    let body = |path: PathBuf| {
+        let text = std::fs::read_to_string(path).expect("C");
+        text.lines().skip(1).map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert_eq!(
+        body(again.join("gyro.c")),
+        body(out.join("firmware/c/gyro.c"))
+    );
+
+    // Its thermometer is not what the own thermal run has.
+    let own = gyrogen(&["run", text(&design), "--out", text(&again)]);
+    assert_eq!(own.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&own.stderr).contains("--record"));
+}
+
 /// What cannot be used ends with status 2, says what to do, and writes nothing.
 #[test]
 fn unusable_input_writes_nothing() {

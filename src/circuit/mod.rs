@@ -11,7 +11,7 @@
 //! ```
 //!
 //! [`chain`] wires the blocks; [`engine`] runs a chain in the arithmetic and the lanes that fit it.
-//! The behaviour is that of `contracts/detection-chain.md`, step by step.
+//! The behaviour is that of `docs/manual.md`, step by step.
 
 pub mod amplitude_loop;
 pub mod chain;

@@ -1,7 +1,7 @@
 //! The command line, one file a subcommand: parse, call the library, print.
 //!
 //! Results go to stdout or to files, talk to stderr. Exit status 0 = done and every check holds,
-//! 1 = a check does not hold, 2 = the input cannot be used (`contracts/cli.md`).
+//! 1 = a check does not hold, 2 = the input cannot be used (`docs/manual.md`).
 
 mod emit;
 mod init;

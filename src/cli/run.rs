@@ -51,6 +51,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if let Some(record) = &outcome.parts.record_csv {
         crate::output::write_whole(&out.join("record.csv"), record.as_bytes())?;
     }
+    let fitted = job::fitted_design::text(&outcome.parts.design);
+    crate::output::write_whole(&out.join("design.toml"), fitted.as_bytes())?;
     crate::output::write_whole(&out.join("report.html"), html.as_bytes())?;
     crate::output::write_whole(&out.join("summary.json"), json.as_bytes())?;
     match arguments.format {
@@ -107,6 +109,9 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
         s.fit.heldout_rms_dps,
         s.fit.noise_floor_rms_dps
     );
+    for chosen in &s.chosen {
+        println!("chosen: {chosen}");
+    }
     println!(
         "budget: firmware within {:.5} deg/s of the fitted polynomial (bound); \
          calibration and fit {:.4} deg/s (estimate)",

@@ -1,5 +1,5 @@
 //! The declared bias model, fitted: a polynomial in the thermometer's own reading
-//! (`contracts/record.md` section 1; eq. 9 of the seed paper where the thermometer is the phase).
+//! (`docs/manual.md`, "Thermal records"; eq. 9 of the seed paper where the thermometer is the phase).
 
 use super::checks::{self, Checked};
 use super::folds::{self, Sample};

@@ -1,4 +1,4 @@
-//! `[circuit]` and `[compensation]`: the keys of `contracts/detection-chain.md`, each with its
+//! `[circuit]` and `[compensation]`: the keys of `docs/manual.md`, each with its
 //! range.
 
 use super::keys::{self, THERMOMETERS};

@@ -16,6 +16,14 @@ const KEYWORDS: &str = " \
     switch thread_local trait true try type typedef typeof typeof_unqual union unsafe unsigned \
     unsized use virtual void volatile where while yield ";
 
+/// Names whose C type `NAME_t`, or whose Rust crate, exists already.
+const TAKEN: &str = " \
+    alloc clock core div double_ fenv float_ imaxdiv int16 int32 int64 int8 int_fast16 int_fast32 \
+    int_fast64 int_fast8 int_least16 int_least32 int_least64 int_least8 intmax intptr ldiv lldiv \
+    max_align mbstate off proc_macro ptrdiff size ssize std test time uint16 uint32 uint64 uint8 \
+    uint_fast16 uint_fast32 uint_fast64 uint_fast8 uint_least16 uint_least32 uint_least64 \
+    uint_least8 uintmax uintptr wchar wint ";
+
 /// Reads `name`: a C identifier, as it is the prefix of everything that is emitted.
 pub(super) fn name(value: Value) -> Result<String> {
     let name = value.text("the design's name")?;
@@ -27,6 +35,8 @@ pub(super) fn name(value: Value) -> Result<String> {
         "begins with an underscore, which C reserves"
     } else if KEYWORDS.contains(&format!(" {name} ")) {
         "is a keyword of C or Rust"
+    } else if TAKEN.contains(&format!(" {name} ")) {
+        "is the name of a standard type or crate"
     } else if name.starts_with(|c: char| c.is_ascii_digit())
         || !name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_')
     {
@@ -142,7 +152,10 @@ fn effects(gyro: &Table, base: Option<&Gyro>) -> Result<Effects> {
             v.real(Real::Celsius, "the crossing's temperature in degC")
         })?,
         half_width_k: t.take("half_width_k", base.map(|m| m.half_width_k), |v| {
-            v.real(Real::Positive, "half the width at half maximum in K")
+            v.real(
+                Real::Positive,
+                "the distance from the centre to each extreme in K",
+            )
         })?,
     };
     Ok(Effects {

@@ -1,5 +1,5 @@
 //! The 127-bit rule: every exact intermediate of up to 127 bits is supported, and a design that
-//! can need more is refused with the sum that shows it (`contracts/detection-chain.md`).
+//! can need more is refused with the sum that shows it (`docs/manual.md`).
 //!
 //! Bits are those of a two's-complement number, counted on the formats and never on ranges:
 //! - a product has the sum of its operands' bits;

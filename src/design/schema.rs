@@ -1,5 +1,5 @@
 //! The design as the program sees it. The keys of `[circuit]` and `[compensation]` are those of
-//! `contracts/detection-chain.md`; their meaning is stated there and only summarised here.
+//! `docs/manual.md`; their meaning is stated there and only summarised here.
 
 use crate::numeric::format::{Format, Quantizer, Rounding};
 use std::collections::BTreeMap;

@@ -68,7 +68,7 @@ impl Bundle {
             .compensation
             .as_ref()
             .is_none_or(|c| c.input == CompensationInput::Phase);
-        let has_chain = part != Part::Compensation && on_phase;
+        let has_chain = part == Part::Tables || part == Part::Chain && on_phase;
         let program = if has_chain {
             engine::trace(design)
         } else {

@@ -167,6 +167,7 @@ fn sources(view: &View, part: Part, language: Language) -> Result<Vec<EmittedFil
     let mut files = Vec::new();
     for (path, text) in pages {
         let text = text.map_err(|e| InputError::new(format!("cannot print {path}: {e}")))?;
+        let text = text.trim_end().to_owned() + "\n";
         files.push(EmittedFile { path, text });
     }
     Ok(files)

@@ -3,7 +3,7 @@
 use super::bundle::{Bundle, Part};
 use super::files::EmittedFile;
 use super::views::{FunctionView, Language, TableView};
-use crate::design::Design;
+use crate::design::{CompensationInput, Design};
 use crate::numeric::format::Overflow;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -144,16 +144,29 @@ pub fn facts(design: &Design, bundle: &Bundle) -> Vec<String> {
             ),
         ]);
         if let Some(l) = &c.phase_loop {
-            facts.push(format!("phase loop {l:?}"));
+            facts.push(format!(
+                "phase loop: setpoint {}, proportional {} >> {}, integral {} >> {}, integrator {} bits",
+                l.setpoint_raw,
+                l.proportional.raw,
+                l.proportional.shift,
+                l.integral.raw,
+                l.integral.shift,
+                l.integrator_bits
+            ));
         }
         if let Some(l) = &c.amplitude_loop {
-            facts.push(format!("amplitude loop {l:?}"));
+            facts.push(format!(
+                "amplitude loop: setpoint {}, error >> {}, integrator >> {} from {}, gain {} bits",
+                l.setpoint_raw, l.error_shift, l.integrator_shift, l.initial_raw, l.gain_bits
+            ));
         }
     }
     if let Some(k) = &design.compensation {
         facts.push(format!(
-            "compensation input {:?}, coefficients {:?} {}",
-            k.input, k.coefficients_raw, k.coefficient_format
+            "compensation: input {}, coefficients {:?} {}, lowest order first",
+            input(&k.input),
+            k.coefficients_raw,
+            k.coefficient_format
         ));
         facts.push(format!(
             "accumulator {}, output {}, rate full scale {} deg/s",
@@ -173,6 +186,17 @@ pub fn facts(design: &Design, bundle: &Bundle) -> Vec<String> {
         );
     }
     facts
+}
+
+/// A compensation's input in words.
+fn input(input: &CompensationInput) -> String {
+    match input {
+        CompensationInput::Phase => "phase, p in half turns".into(),
+        CompensationInput::Channel(c) => format!(
+            "{} {}, p = (raw - {}) * 2^-{}",
+            c.column, c.format, c.offset_raw, c.scale_bits
+        ),
+    }
 }
 
 impl Manifest {
@@ -229,6 +253,7 @@ impl Manifest {
             }),
             faults: casts
                 .filter(|(_, cast)| cast.overflow == Some(Overflow::Error))
+                .filter(|(k, _)| !bundle.program.is_proved_in_range(*k))
                 .map(|(k, cast)| FaultEntry {
                     number: k + 1,
                     node: cast.label.to_string(),

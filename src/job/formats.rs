@@ -67,11 +67,9 @@ pub fn column_of(compensation: &Compensation) -> &str {
 /// # Errors
 /// Ranges that no word holds.
 pub fn fill(design: &mut Design, fit: &BaselineFit, record: &ThermalRecord) -> Result<Vec<String>> {
-    let fits = design
-        .compensation
-        .as_ref()
-        .is_some_and(|c| column_of(c) == fit.thermometer);
-    if fits {
+    let own = design.compensation_is_own;
+    let usable = |c: &Compensation| column_of(c) == fit.thermometer && (own || holds(c, fit));
+    if design.compensation.as_ref().is_some_and(usable) {
         return Ok(Vec::new());
     }
     let rate = record.column("rate_out_dps").unwrap_or(&[]);
@@ -126,6 +124,15 @@ pub fn fill(design: &mut Design, fit: &BaselineFit, record: &ThermalRecord) -> R
     ));
     design.compensation = Some(compensation);
     Ok(said)
+}
+
+/// True if the formats hold every coefficient of the fit.
+fn holds(c: &Compensation, fit: &BaselineFit) -> bool {
+    let (offset, scale) = super::coefficients::variable(c);
+    let exact = fit.scaled_to(offset, scale);
+    let format = c.coefficient_format;
+    let fits = |v: &f64| format.contains((v / format.lsb()).round() as i128);
+    exact.len() <= 16 && exact.iter().all(fits)
 }
 
 /// The narrowest signed format of `bits` bits whose values reach `peak`.

@@ -25,7 +25,13 @@ pub fn points(
     let thermometer = record.column(&fit.thermometer).unwrap_or(&[]);
     let rate_out = record.column("rate_out_dps").unwrap_or(&[]);
     let applied = record.column("rate_dps");
-    let applied_at = |row: usize| applied.map_or(0.0, |a| a[row]);
+    // A rate that was not measured counts as none, as in the fit.
+    let applied_at = |row: usize| {
+        applied
+            .map(|a| a[row])
+            .filter(|v| v.is_finite())
+            .unwrap_or(0.0)
+    };
     let format = rate_format(design, c);
     check_range(design, c, format, record, rate_out)?;
 

@@ -5,11 +5,13 @@
 //! [`own_run`] is the design's own thermal run through the circuit, [`from_record`] a measured
 //! record through the compensation alone; [`formats`] chooses formats that the design leaves open,
 //! [`coefficients`] rounds the fit into them, [`budget`] adds up what each step costs; [`firmware`]
-//! emits, builds and compares; [`outcome`] is what comes of it.
+//! emits, builds and compares; [`fitted_design`] is the
+//! design that reproduces it; [`outcome`] is what comes of it.
 
 pub mod budget;
 pub mod coefficients;
 pub mod firmware;
+pub mod fitted_design;
 pub mod formats;
 pub mod from_record;
 pub mod outcome;

@@ -87,6 +87,8 @@ pub struct Summary {
     pub ratio: f64,
     /// The fit.
     pub fit: FitSummary,
+    /// Formats that were chosen, with the reason; empty if the design's own were used.
+    pub chosen: Vec<String>,
     /// What each step costs.
     pub budget: Budget,
     /// Emitted code against the model.
@@ -236,6 +238,7 @@ impl Outcome {
                 noise_floor_rms_dps: fit.noise_floor_rms_dps,
                 outliers: fit.outliers.len(),
             },
+            chosen: parts.chosen.clone(),
             budget: parts.budget.clone(),
             equivalence: Equivalence {
                 compared: parts.compared.iter().map(|c| c.compared).sum(),

@@ -5,7 +5,7 @@ use super::outcome::Point;
 use super::{clamped_bias, compensation, warning};
 use crate::circuit::engine::{self, ArithmeticKind, Rows};
 use crate::closure::BaselineFit;
-use crate::design::Design;
+use crate::design::{CompensationInput, Design};
 use crate::error::{Error, InputError, Result};
 use crate::numeric::format::pow2;
 use crate::plant::{Reading, Sampling, ThermalPlant};
@@ -52,6 +52,20 @@ impl OwnRun {
                 phase_bits: circuit.nco.phase_bits,
             },
         );
+        let own = design
+            .compensation
+            .as_ref()
+            .filter(|_| design.compensation_is_own);
+        if let Some(c) = own
+            && c.input != CompensationInput::Phase
+        {
+            return Err(InputError::new(format!(
+                "the compensation's input is {}, the own thermal run's thermometer is the drive phase",
+                super::formats::column_of(c)
+            ))
+            .help("give a measured record with --record, or set compensation.input = \"phase\"")
+            .into());
+        }
         let ratio = circuit.decimator.ratio as usize;
         let memory = (circuit.decimator.stages * circuit.decimator.differential_delay) as usize;
         let settling_rows = memory + SETTLING_ROWS;
@@ -87,7 +101,7 @@ impl OwnRun {
         Ok(own)
     }
 
-    /// The run as a thermal record (`contracts/record.md`): what the closure sees of it.
+    /// The run as a thermal record (`docs/manual.md`): what the closure sees of it.
     pub fn record_csv(&self) -> String {
         let mut text = String::from("time_s,chamber_degc,phase_rad,rate_out_dps\n");
         for (reading, (phase, rate)) in self.readings.iter().zip(&self.measured) {

@@ -1,4 +1,4 @@
-//! The one quantiser: `cast(v, format, rounding, overflow)` of `contracts/detection-chain.md`.
+//! The one quantiser: `cast(v, format, rounding, overflow)` of `docs/manual.md`.
 //!
 //! A [`Cast`] is compiled once, when the chain is built, from the fraction bits before it and the
 //! format after it; [`Kernel`] is what [`super::fixed::Fixed`] then runs on every word: one

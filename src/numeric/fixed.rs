@@ -18,7 +18,7 @@ pub struct Overflowed {
     pub cast: usize,
     /// The exact word before the overflow step, raw.
     pub value: i128,
-    /// What went into the node, raw; see `contracts/detection-chain.md`.
+    /// What went into the node, raw; see `docs/manual.md`.
     pub operands: [Option<i128>; 2],
     /// The first operand is a coefficient, aligned by this many bits.
     pub coefficient_shift: Option<u32>,

@@ -1,5 +1,5 @@
 //! A capture: one row of ADC codes (drive, sense) a sample, read as a stream from CSV or NPY
-//! (`contracts/record.md` section 2, `contracts/detection-chain.md`).
+//! (`docs/manual.md` section 2, `docs/manual.md`).
 //!
 //! The file is never held whole: a reader needs some hundred KiB and the caller's block.
 

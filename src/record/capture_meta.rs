@@ -1,5 +1,5 @@
 //! What a capture says of itself: the comment lines `# key = value` of a CSV file, or the side-car
-//! TOML of an NPY file (`contracts/record.md`, section 2).
+//! TOML of an NPY file (`docs/manual.md`, "Replay and captures").
 
 use crate::error::{InputError, Result, io_error};
 use std::io::Read;

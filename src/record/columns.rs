@@ -1,4 +1,4 @@
-//! Which column of a file plays which part (`contracts/record.md` section 1).
+//! Which column of a file plays which part (`docs/manual.md`, "Thermal records").
 
 use super::cells::{self, Cell};
 use super::warning::Warning;

@@ -1,4 +1,4 @@
-//! Measured records: thermal records and captures (`contracts/record.md`).
+//! Measured records: thermal records and captures (`docs/manual.md`).
 //!
 //! [`thermal`] reads a thermal record; `cells` cuts its lines and reads its numbers, [`columns`]
 //! says which column plays which part, `clock` puts the rows in time, `plausibility` and `frozen`

@@ -1,4 +1,4 @@
-//! The output of `replay` (`contracts/detection-chain.md`, "Output of `replay`"): rows of numbers
+//! The output of `replay` (`docs/manual.md`, "Replay and captures"): rows of numbers
 //! to CSV or NPY, in the file whole or not at all.
 
 use super::npy_header;

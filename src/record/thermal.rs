@@ -1,4 +1,4 @@
-//! The thermal record: one row per averaged reading (`contracts/record.md` section 1).
+//! The thermal record: one row per averaged reading (`docs/manual.md`, "Thermal records").
 
 use super::cells::{self, BadNumber};
 use super::columns::{self, Line, Roles};
@@ -73,7 +73,7 @@ impl ThermalRecord {
 /// Reads a thermal record.
 ///
 /// # Errors
-/// What `contracts/record.md` calls unusable, with line, column and remedy; see the table in the
+/// What `docs/manual.md` calls unusable, with line, column and remedy; see the table in the
 /// tests. What is usable but implausible comes back as warnings.
 pub fn read(path: &Path, mapping: &RecordMapping) -> Result<(ThermalRecord, Vec<Warning>)> {
     let bytes = std::fs::read(path).map_err(|e| io_error(path, "read the record", &e))?;

@@ -1,0 +1,108 @@
+//! The design with the fitted compensation as a design file of its own: what reproduces the firmware.
+
+use crate::design::{Compensation, CompensationInput, Design};
+use crate::numeric::format::Quantizer;
+use std::fmt::Write as _;
+
+/// The text of the user's design (or of the default) with its `[compensation]` replaced by the one
+/// that was fitted.
+pub fn text(design: &Design) -> String {
+    let mut text = without_compensation(&design.source.text);
+    if let Some(c) = &design.compensation {
+        text = text.trim_end().to_owned();
+        text += "\n\n# Fitted; the calibrated range is clamp_raw.\n";
+        text += &compensation(c);
+    }
+    text
+}
+
+/// Cuts the table `[compensation]`, and its subtables, out of a design's text.
+fn without_compensation(text: &str) -> String {
+    let mut kept = String::new();
+    let mut inside = false;
+    for line in text.lines() {
+        let start = line.trim_start();
+        if start.starts_with('[') && !start.starts_with("[[") {
+            let name = start.trim_start_matches('[').trim_start();
+            let rest = name.strip_prefix("compensation");
+            let ends = |r: &str| r.trim_start().starts_with([']', '.']);
+            inside = rest.is_some_and(ends);
+        }
+        if !inside {
+            kept += line;
+            kept.push('\n');
+        }
+    }
+    kept
+}
+
+fn compensation(c: &Compensation) -> String {
+    let mut text = String::from("[compensation]\n");
+    match &c.input {
+        CompensationInput::Phase => text += "input = \"phase\"\n",
+        CompensationInput::Channel(channel) => {
+            _ = writeln!(text, "input = \"{}\"", channel.column);
+            _ = writeln!(text, "input_format = \"{}\"", channel.format);
+            _ = writeln!(text, "input_offset_raw = {}", channel.offset_raw);
+            _ = writeln!(text, "input_scale_bits = {}", channel.scale_bits);
+            _ = writeln!(text, "rate_input_format = \"{}\"", channel.rate_format);
+        }
+    }
+    _ = writeln!(text, "coefficients_raw = {:?}", c.coefficients_raw);
+    _ = writeln!(text, "coefficient_format = \"{}\"", c.coefficient_format);
+    _ = writeln!(text, "accumulator = {}", quantizer(c.accumulator));
+    _ = writeln!(text, "rate_full_scale_dps = {:?}", c.rate_full_scale_dps);
+    _ = writeln!(text, "output = {}", quantizer(c.output));
+    if let Some((low, high)) = c.clamp_raw {
+        _ = writeln!(text, "clamp_raw = [{low}, {high}]");
+    }
+    text
+}
+
+fn quantizer(q: Quantizer) -> String {
+    format!(
+        "{{ format = \"{}\", rounding = \"{}\", overflow = \"{}\" }}",
+        q.format,
+        q.rounding.name(),
+        q.overflow.name()
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::design::{ChannelInput, reader};
+    use crate::numeric::format::Format;
+
+    #[test]
+    fn a_fitted_design_reads_back_as_itself() {
+        let mut design = reader::read(None).expect("the default");
+        let mut inputs = vec![CompensationInput::Phase];
+        inputs.push(CompensationInput::Channel(ChannelInput {
+            column: "die_degc".into(),
+            format: Format::q(8, 8),
+            offset_raw: 11674,
+            scale_bits: 13,
+            rate_format: Format::q(4, 28),
+        }));
+        for input in inputs {
+            if let Some(c) = &mut design.compensation {
+                c.input = input;
+                c.coefficients_raw = vec![1, -2, 3, -4];
+                c.clamp_raw = Some((-5, 6));
+            }
+            let back = reader::parse(&text(&design), None).expect("a design");
+            assert_eq!(back.compensation, design.compensation);
+            assert_eq!(back.circuit, design.circuit);
+        }
+    }
+
+    #[test]
+    fn a_small_design_gets_the_table_appended() {
+        let mut design = reader::parse("[fit]\norder = 3\n", None).expect("a design");
+        design.compensation_is_own = true;
+        let back = reader::parse(&text(&design), None).expect("a design");
+        assert_eq!(back.compensation, design.compensation);
+        assert_eq!(back.fit, design.fit);
+    }
+}
