@@ -15,11 +15,13 @@
 #endif
 
 
-/* floor(a / 2^n), n < 32 */
+/* floor(a / 2^n), n < 32: a negative word is shifted as its complement -a - 1. */
 static inline int32_t gyro_asr_32(int32_t a, uint32_t n)
 {
-    return (a >= 0) ? (int32_t)((uint32_t)a >> n)
-                    : ((-(int32_t)((uint32_t)(-(a + 1)) >> n)) - 1);
+    const uint32_t bits = (uint32_t)((a >= 0) ? a : (-(a + 1)));
+    const uint32_t shifted = bits >> n;
+    const int32_t word = (int32_t)shifted;
+    return (a >= 0) ? word : ((-word) - 1);
 }
 
 /* The bits up to and with `sign` as a two's-complement number. */
@@ -27,7 +29,9 @@ static inline int32_t gyro_sign_extend_32(uint32_t a, uint32_t sign)
 {
     const uint32_t below = (uint32_t)(sign - UINT32_C(1));
     const uint32_t low = a & below;
-    return ((a & sign) != UINT32_C(0)) ? ((-(int32_t)(below - low)) - 1) : (int32_t)low;
+    const uint32_t complement = below - low;
+    const int32_t word = (int32_t)complement;
+    return ((a & sign) != UINT32_C(0)) ? ((-word) - 1) : (int32_t)low;
 }
 
 static inline int32_t gyro_clamp_32(int32_t a, int32_t low, int32_t high)
@@ -45,11 +49,13 @@ static inline int32_t gyro_check_32(int32_t a, int32_t low, int32_t high,
     return gyro_clamp_32(a, low, high);
 }
 
-/* floor(a / 2^n), n < 64 */
+/* floor(a / 2^n), n < 64: a negative word is shifted as its complement -a - 1. */
 static inline int64_t gyro_asr_64(int64_t a, uint32_t n)
 {
-    return (a >= 0) ? (int64_t)((uint64_t)a >> n)
-                    : ((-(int64_t)((uint64_t)(-(a + 1)) >> n)) - 1);
+    const uint64_t bits = (uint64_t)((a >= 0) ? a : (-(a + 1)));
+    const uint64_t shifted = bits >> n;
+    const int64_t word = (int64_t)shifted;
+    return (a >= 0) ? word : ((-word) - 1);
 }
 
 /* The bits up to and with `sign` as a two's-complement number. */
@@ -57,7 +63,9 @@ static inline int64_t gyro_sign_extend_64(uint64_t a, uint64_t sign)
 {
     const uint64_t below = (uint64_t)(sign - UINT64_C(1));
     const uint64_t low = a & below;
-    return ((a & sign) != UINT64_C(0)) ? ((-(int64_t)(below - low)) - 1) : (int64_t)low;
+    const uint64_t complement = below - low;
+    const int64_t word = (int64_t)complement;
+    return ((a & sign) != UINT64_C(0)) ? ((-word) - 1) : (int64_t)low;
 }
 
 static inline int64_t gyro_clamp_64(int64_t a, int64_t low, int64_t high)

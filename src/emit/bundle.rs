@@ -1,7 +1,8 @@
 //! What is printed, apart from the language: the program, lowered, with its states and initial
 //! values under checked names.
 
-use super::lower::{Lowered, Type, lower, residue_type, word_type};
+use super::lower::lower;
+use super::machine::{Lowered, Type, residue_type, word_type};
 use crate::circuit::compensation::{Bias, Rate};
 use crate::circuit::engine;
 use crate::design::{CompensationInput, Design};

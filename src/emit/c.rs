@@ -3,7 +3,7 @@
 //! through helpers of the emitted `*_arith.h`.
 
 use super::bundle::Bundle;
-use super::lower::{Expr, Lowered, Statement, Type, Typed, Value, Width};
+use super::machine::{Expr, Lowered, Statement, Type, Typed, Value, Width};
 use crate::numeric::trace::ir::{Function, Interval};
 use std::fmt::Write as _;
 
@@ -88,6 +88,9 @@ pub fn definition(bundle: &Bundle, number: usize) -> String {
     };
     let mut text = signature(bundle, number);
     text.push_str("\n{\n");
+    for k in printer.lowered.unused_inputs() {
+        _ = writeln!(text, "    (void){};", printer.function.inputs[k].0.name);
+    }
     printer.statements(&printer.lowered.body, 1, &mut text);
     match printer.lowered.outputs.as_slice() {
         [] => {}

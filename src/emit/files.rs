@@ -1,7 +1,7 @@
 //! The files of a firmware bundle: sources, harness, self-test, vectors, manifest.
 
 use super::bundle::{Bundle, Part};
-use super::lower::{Type, Width};
+use super::machine::{Type, Width};
 use super::manifest::{self, Manifest};
 use super::views::{self, FunctionView, Language, StateView, StructView, TableView, mix};
 use super::{c, rust};
@@ -20,10 +20,19 @@ use std::path::Path;
 pub const SEED: u64 = 2004;
 /// Draws for each function in the self-test.
 const SELFTEST_DRAWS: u32 = 256;
-/// Decimation periods in the self-test and in the vectors.
+/// Decimation periods in the self-test, and least number of them in the vectors.
 const PERIODS: usize = 64;
+/// ADC samples of the chain's vectors, where the number of periods allows it.
+const VECTOR_SAMPLES: usize = 1 << 14;
+/// Most decimation periods in the vectors.
+const MOST_PERIODS: usize = 512;
+/// Words among which the vectors at ties and limits are searched.
+const CANDIDATES: usize = 1 << 16;
 /// Random vectors of each function.
 const VECTORS: usize = 1024;
+
+/// Random inputs among which those are searched that show a coefficient's last bit.
+const SEARCHED: usize = 1 << 19;
 
 /// A file of a bundle.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -296,7 +305,7 @@ fn initial(bundle: &Bundle, language: Language) -> Vec<String> {
 
 /// Types in which the emitted Rust checks for faults.
 fn checks(bundle: &Bundle) -> Vec<&'static str> {
-    use super::lower::{Expr, Statement};
+    use super::machine::{Expr, Statement};
     let mut types = Vec::new();
     for lowered in &bundle.lowered {
         for statement in &lowered.body {
@@ -387,8 +396,11 @@ fn vectors(design: &Design, bundle: &Bundle, models: &[Model]) -> Vec<EmittedFil
         header.push("fault");
         let mut text = header.join(",") + "\n";
         let mut inputs = stimulus::inputs(&model.inputs, VECTORS, SEED);
+        let candidates = stimulus::inputs(&model.inputs, CANDIDATES, SEED + 4);
+        inputs.extend(model.near_ties(&candidates));
+        inputs.extend(model.fault_edges(&candidates));
         if model.name == "bias" {
-            let candidates: Vec<i128> = stimulus::inputs(&model.inputs, 1 << 17, SEED + 1)
+            let candidates: Vec<i128> = stimulus::inputs(&model.inputs, SEARCHED, SEED + 1)
                 .into_iter()
                 .flatten()
                 .collect();
@@ -415,15 +427,12 @@ fn vectors(design: &Design, bundle: &Bundle, models: &[Model]) -> Vec<EmittedFil
 }
 
 fn chain_vectors(design: &Design, bundle: &Bundle) -> [EmittedFile; 2] {
-    let samples = PERIODS * bundle.ratio as usize;
-    // A little of every segment of the stimulus.
-    let (all_drive, all_sense) = stimulus::capture(design, 6 << 12, SEED);
-    let pick = |all: &[i32]| -> Vec<i32> {
-        (0..samples)
-            .map(|n| all[(n * all.len() / samples + n % 61) % all.len()])
-            .collect()
-    };
-    let (drive, sense) = (pick(&all_drive), pick(&all_sense));
+    // Long enough for the loops to reach their limits, where the periods are short.
+    let ratio = bundle.ratio as usize;
+    let periods = (VECTOR_SAMPLES / ratio).clamp(PERIODS, MOST_PERIODS);
+    let samples = periods * ratio;
+    let segment = periods.div_ceil(6) * ratio;
+    let (drive, sense) = stimulus::segments(design, samples, segment, SEED);
     let mut input = String::from("drive_code,sense_code\n");
     for (d, s) in drive.iter().zip(&sense) {
         input += &format!("{d},{s}\n");

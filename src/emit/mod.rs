@@ -1,4 +1,4 @@
-//! Firmware from the traced circuit: [`lower`] makes typed machine operations of the program,
+//! Firmware from the traced circuit: [`lower`] makes typed [`machine`] operations of the program,
 //! [`bundle`] gathers what is printed, [`c`] and [`rust`] spell it, [`files`] writes the bundle with
 //! its self-test, vectors and manifest.
 
@@ -6,6 +6,8 @@ pub mod bundle;
 pub mod c;
 pub mod files;
 pub mod lower;
+mod lower_cast;
+pub mod machine;
 pub mod manifest;
 pub mod rust;
 pub mod views;

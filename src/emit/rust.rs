@@ -2,7 +2,7 @@
 //! any build (wrapping operators where ranges prove that nothing wraps, checked table access).
 
 use super::bundle::Bundle;
-use super::lower::{Expr, Lowered, Statement, Type, Typed, Value, Width};
+use super::machine::{Expr, Lowered, Statement, Type, Typed, Value, Width};
 use crate::numeric::trace::ir::Function;
 use std::fmt::Write as _;
 
@@ -74,6 +74,9 @@ pub fn definition(bundle: &Bundle, number: usize) -> String {
     let result = result_type(bundle, number).map_or(String::new(), |t| format!(" -> {t}"));
     let name = &function.name;
     let mut text = format!("pub fn {name}({}){result} {{\n", parameters.join(", "));
+    for k in lowered.unused_inputs() {
+        _ = writeln!(text, "    let _ = {};", function.inputs[k].0.name);
+    }
     printer.statements(&lowered.body, 1, &mut text);
     match lowered.outputs.as_slice() {
         [] => {}

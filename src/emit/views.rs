@@ -1,7 +1,7 @@
 //! What the templates show: strings only, made from the bundle.
 
 use super::bundle::{Bundle, StateType};
-use super::lower::{Type, Width};
+use super::machine::{Type, Width};
 use super::{c, rust};
 use crate::numeric::trace::ir::Interval;
 

@@ -171,6 +171,15 @@ impl Cast {
         (self.wide.low, self.wide.high)
     }
 
+    /// The same cast with its rounding constant moved by `step`: damage that test vectors have to
+    /// find. `None` where there is no constant.
+    pub fn nudged(&self, step: i128) -> Option<Cast> {
+        let mut cast = self.clone();
+        cast.narrow.base = cast.narrow.base.plus(i64::low(step));
+        cast.wide.base = cast.wide.base.plus(i128::low(step));
+        ((1..127).contains(&self.shift) && self.rounding != Rounding::Floor).then_some(cast)
+    }
+
     /// Tells the cast what the ranges prove: that the value before the overflow step always lies
     /// within the limits, so that the step can go (and the whole cast, if it does not shift).
     pub fn prove_in_range(&mut self) {

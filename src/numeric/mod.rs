@@ -1,6 +1,6 @@
 //! Formats, rounding, overflow, and the arithmetics that the circuit is written over.
 //!
-//! [`format`] and [`cast`] say what a quantiser does; [`arithmetic`] is the interface of the
+//! [`mod@format`] and [`cast`] say what a quantiser does; [`arithmetic`] is the interface of the
 //! blocks; [`float`], [`fixed`] and [`trace`] implement it; [`constants`] decides the integers
 //! nearest to sines, arc tangents and the CORDIC gain.
 

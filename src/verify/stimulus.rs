@@ -80,7 +80,11 @@ pub fn inputs(ranges: &[Interval], random: usize, seed: u64) -> Vec<Vec<i128>> {
 /// Drive and sense codes: tones beside the NCO with noise, full-scale squares, constants at the
 /// ends, steps, and pure noise, in turn, `samples` in all.
 pub fn capture(design: &Design, samples: usize, seed: u64) -> (Vec<i32>, Vec<i32>) {
-    const SEGMENT: usize = 1 << 12;
+    segments(design, samples, 1 << 12, seed)
+}
+
+/// The same with segments of another length: at `samples / 6`, one of each kind.
+pub fn segments(design: &Design, samples: usize, length: usize, seed: u64) -> (Vec<i32>, Vec<i32>) {
     let format = design.circuit.adc.format;
     let range = Interval::new(format.min_raw(), format.max_raw());
     let (low, high) = (range.low as i32, range.high as i32);
@@ -90,7 +94,7 @@ pub fn capture(design: &Design, samples: usize, seed: u64) -> (Vec<i32>, Vec<i32
     let (mut drive, mut sense) = (Vec::with_capacity(samples), Vec::with_capacity(samples));
     let clip = |v: f64| (v.round() as i64).clamp(i64::from(low), i64::from(high)) as i32;
     for n in 0..samples {
-        let segment = n / SEGMENT;
+        let segment = n / length;
         let full = f64::from(high);
         let angle =
             std::f64::consts::TAU * (turns * n as f64 * (1.0 + 1e-5 * segment as f64)).fract();

@@ -15,11 +15,13 @@
 #endif
 
 {% for w in [32, 64] %}
-/* floor(a / 2^n), n < {{ w }} */
+/* floor(a / 2^n), n < {{ w }}: a negative word is shifted as its complement -a - 1. */
 static inline int{{ w }}_t {{ v.p }}_asr_{{ w }}(int{{ w }}_t a, uint32_t n)
 {
-    return (a >= 0) ? (int{{ w }}_t)((uint{{ w }}_t)a >> n)
-                    : ((-(int{{ w }}_t)((uint{{ w }}_t)(-(a + 1)) >> n)) - 1);
+    const uint{{ w }}_t bits = (uint{{ w }}_t)((a >= 0) ? a : (-(a + 1)));
+    const uint{{ w }}_t shifted = bits >> n;
+    const int{{ w }}_t word = (int{{ w }}_t)shifted;
+    return (a >= 0) ? word : ((-word) - 1);
 }
 
 /* The bits up to and with `sign` as a two's-complement number. */
@@ -27,7 +29,9 @@ static inline int{{ w }}_t {{ v.p }}_sign_extend_{{ w }}(uint{{ w }}_t a, uint{{
 {
     const uint{{ w }}_t below = (uint{{ w }}_t)(sign - UINT{{ w }}_C(1));
     const uint{{ w }}_t low = a & below;
-    return ((a & sign) != UINT{{ w }}_C(0)) ? ((-(int{{ w }}_t)(below - low)) - 1) : (int{{ w }}_t)low;
+    const uint{{ w }}_t complement = below - low;
+    const int{{ w }}_t word = (int{{ w }}_t)complement;
+    return ((a & sign) != UINT{{ w }}_C(0)) ? ((-word) - 1) : (int{{ w }}_t)low;
 }
 
 static inline int{{ w }}_t {{ v.p }}_clamp_{{ w }}(int{{ w }}_t a, int{{ w }}_t low, int{{ w }}_t high)

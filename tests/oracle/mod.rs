@@ -8,10 +8,12 @@
 //! `capture` make random inputs, `harness` runs the binary under test.
 #![allow(dead_code)]
 
+pub mod bundle;
 pub mod capture;
 pub mod cases;
 pub mod constants;
 pub mod design;
+pub mod edges;
 pub mod fixed;
 pub mod float;
 pub mod generate;
