@@ -89,13 +89,13 @@ pub fn choose(sample: &Sample, wanted: FitOrder, most: usize, blocks: &[Range<us
         ),
         FitOrder::Auto | FitOrder::ByRecord if smallest == best_order => (
             best_order,
-            format!("order {best_order} has the least held-out error, {best_rms:.3e} deg/s rms"),
+            format!("order {best_order} has the least held-out error, {best_rms:.4} deg/s rms"),
         ),
         FitOrder::Auto | FitOrder::ByRecord => (
             smallest,
             format!(
                 "order {smallest} is the smallest whose held-out error is within one standard \
-                 error of the least (order {best_order}, {best_rms:.3e} deg/s rms, {limit:.3e} \
+                 error of the least (order {best_order}, {best_rms:.4} deg/s rms, {limit:.4} \
                  with the standard error)"
             ),
         ),
@@ -107,7 +107,7 @@ pub fn choose(sample: &Sample, wanted: FitOrder, most: usize, blocks: &[Range<us
         && order != smallest
     {
         reason.push_str(&format!(
-            "; by held-out error it would be order {smallest} ({:.3e} deg/s rms against {:.3e})",
+            "; by held-out error it would be order {smallest} ({:.4} deg/s rms against {:.4})",
             results
                 .get(smallest)
                 .map_or(best_rms, |r| r.0.heldout_clean_rms_dps),

@@ -93,9 +93,9 @@ const BROKEN: &[Case] = &[
     ("[record]", "[record]\nthermometer = ¦\"die_deg\"", "`die_deg`", "did you mean `die_degc`?"),
     ("[record]", "[record]\ncolumns.agc = ¦\" \"", "names no column", "header"),
     ("[record]", "[record]\ncolumns.agc = \"a\"\ncolumns.quad_dps = ¦\"a\"", "the column that `agc` is read from", "of its own"),
-    ("order = 2", "order = ¦9", "0..=8", "auto"),
-    ("order = 2", "order = ¦\"best\"", "`best`", "`auto`"),
-    ("order = 2", "order = ¦\"2\"", "found the string", "`order = 2`"),
+    ("order = \"by_record\"", "order = ¦9", "0..=8", "auto"),
+    ("order = \"by_record\"", "order = ¦\"best\"", "`best`", "`auto`"),
+    ("order = \"by_record\"", "order = ¦\"2\"", "found the string", "`order = 2`"),
     ("heldout_blocks = 10", "heldout_blocks = ¦1", "2..=50", "cross-validation"),
 ];
 
@@ -140,7 +140,7 @@ fn extremes_inside_the_ranges_are_taken() {
             "rate_full_scale_dps = 0.0078125",
         ),
         ("seed = 20040024", "seed = 18446744073709551615"),
-        ("order = 2", "order = 0"),
+        ("order = \"by_record\"", "order = 0"),
         ("step_k = 5.0", "step_k = 70"),
     ] {
         parse(&mutated(old, new), None).unwrap_or_else(|e| panic!("{new}: {e}"));

@@ -170,7 +170,7 @@ fn channel(fit: &BaselineFit, rate_format: Format) -> Result<(CompensationInput,
     let half_range = (fit.half_span / lsb).max(1.0);
     let scale_bits = (half_range.log2().ceil() as u32).clamp(1, 64);
     let said = vec![format!(
-        "input {format} of {}: one LSB moves the bias by {:.2e} deg/s, the noise floor is {floor:.2e}",
+        "input {format} of {}: one LSB moves the bias by {:.6} deg/s, the noise floor is {floor:.6} deg/s",
         fit.thermometer,
         slope * lsb
     )];

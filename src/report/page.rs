@@ -1,0 +1,334 @@
+//! What the template prints: every number as text with its digits, every sentence put together.
+
+use super::Shown;
+use super::figures::{self, Figure};
+use super::tables;
+use super::text::{decimals_of, fixed, grouped, percent, significant};
+use crate::job::outcome::Drift;
+use askama::Template;
+
+/// The page.
+#[derive(Debug, Template)]
+#[template(path = "report/run.html")]
+pub struct Page {
+    /// The design's name.
+    pub name: String,
+    /// What came of it, in a sentence.
+    pub headline: String,
+    /// True if emitted code and model agree everywhere.
+    pub holds: bool,
+    /// What limits the result, in a sentence.
+    pub finding: String,
+    /// Drift by path: name, peak to peak, rms, share of before.
+    pub drift: Vec<[String; 4]>,
+    /// Largest distance of fixed and float, deg/s.
+    pub apart: String,
+    /// The figures.
+    pub figures: Vec<Figure>,
+    /// What, deg/s, output LSB, kind.
+    pub budget: Vec<[String; 4]>,
+    /// The sums in the same layout.
+    pub budget_sums: Vec<[String; 4]>,
+    /// The fit: name, value.
+    pub fit: Vec<[String; 2]>,
+    /// Orders that were tried.
+    pub orders: Vec<Order>,
+    /// Unit of the first column of coefficients.
+    pub unit: String,
+    /// The firmware's variable in words.
+    pub variable: String,
+    /// Format of the coefficients.
+    pub format: String,
+    /// Coefficients: order, physical, of the variable, raw, rounding error.
+    pub coefficients: Vec<[String; 5]>,
+    /// Formats: name, value.
+    pub formats: Vec<[String; 2]>,
+    /// Why they were chosen.
+    pub chosen: Vec<String>,
+    /// Emitted code against the model.
+    pub equivalence: Vec<Equivalent>,
+    /// Words and mismatches in all.
+    pub equivalence_sum: [String; 2],
+    /// Code, column, message.
+    pub warnings: Vec<[String; 3]>,
+    /// Name, value.
+    pub provenance: Vec<[String; 2]>,
+    /// Path, SHA-256.
+    pub emitted: Vec<[String; 2]>,
+    /// Where the guarantee stops.
+    pub limits: Vec<String>,
+}
+
+/// An order that was tried.
+#[derive(Debug)]
+pub struct Order {
+    /// The order.
+    pub order: usize,
+    /// Whether it is the one.
+    pub used: bool,
+    /// In-sample, held-out, held-out without spikes.
+    pub rms: [String; 3],
+}
+
+/// A line of the comparison.
+#[derive(Debug)]
+pub struct Equivalent {
+    /// Function, table or chain.
+    pub name: String,
+    /// `C`, `Rust`.
+    pub language: String,
+    /// How many.
+    pub inputs: String,
+    /// Whether those are all.
+    pub coverage: &'static str,
+    /// How many.
+    pub words: String,
+    /// How many.
+    pub mismatches: String,
+    /// Whether there are none.
+    pub same: bool,
+    /// In words.
+    pub first: String,
+}
+
+impl Page {
+    /// Formats everything.
+    pub fn new(shown: &Shown) -> Self {
+        let s = shown.summary;
+        Page {
+            name: shown.design.name.clone(),
+            headline: headline(shown),
+            holds: s.equivalence.mismatches == 0,
+            finding: finding(shown),
+            drift: drift(shown),
+            apart: significant(s.equivalence.fixed_minus_float_max_dps, 3),
+            figures: figures::all(shown),
+            budget: s
+                .budget
+                .lines
+                .iter()
+                .map(|l| budget_line(&l.what, l.dps, shown, l.kind))
+                .collect(),
+            budget_sums: vec![
+                budget_line("sum of the bounds", s.budget.bound_dps, shown, "bound"),
+                budget_line(
+                    "root sum square of the estimates",
+                    s.budget.estimate_dps,
+                    shown,
+                    "estimate",
+                ),
+            ],
+            fit: tables::fit(shown),
+            orders: tables::orders(shown),
+            unit: shown.fit.unit.to_owned(),
+            variable: tables::variable(shown),
+            format: s.fit.coefficient_format.clone(),
+            coefficients: tables::coefficients(shown),
+            formats: tables::formats(shown),
+            chosen: shown.chosen.to_vec(),
+            equivalence: equivalence(shown),
+            equivalence_sum: [
+                grouped(s.equivalence.compared),
+                grouped(s.equivalence.mismatches),
+            ],
+            warnings: s
+                .warnings
+                .iter()
+                .map(|w| {
+                    let column = w.column.clone().unwrap_or_else(|| "–".to_owned());
+                    [w.code.to_owned(), column, w.message.clone()]
+                })
+                .collect(),
+            provenance: provenance(shown),
+            emitted: s
+                .emitted
+                .iter()
+                .map(|e| [e.path.clone(), e.sha256.clone()])
+                .collect(),
+            limits: limits(shown),
+        }
+    }
+}
+
+/// "1 mismatch", "0 mismatches".
+fn mismatches(count: u64) -> String {
+    let plural = if count == 1 { "" } else { "es" };
+    format!("{} mismatch{plural}", grouped(count))
+}
+
+fn headline(shown: &Shown) -> String {
+    let s = shown.summary;
+    let (before, after) = (s.before.drift_pp_dps, s.after.fixed.drift_pp_dps);
+    // Three digits of the smaller figure, and as many decimals of the other.
+    let digits = 2.0 - before.min(after).max(f64::MIN_POSITIVE).log10().floor();
+    let decimals = digits.clamp(0.0, decimals_of(shown.output_lsb) as f64) as usize;
+    let change = if after <= before { "falls" } else { "rises" };
+    let verdict = if s.equivalence.mismatches == 0 {
+        "carry"
+    } else {
+        "do not carry"
+    };
+    format!(
+        "Bias drift over temperature {change} from {} to {} deg/s peak to peak ({} of what it was), \
+         computed in fixed point; the emitted C and Rust {verdict} the model's bits: {} in {} words \
+         compared.",
+        fixed(before, decimals),
+        fixed(after, decimals),
+        percent(after, before),
+        mismatches(s.equivalence.mismatches),
+        grouped(s.equivalence.compared)
+    )
+}
+
+fn finding(shown: &Shown) -> String {
+    let b = &shown.summary.budget;
+    let what = if b.bound_dps < b.estimate_dps {
+        "The fit and its calibration limit the result, not the word lengths"
+    } else {
+        "The word lengths limit the result: wider formats would help"
+    };
+    format!(
+        "{what}: fixed point adds at most {} deg/s (bound), fit and calibration {} deg/s (estimate).",
+        significant(b.bound_dps, 2),
+        significant(b.estimate_dps, 3)
+    )
+}
+
+fn drift(shown: &Shown) -> Vec<[String; 4]> {
+    let s = shown.summary;
+    // Four digits of the smallest figure, no more than the output has.
+    let least = [s.before, s.after.float, s.after.fixed]
+        .iter()
+        .fold(f64::INFINITY, |m, d| m.min(d.rms_dps).min(d.drift_pp_dps));
+    let digits = 3.0 - least.max(f64::MIN_POSITIVE).log10().floor();
+    let decimals = digits.clamp(0.0, decimals_of(shown.output_lsb) as f64) as usize;
+    let share = |d: Drift| {
+        let text = percent(d.drift_pp_dps, s.before.drift_pp_dps);
+        text.trim_end_matches("\u{202f}%").to_owned()
+    };
+    let line = |name: &str, d: Drift| {
+        [
+            name.to_owned(),
+            fixed(d.drift_pp_dps, decimals),
+            fixed(d.rms_dps, decimals),
+            share(d),
+        ]
+    };
+    vec![
+        line("before compensation", s.before),
+        line("after, float model", s.after.float),
+        line("after, fixed-point model", s.after.fixed),
+        line("after, emitted C", s.after.c),
+        line("after, emitted Rust", s.after.rust),
+    ]
+}
+
+fn budget_line(what: &str, dps: f64, shown: &Shown, kind: &str) -> [String; 4] {
+    let lsb = dps / shown.output_lsb;
+    [
+        what.to_owned(),
+        significant(dps, 3),
+        significant(lsb, 3),
+        kind.to_owned(),
+    ]
+}
+
+fn equivalence(shown: &Shown) -> Vec<Equivalent> {
+    let e = &shown.summary.equivalence;
+    let mut lines: Vec<Equivalent> = e
+        .functions
+        .iter()
+        .map(|c| Equivalent {
+            name: c.name.clone(),
+            language: language(c.language),
+            inputs: grouped(c.inputs),
+            coverage: if c.exhaustive { "all" } else { "sample" },
+            words: grouped(c.compared),
+            mismatches: grouped(c.mismatches),
+            same: c.mismatches == 0,
+            first: c.first.clone().unwrap_or_else(|| "–".to_owned()),
+        })
+        .collect();
+    let counted: u64 = e.functions.iter().map(|c| c.mismatches).sum();
+    let on_record = e.mismatches.saturating_sub(counted);
+    let differing = shown
+        .points
+        .iter()
+        .find(|p| p.c_dps != p.fixed_dps || p.rust_dps != p.fixed_dps);
+    lines.push(Equivalent {
+        name: "readings of the record".to_owned(),
+        language: "C, Rust".to_owned(),
+        inputs: grouped(shown.points.len() as u64),
+        coverage: "sample",
+        words: "not counted".to_owned(),
+        mismatches: grouped(on_record),
+        same: on_record == 0,
+        first: differing.map_or("–".to_owned(), |p| {
+            let [time, fixed, c, rust] = [p.time_s, p.fixed_dps, p.c_dps, p.rust_dps].map(reading);
+            format!("at {time} s: fixed {fixed}, C {c}, Rust {rust} deg/s")
+        }),
+    });
+    lines
+}
+
+/// All digits of a reading.
+fn reading(value: f64) -> String {
+    if value.is_finite() {
+        value.to_string()
+    } else {
+        "none".to_owned()
+    }
+}
+
+fn language(name: &str) -> String {
+    match name {
+        "c" => "C".to_owned(),
+        "rust" => "Rust".to_owned(),
+        other => other.to_owned(),
+    }
+}
+
+fn provenance(shown: &Shown) -> Vec<[String; 2]> {
+    let s = shown.summary;
+    let line = |name: &str, value: String| [name.to_owned(), value];
+    let own = "the design's own thermal run, simulated (record.csv in the output folder)";
+    let path = shown.design.source.path.as_ref();
+    vec![
+        line("command", s.command.clone()),
+        line("gyrogen", s.version.to_owned()),
+        line(
+            "design",
+            path.map_or("embedded default".to_owned(), |p| p.display().to_string()),
+        ),
+        line("design, sha256", s.design_sha256.clone()),
+        line("record", s.record.clone().unwrap_or_else(|| own.to_owned())),
+        line("C compiler and flags", shown.toolchains[0].to_owned()),
+        line("Rust compiler and flags", shown.toolchains[1].to_owned()),
+        line("wall time", format!("{} s", fixed(s.seconds, 1))),
+    ]
+}
+
+fn limits(shown: &Shown) -> Vec<String> {
+    let bits = if shown.summary.equivalence.mismatches == 0 {
+        "The bits of model, emitted C and emitted Rust are equal on the inputs that were compared: on \
+         every input there is where the table says all, elsewhere on corner cases, pseudo-random words \
+         and the record, and nothing is claimed beyond them."
+    } else {
+        "The bits of model, emitted C and emitted Rust differ on at least one of the inputs that were \
+         compared: do not use this firmware."
+    };
+    let compilers = "This holds for the compilers and flags listed under provenance; for another compiler, \
+         other flags or a target processor, run the self-test that is emitted with the firmware there.";
+    let plant = if shown.summary.record.is_some() {
+        "The drift figures are those of this one record within its calibrated range; the bias polynomial \
+         is a model of the device, and another profile, another unit or an aged one may drift otherwise."
+    } else {
+        "The drift figures come from a simulated gyro: the plant is a model, and they say nothing of a \
+         device until a record of it has been run."
+    };
+    [bits, compilers, plant].map(str::to_owned).to_vec()
+}
+
+#[cfg(test)]
+#[path = "page_tests.rs"]
+mod tests;

@@ -1,0 +1,214 @@
+//! What the figures have in common: the readings that are drawn, axes, blocks, directions.
+
+use super::Shown;
+use super::axis::{Axis, Interval};
+use super::svg::{Frame, Shape, Swatch};
+use super::text::{fixed, grouped};
+use crate::job::outcome::Point;
+
+/// Readings up to which each is drawn.
+const DRAWN: usize = 1500;
+
+/// What the figures have in common.
+pub struct Scene<'a> {
+    /// What the report is made from.
+    pub shown: &'a Shown<'a>,
+    /// The readings that are drawn.
+    pub drawn: Vec<usize>,
+    /// Said where not all are.
+    pub thinned: String,
+    /// Of a marker, px.
+    pub radius: f64,
+    /// The thermometer's axis.
+    pub thermometer: Axis,
+}
+
+/// A value of a reading.
+pub type Of = fn(&Point) -> f64;
+
+impl<'a> Scene<'a> {
+    /// Chooses what is drawn.
+    pub fn new(shown: &'a Shown<'a>) -> Self {
+        let points = shown.points;
+        let drawn = thin(points);
+        let thinned = if drawn.len() < points.len() {
+            format!(
+                " {} of {} readings are drawn: the least and the greatest residual of each {} in a row.",
+                grouped(drawn.len() as u64),
+                grouped(points.len() as u64),
+                stretch(points.len())
+            )
+        } else {
+            String::new()
+        };
+        let radius = match drawn.len() {
+            0..=150 => 6.0,
+            151..=500 => 3.2,
+            _ => 2.4,
+        };
+        let range = [shown.fit.range.0, shown.fit.range.1];
+        let readings = points.iter().map(|p| p.thermometer).chain(range);
+        let thermometer = Axis {
+            interval: Interval::of(readings).padded(0.05),
+            quantity: quantity(&shown.fit.thermometer),
+            unit: shown.fit.unit.to_owned(),
+        };
+        Scene {
+            shown,
+            drawn,
+            thinned,
+            radius,
+            thermometer,
+        }
+    }
+
+    /// The drawn readings as (x, y).
+    pub fn xy(&self, x: Of, y: Of) -> Vec<(f64, f64)> {
+        let points = self.drawn.iter().filter_map(|k| self.shown.points.get(*k));
+        points.map(|p| (x(p), y(p))).collect()
+    }
+
+    /// An interval for what is drawn and some levels.
+    pub fn interval(&self, of: &[Of], more: &[f64]) -> Interval {
+        let points = self.shown.points.iter();
+        let values = points.flat_map(|p| of.iter().map(move |f| f(p)));
+        Interval::of(values.chain(more.iter().copied())).padded(0.07)
+    }
+
+    /// Where the firmware's input is limited, outside the calibrated range.
+    pub fn outside(&self) -> Vec<(f64, f64)> {
+        if !self.shown.is_clamped() {
+            return Vec::new();
+        }
+        let (axis, range) = (self.thermometer.interval, self.shown.fit.range);
+        vec![(axis.low, range.0), (range.1, axis.high)]
+    }
+
+    /// Its line in the legend.
+    pub fn outside_entry(&self) -> Option<(&'static str, Swatch, String)> {
+        let text = "outside calibrated range, clamped";
+        self.shown
+            .is_clamped()
+            .then(|| ("outside", Swatch::Area, text.to_owned()))
+    }
+
+    /// Names of the two directions of the thermometer.
+    pub fn directions(&self) -> (&'static str, &'static str) {
+        let by_sign = matches!(self.shown.fit.thermometer.as_str(), "phase_rad" | "freq_hz");
+        if by_sign && self.shown.summary.record.is_some() {
+            ("thermometer rising", "thermometer falling")
+        } else {
+            ("heating", "cooling")
+        }
+    }
+
+    /// For all paths after compensation, with the held-out band.
+    pub fn residual_interval(&self) -> Interval {
+        let heldout = self.shown.fit.heldout_rms_dps;
+        let paths: [Of; 4] = [
+            |p| p.float_dps,
+            |p| p.fixed_dps,
+            |p| p.c_dps,
+            |p| p.rust_dps,
+        ];
+        self.interval(&paths, &[heldout, -heldout])
+    }
+
+    /// Float as a line, the others as markers: those of C and Rust fit into the circle of fixed.
+    /// The abscissa is divided by `per`.
+    pub fn paths(&self, frame: &mut Frame, x: Of, per: f64) {
+        let series = |y: Of| -> Vec<(f64, f64)> {
+            let points = self.xy(x, y).into_iter();
+            points.map(|(x, y)| (x / per, y)).collect()
+        };
+        let r = self.radius;
+        let many = self.drawn.len() > 150;
+        let class = |one, thin| if many { thin } else { one };
+        frame.line(class("float", "float many"), &series(|p| p.float_dps));
+        let fixed = series(|p| p.fixed_dps);
+        frame.markers(class("fixed", "fixed many"), Shape::Circle, r, &fixed);
+        frame.markers(
+            class("c", "c many"),
+            Shape::Plus,
+            0.8 * r,
+            &series(|p| p.c_dps),
+        );
+        let rust = series(|p| p.rust_dps);
+        frame.markers(class("rust", "rust many"), Shape::Cross, 0.8 * r, &rust);
+    }
+
+    /// From when to when each held-out block lasts, s; the border is halfway between readings.
+    pub fn blocks(&self) -> Vec<(f64, f64)> {
+        let (fit, points) = (self.shown.fit, self.shown.points);
+        // Either the points are the fitted rows, or they are all rows of the record.
+        let time = |k: usize| {
+            let row = if points.len() == fit.rows.len() {
+                k
+            } else {
+                *fit.rows.get(k)?
+            };
+            points.get(row).map(|p| p.time_s)
+        };
+        let border = |k: usize| match (k.checked_sub(1).and_then(time), time(k)) {
+            (Some(a), Some(b)) => Some((a + b) / 2.0),
+            (a, b) => a.or(b),
+        };
+        let ends = fit
+            .blocks
+            .iter()
+            .map(|b| Some((border(b.start)?, border(b.end)?)));
+        ends.collect::<Option<Vec<_>>>().unwrap_or_default()
+    }
+
+    /// ", 0.0 to 70.0 degC", where a temperature is known and is not on the axis.
+    pub fn span_degc(&self) -> String {
+        let known = self.shown.points.iter().map(|p| p.temperature_degc);
+        let (low, high) = known
+            .filter(|t| t.is_finite())
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), t| {
+                (l.min(t), h.max(t))
+            });
+        if low > high || self.shown.fit.unit == "degC" {
+            return String::new();
+        }
+        format!(", readings at {} to {} degC", fixed(low, 1), fixed(high, 1))
+    }
+}
+/// A thermometer's name in words; an unknown column's own.
+pub fn quantity(thermometer: &str) -> String {
+    match thermometer {
+        "phase_rad" => "thermometer: drive phase".to_owned(),
+        "freq_hz" => "thermometer: drive frequency".to_owned(),
+        "die_degc" => "thermometer: die temperature".to_owned(),
+        "chamber_degc" => "thermometer: chamber temperature".to_owned(),
+        other => format!("thermometer: {other}"),
+    }
+}
+
+/// Readings in a row of which two are drawn.
+fn stretch(count: usize) -> usize {
+    (2 * count).div_ceil(DRAWN).max(1)
+}
+
+/// The readings that are drawn: all, or the least and the greatest residual of each stretch.
+fn thin(points: &[Point]) -> Vec<usize> {
+    let stretch = stretch(points.len());
+    if stretch <= 2 {
+        return (0..points.len()).collect();
+    }
+    let residual = |k: &usize| points[*k].fixed_dps;
+    let mut drawn = Vec::new();
+    for start in (0..points.len()).step_by(stretch) {
+        let rows = || start..(start + stretch).min(points.len());
+        let least = rows().min_by(|a, b| residual(a).total_cmp(&residual(b)));
+        let greatest = rows().max_by(|a, b| residual(a).total_cmp(&residual(b)));
+        let (Some(least), Some(greatest)) = (least, greatest) else {
+            continue;
+        };
+        drawn.push(least.min(greatest));
+        if least != greatest {
+            drawn.push(least.max(greatest));
+        }
+    }
+    drawn
+}
