@@ -7,13 +7,13 @@
 
 pub mod ir;
 pub mod lanes;
+mod state;
 
-use super::arithmetic::{
-    Arithmetic, Block, IndexTable, LoopBody, Port, Ring, SineTable, StateVisitor,
-};
+use super::arithmetic::{Arithmetic, Block, IndexTable, LoopBody, Port, Ring, SineTable};
 use super::cast::{Cast, round_shift};
 use super::format::Overflow;
-use ir::{CallSite, Function, Id, Interval, Loop, Node, Op, Program, Slot, SlotKind};
+use ir::{CallSite, Function, Id, Interval, Loop, Node, Op, Program};
+use state::{Loader, Storer};
 use std::cell::RefCell;
 use std::sync::Arc;
 
@@ -190,76 +190,6 @@ impl Trace {
             other.is_some_and(|o| o.overflow != Some(Overflow::Error) && o.does_as(cast))
         });
         first.unwrap_or(cast.id)
-    }
-}
-
-/// Replaces a state's words by loads.
-struct Loader<'a> {
-    trace: &'a Trace,
-}
-
-impl Loader<'_> {
-    fn slot(&self, name: &'static str, len: usize, kind: SlotKind) -> usize {
-        self.trace.with(|frame| {
-            frame.function.slots.push(Slot { name, len, kind });
-            frame.function.slots.len() - 1
-        })
-    }
-}
-
-impl StateVisitor<Trace> for Loader<'_> {
-    fn word(&mut self, name: &'static str, word: &mut Id, low: i128, high: i128) {
-        let range = Interval::new(low, high);
-        let slot = self.slot(name, 1, SlotKind::Word(range));
-        *word = self.trace.push(Op::LoadWord(slot, 0), range);
-    }
-
-    fn residues(&mut self, name: &'static str, residues: &mut [Id], ring: &Ring) {
-        let slot = self.slot(name, residues.len(), SlotKind::Residue(ring.bits));
-        for (k, residue) in residues.iter_mut().enumerate() {
-            *residue = self
-                .trace
-                .push(Op::LoadResidue(slot, k), Interval::point(0));
-        }
-    }
-}
-
-/// Notes what a state's words have become.
-struct Storer<'a> {
-    trace: &'a Trace,
-    slot: usize,
-}
-
-impl Storer<'_> {
-    fn store(&mut self, ids: &[Id]) {
-        let slot = self.slot;
-        self.slot += 1;
-        self.trace.with(|frame| {
-            for (k, id) in ids.iter().enumerate() {
-                let node = &frame.function.nodes[*id];
-                let unchanged =
-                    node.op == Op::LoadWord(slot, k) || node.op == Op::LoadResidue(slot, k);
-                if !unchanged {
-                    if let SlotKind::Word(declared) = frame.function.slots[slot].kind {
-                        assert!(
-                            node.range.is_within(declared.low, declared.high),
-                            "state {} leaves its declared range",
-                            frame.function.slots[slot].name
-                        );
-                    }
-                    frame.function.stores.push((slot, k, *id));
-                }
-            }
-        });
-    }
-}
-
-impl StateVisitor<Trace> for Storer<'_> {
-    fn word(&mut self, _name: &'static str, word: &mut Id, _low: i128, _high: i128) {
-        self.store(&[*word]);
-    }
-    fn residues(&mut self, _name: &'static str, residues: &mut [Id], _ring: &Ring) {
-        self.store(residues);
     }
 }
 
