@@ -57,9 +57,6 @@ pub fn run(
         (None, Some(path)) => record::read(path, &design.record)?,
         (None, None) => unreachable!("either a record or an own run"),
     };
-    if let Some(run) = &simulated {
-        warnings.extend(run.warnings(&design));
-    }
 
     say("fitting the bias polynomial");
     let mut mapping = if simulated.is_some() {
@@ -79,6 +76,9 @@ pub fn run(
     let fit = closure::fit(&record, &mapping, &options)?;
     warnings.extend(fit.warnings.iter().cloned());
     let chosen = formats::fill(&mut design, &fit, &record)?;
+    if let Some(run) = &simulated {
+        warnings.extend(run.warnings(&design));
+    }
     let rounded = coefficients::round(&mut design, &fit)?;
     // A fit of another order than the file's has other products.
     crate::design::limits::check(&design).map_err(|excess| {

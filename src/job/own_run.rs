@@ -1,6 +1,7 @@
 //! The design's own thermal run: plant, ADC codes, circuit, in one stream without a break.
 
 use super::firmware::Firmware;
+use super::formats;
 use super::outcome::Point;
 use super::{clamped_bias, compensation, warning};
 use crate::circuit::engine::{self, ArithmeticKind, Rows};
@@ -61,7 +62,7 @@ impl OwnRun {
         {
             return Err(InputError::new(format!(
                 "the compensation's input is {}, the own thermal run's thermometer is the drive phase",
-                super::formats::column_of(c)
+                formats::column_of(c)
             ))
             .help("give a measured record with --record, or set compensation.input = \"phase\"")
             .into());
@@ -126,11 +127,7 @@ impl OwnRun {
                 format!("the NCO runs at {nco_hz:.3} Hz, the gyro resonates at {drive_hz} Hz"),
             ));
         }
-        let decimator = &circuit.decimator;
-        let span = f64::from(decimator.ratio * decimator.differential_delay);
-        let gain = span.powi(decimator.stages as i32) * pow2(-(decimator.gain_bits() as i32));
-        // A product with a carrier of the same frequency halves the amplitude.
-        let nominal = 2.0 * design.thermal_run.sense_full_scale_dps / gain;
+        let nominal = formats::nominal_full_scale_dps(design);
         if let Some(c) = &design.compensation
             && (c.rate_full_scale_dps / nominal - 1.0).abs() > 0.01
         {
@@ -138,9 +135,9 @@ impl OwnRun {
                 "scale_factor",
                 format!(
                     "compensation.rate_full_scale_dps is {}, sense I of this run has a full scale of \
-                     {nominal:.3} deg/s: rates come out {:.2} % too large",
+                     {nominal:.3} deg/s (a power of two is wanted): rates and drift come out {:.4} times as large",
                     c.rate_full_scale_dps,
-                    100.0 * (c.rate_full_scale_dps / nominal - 1.0)
+                    c.rate_full_scale_dps / nominal
                 ),
             ));
         }
@@ -280,7 +277,6 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
 
 /// Sense I in deg/s is its value times this.
 fn full_scale(design: &Design) -> f64 {
-    let nominal = 2.0 * design.thermal_run.sense_full_scale_dps;
     let own = design.compensation.as_ref().map(|c| c.rate_full_scale_dps);
-    own.unwrap_or_else(|| f64::powf(2.0, nominal.log2().round()))
+    own.unwrap_or_else(|| formats::power_of_two_near(formats::nominal_full_scale_dps(design)))
 }
