@@ -79,7 +79,8 @@ pub fn fill(design: &mut Design, fit: &BaselineFit, record: &ThermalRecord) -> R
         .filter(|v| !v.is_nan())
         .fold(0.0, |m: f64, v| m.max(v.abs()));
     // Rate and bias, and their difference, with a factor of two to spare.
-    let output = signed_for(4.0 * greatest, WORD_BITS)?;
+    let step = fit.noise_floor_rms_dps / 64.0;
+    let output = no_finer_than(4.0 * greatest, step, 16..=WORD_BITS)?;
     let (input, mut said) = if fit.thermometer == "phase_rad" {
         (CompensationInput::Phase, Vec::new())
     } else {
@@ -119,7 +120,8 @@ pub fn fill(design: &mut Design, fit: &BaselineFit, record: &ThermalRecord) -> R
         "accumulator {accumulator}: holds all terms at once, {sum:.4} deg/s"
     ));
     said.push(format!(
-        "output {output}: rates up to {greatest:.4} deg/s, with a factor of four to spare"
+        "output {output}: rates up to {greatest:.4} deg/s, with a factor of four to spare; one LSB is at \
+         most a 64th of the noise floor"
     ));
     design.compensation = Some(compensation);
     Ok(said)
@@ -137,6 +139,21 @@ pub fn nominal_full_scale_dps(design: &Design) -> f64 {
 /// The power of two nearest to `value`, by ratio.
 pub fn power_of_two_near(value: f64) -> f64 {
     pow2(value.log2().round() as i32)
+}
+
+/// The shortest signed format in `bits` whose values reach `peak` and whose LSB is at most `step`;
+/// the longest, if none is as fine.
+fn no_finer_than(peak: f64, step: f64, bits: std::ops::RangeInclusive<u32>) -> Result<Format> {
+    let mut format = signed_for(peak, *bits.end())?;
+    for count in bits {
+        if let Ok(shorter) = signed_for(peak, count)
+            && shorter.lsb() <= step
+        {
+            format = shorter;
+            break;
+        }
+    }
+    Ok(format)
 }
 
 /// True if the formats hold every coefficient of the fit.
@@ -170,14 +187,7 @@ fn channel(fit: &BaselineFit, rate_format: Format) -> Result<(CompensationInput,
         .map(|t| fit.slope_dps(t).abs())
         .fold(0.0, f64::max);
     let floor = fit.noise_floor_rms_dps.max(1e-9);
-    let enough = |format: &Format| slope * format.lsb() <= floor / 16.0;
-    let mut format = signed_for(reach + margin, *INPUT_BITS.start())?;
-    for bits in INPUT_BITS {
-        format = signed_for(reach + margin, bits)?;
-        if enough(&format) {
-            break;
-        }
-    }
+    let format = no_finer_than(reach + margin, floor / 16.0 / slope.max(1e-12), INPUT_BITS)?;
     let lsb = format.lsb();
     let offset_raw = (fit.centre / lsb).round() as i128;
     let half_range = (fit.half_span / lsb).max(1.0);
