@@ -77,7 +77,6 @@ pub struct View {
     code_low: String,
     code_span: String,
     row: Vec<String>,
-    harness_row: Vec<String>,
     chain_checksum: String,
     chain_number: u32,
 }
@@ -235,8 +234,7 @@ impl View {
                 Language::C => format!("UINT64_C({})", (code.high - code.low) as u64),
                 Language::Rust => ((code.high - code.low) as u64).to_string(),
             },
-            row: row(design, bundle, language, "g"),
-            harness_row: row(design, bundle, language, "g"),
+            row: row(design, bundle, language),
             chain_checksum: format!("{:#x}", chain_checksum(design, bundle)),
             chain_number: number + 1,
             functions,
@@ -251,7 +249,7 @@ impl View {
 }
 
 /// The columns of a row as unsigned 64-bit words, in the order of `replay`.
-fn row(design: &Design, bundle: &Bundle, language: Language, detector: &str) -> Vec<String> {
+fn row(design: &Design, bundle: &Bundle, language: Language) -> Vec<String> {
     let Some(k) = bundle
         .program
         .functions
@@ -270,10 +268,10 @@ fn row(design: &Design, bundle: &Bundle, language: Language, detector: &str) -> 
                 Some((name, v)) => views::word_64(&format!("row.{name}"), v.ty, language),
                 None => match language {
                     Language::C => {
-                        format!("(uint64_t){detector}.chain.nco.tuning_word & UINT64_C({mask})")
+                        format!("(uint64_t)g.chain.nco.tuning_word & UINT64_C({mask})")
                     }
                     Language::Rust => {
-                        format!("u64::from({detector}.chain.nco.tuning_word) & {mask}")
+                        format!("u64::from(g.chain.nco.tuning_word) & {mask}")
                     }
                 },
             },

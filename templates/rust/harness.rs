@@ -44,7 +44,7 @@ fn table(name: &str) -> Option<Vec<u64>> {
         let drive = i32::from_ne_bytes([a, b, c, d]);
         let sense = i32::from_ne_bytes([e, f, h, i]);
         if let Some(row) = g.push(drive, sense) {
-            put(output, &[{% for o in v.harness_row %}{{ o }}, {% endfor %}u64::from(g.fault)]);
+            put(output, &[{% for o in v.row %}{{ o }}, {% endfor %}u64::from(g.fault)]);
         }
     }
 }

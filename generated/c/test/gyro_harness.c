@@ -13,8 +13,6 @@
 #include "gyro.h"
 #include "gyro_tables.h"
 
-#define RECORDS 4096U
-
 static size_t get(void *to, size_t size)
 {
     return fread(to, size, 1U, stdin);
