@@ -3,7 +3,7 @@
 use crate::design;
 use crate::numeric::arithmetic::{Arithmetic, Block, Port, StateVisitor};
 use crate::numeric::cast::{Cast, Label, Target};
-use crate::numeric::format::Rounding;
+use crate::numeric::format::{Rounding, pow2};
 
 /// The amplitude loop's configuration.
 #[derive(Debug, Clone)]
@@ -61,6 +61,23 @@ impl AmplitudeLoop {
         AmplitudeLoopState {
             integrator: ar.constant(self.initial, 0),
         }
+    }
+}
+
+impl AmplitudeLoop {
+    /// The state that holds the drive gain `gain` (0 to 1) at no amplitude error, limited to what the
+    /// integrator holds.
+    pub fn holding<A: Arithmetic>(&self, ar: &A, gain: f64) -> AmplitudeLoopState<A::Word> {
+        let counts = gain * pow2(self.gain_bits as i32 - 1 - self.integrator_shift.gain);
+        let integrator = (counts.round() as i128).clamp(0, self.integrator_limit);
+        AmplitudeLoopState {
+            integrator: ar.constant(integrator, 0),
+        }
+    }
+
+    /// The magnitude that the loop holds, as a word.
+    pub fn setpoint<A: Arithmetic>(&self, ar: &A) -> A::Word {
+        ar.constant(self.setpoint, self.magnitude_fraction_bits)
     }
 }
 

@@ -72,6 +72,15 @@ pub struct Row<W> {
     pub gain: Option<W>,
 }
 
+/// Where the loops rest: what a warm start puts into them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Held {
+    /// What the phase loop adds to the design's tuning word, steps.
+    pub correction_steps: f64,
+    /// Drive gain, 0 to 1.
+    pub gain: f64,
+}
+
 /// Names of the decimators in the state, by channel.
 const CIC_MEMBERS: [&str; 4] = ["cic_drive_i", "cic_drive_q", "cic_sense_i", "cic_sense_q"];
 
@@ -196,6 +205,33 @@ impl<const N: usize> Chain<N> {
             phase_loop: self.phase_loop.as_ref().map(|l| l.start(ar)),
             amplitude_loop: self.amplitude_loop.as_ref().map(|l| l.start(ar)),
         }
+    }
+
+    /// Puts the loops where they hold a tuning word correction (steps) and a drive gain (0 to 1)
+    /// with no error, and the oscillator at that tuning word; gives the gain that is then put out.
+    pub fn hold<A: Arithmetic>(
+        &self,
+        ar: &A,
+        fast: &mut FastState<A::Residue, N>,
+        slow: &mut SlowState<A::Word>,
+        held: Held,
+    ) -> Option<A::Word> {
+        if let (Some(block), Some(state)) = (&self.phase_loop, &mut slow.phase_loop) {
+            *state = block.holding(ar, held.correction_steps);
+            // A step at the setpoint has no error: it leaves the integrator and puts out the rest.
+            let [correction] = ar.call(block, "phase_loop", state, [block.setpoint(ar)]);
+            let [] = ar.call(
+                &Retune(&self.nco),
+                "nco",
+                &mut fast.oscillator,
+                [correction],
+            );
+        }
+        let (block, state) = (self.amplitude_loop.as_ref()?, &mut slow.amplitude_loop);
+        let state = state.as_mut()?;
+        *state = block.holding(ar, held.gain);
+        let [gain] = ar.call(block, "amplitude_loop", state, [block.setpoint(ar)]);
+        Some(gain)
     }
 
     /// One ADC sample: drive and sense code.

@@ -1,9 +1,9 @@
 //! Runs a chain over captured codes: in `f64`, or bit-accurately in the narrowest lanes that the
 //! traced ranges fit into.
 
-use super::chain::{Chain, FastState, Row, SlowState};
+use super::chain::{Chain, FastState, Held, Row, SlowState};
 use crate::design::Design;
-use crate::numeric::arithmetic::Arithmetic;
+use crate::numeric::arithmetic::{Arithmetic, Block};
 use crate::numeric::cast::HasKernel;
 use crate::numeric::fixed::{Fixed, Overflowed};
 use crate::numeric::float::Float;
@@ -41,8 +41,34 @@ pub trait Engine {
         sense: &[i32],
         rows: &mut Rows,
     ) -> Result<(), Box<Overflowed>>;
+    /// The same for ADC inputs in LSB. The bit-accurate engine quantises them as an ideal ADC does
+    /// (nearest, ties up, saturating); the one without quantisation takes them as they are.
+    ///
+    /// # Errors
+    /// As [`Engine::process`].
+    fn process_inputs(
+        &mut self,
+        drive_lsb: &[f64],
+        sense_lsb: &[f64],
+        rows: &mut Rows,
+    ) -> Result<(), Box<Overflowed>>;
     /// No rows, of the kind that this engine makes.
     fn no_rows(&self) -> Rows;
+    /// What the circuit excites the drive with until the end of the next period.
+    fn excitation(&self) -> Excitation;
+    /// Puts the loops at rest (see [`Chain::hold`]).
+    fn hold(&mut self, held: Held);
+}
+
+/// The circuit's outputs to the drive.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Excitation {
+    /// Phase of the oscillator at the last sample, 2^-64 turn.
+    pub phase: u64,
+    /// What it advances by before each sample, 2^-64 turn.
+    pub step: u64,
+    /// Drive gain, 0 to 1; `None` without an amplitude loop.
+    pub gain: Option<f64>,
 }
 
 /// The columns of a row after `index`, in the contract's order.
@@ -167,6 +193,12 @@ impl FloatScale {
 /// How an arithmetic meets the outside: codes in, columns out, overflows.
 trait Ends: Arithmetic {
     fn code(&self, code: i32, fraction_bits: i32) -> Self::Word;
+    /// An ADC input in LSB; `limits` are the codes'.
+    fn input(&self, lsb: f64, fraction_bits: i32, limits: [f64; 2]) -> Self::Word;
+    /// A phase or step of a ring of `bits` in 2^-64 turn.
+    fn turns(residue: Self::Residue, bits: u32) -> u64;
+    /// A drive gain, 0 to 1.
+    fn gain(word: Self::Word, scale: &FloatScale) -> f64;
     fn at(&self, _sample: u64) {}
     fn stopped(&self) -> Option<Overflowed> {
         None
@@ -186,6 +218,17 @@ impl<W: HasKernel, R: Lane, const IDLE: bool> Ends for Fixed<W, R, IDLE> {
     #[inline(always)]
     fn code(&self, code: i32, _fraction_bits: i32) -> W {
         W::from_i32(code)
+    }
+    #[inline(always)]
+    fn input(&self, lsb: f64, _fraction_bits: i32, [low, high]: [f64; 2]) -> W {
+        // Of at most 32 bits: the sum with a half is exact.
+        W::from_i32((lsb.max(low).min(high) + 0.5).floor().min(high) as i32)
+    }
+    fn turns(residue: R, bits: u32) -> u64 {
+        (residue.wide() as u64) << (64 - bits)
+    }
+    fn gain(word: W, scale: &FloatScale) -> f64 {
+        word.wide() as f64 * scale.gain_lsb
     }
     #[inline(always)]
     fn at(&self, sample: u64) {
@@ -210,6 +253,17 @@ impl<W: HasKernel, R: Lane, const IDLE: bool> Ends for Fixed<W, R, IDLE> {
 impl Ends for Float {
     fn code(&self, code: i32, fraction_bits: i32) -> f64 {
         f64::from(code) * pow2(-fraction_bits)
+    }
+    #[inline(always)]
+    fn input(&self, lsb: f64, fraction_bits: i32, _limits: [f64; 2]) -> f64 {
+        lsb * pow2(-fraction_bits)
+    }
+    fn turns(residue: i128, _bits: u32) -> u64 {
+        // One turn is the whole 128-bit circle.
+        (residue >> 64) as u64
+    }
+    fn gain(word: f64, scale: &FloatScale) -> f64 {
+        word * scale.gain_lsb
     }
     fn no_rows() -> Rows {
         Rows::Real(Vec::new())
@@ -245,12 +299,14 @@ struct Running<F: Arithmetic, S: Arithmetic<Residue = F::Residue>, const N: usiz
     phase: usize,
     /// A cast at the sample rate may stop the run.
     watched: bool,
+    /// Drive gain as last put out.
+    gain: Option<f64>,
 }
 
 impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Running<F, S, N> {
     fn new(chain: Chain<N>, fast: F, slow: S, scale: FloatScale) -> Self {
         let product = &chain.mixers[0].product;
-        Running {
+        let mut running = Running {
             fast_state: chain.start_fast(&fast),
             slow_state: chain.start_slow(&slow),
             watched: product.overflow == Some(crate::numeric::format::Overflow::Error)
@@ -261,50 +317,45 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Runnin
             scale,
             samples: 0,
             phase: 0,
-        }
+            gain: None,
+        };
+        running.gain = running.initial_gain();
+        running
     }
 
-    /// Samples inside one period: nothing but the fast state changes.
-    fn block(&mut self, drive: &[i32], sense: &[i32]) {
-        let fraction_bits = self.chain.code_fraction_bits;
+    /// The drive gain before the first row: that of the integrator as the design gives it.
+    fn initial_gain(&self) -> Option<f64> {
+        let block = self.chain.amplitude_loop.as_ref()?;
+        let mut state = self.slow_state.amplitude_loop?;
+        // At the setpoint there is no error, so this step changes nothing.
+        let [gain] = block.step(&self.slow, &mut state, [block.setpoint(&self.slow)]);
+        Some(S::gain(gain, &self.scale))
+    }
+
+    /// Samples inside one period: nothing but the fast state changes. `word` makes a word of a code.
+    #[inline(always)]
+    fn block<T: Copy>(&mut self, drive: &[T], sense: &[T], word: impl Fn(&F, T) -> F::Word) {
         // A copy that does not escape lives in registers.
         let mut state = self.fast_state;
         for (k, (d, s)) in drive.iter().zip(sense).enumerate() {
             if self.watched {
                 self.fast.at(self.samples + k as u64);
             }
-            let codes = [
-                self.fast.code(*d, fraction_bits),
-                self.fast.code(*s, fraction_bits),
-            ];
+            let codes = [word(&self.fast, *d), word(&self.fast, *s)];
             self.chain.sample(&self.fast, &mut state, codes);
         }
         self.fast_state = state;
         self.samples += drive.len() as u64;
     }
 
-    fn end_of_period(&mut self, rows: &mut Rows) {
-        self.slow.at(self.samples - 1);
-        let row = self
-            .chain
-            .period(&self.slow, &mut self.fast_state, &mut self.slow_state);
-        let tuning = self
-            .slow_state
-            .phase_loop
-            .is_some()
-            .then_some(self.fast_state.oscillator.tuning);
-        S::put(&row, tuning, self.chain.nco.ring.bits, &self.scale, rows);
-    }
-}
-
-impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Engine
-    for Running<F, S, N>
-{
-    fn process(
+    /// Codes of any number of periods; `word` makes a word of a code.
+    #[inline(always)]
+    fn periods<T: Copy>(
         &mut self,
-        drive: &[i32],
-        sense: &[i32],
+        drive: &[T],
+        sense: &[T],
         rows: &mut Rows,
+        word: impl Fn(&F, T) -> F::Word,
     ) -> Result<(), Box<Overflowed>> {
         let ratio = self.chain.cics[0].ratio as usize;
         let (mut drive, mut sense) = (drive, sense);
@@ -313,7 +364,7 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Engine
             let (d, s);
             (d, drive) = drive.split_at(count);
             (s, sense) = sense.split_at(count);
-            self.block(d, s);
+            self.block(d, s, &word);
             // The fast rate comes first in the order of steps; an overflow there is the earlier.
             if let Some(overflowed) = self.fast.stopped() {
                 return Err(Box::new(overflowed));
@@ -328,6 +379,68 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Engine
             }
         }
         Ok(())
+    }
+
+    fn end_of_period(&mut self, rows: &mut Rows) {
+        self.slow.at(self.samples - 1);
+        let row = self
+            .chain
+            .period(&self.slow, &mut self.fast_state, &mut self.slow_state);
+        let tuning = self
+            .slow_state
+            .phase_loop
+            .is_some()
+            .then_some(self.fast_state.oscillator.tuning);
+        self.gain = row.gain.map(|g| S::gain(g, &self.scale));
+        S::put(&row, tuning, self.chain.nco.ring.bits, &self.scale, rows);
+    }
+}
+
+impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Engine
+    for Running<F, S, N>
+{
+    fn process(
+        &mut self,
+        drive: &[i32],
+        sense: &[i32],
+        rows: &mut Rows,
+    ) -> Result<(), Box<Overflowed>> {
+        let fraction_bits = self.chain.code_fraction_bits;
+        self.periods(drive, sense, rows, |ar, code| ar.code(code, fraction_bits))
+    }
+
+    fn process_inputs(
+        &mut self,
+        drive_lsb: &[f64],
+        sense_lsb: &[f64],
+        rows: &mut Rows,
+    ) -> Result<(), Box<Overflowed>> {
+        let fraction_bits = self.chain.code_fraction_bits;
+        let range = self.chain.code_range;
+        let limits = [range.low as f64, range.high as f64];
+        self.periods(drive_lsb, sense_lsb, rows, |ar, lsb| {
+            ar.input(lsb, fraction_bits, limits)
+        })
+    }
+
+    fn excitation(&self) -> Excitation {
+        let bits = self.chain.nco.ring.bits;
+        let oscillator = &self.fast_state.oscillator;
+        Excitation {
+            phase: F::turns(oscillator.phase, bits),
+            step: F::turns(oscillator.tuning, bits),
+            gain: self.gain,
+        }
+    }
+
+    fn hold(&mut self, held: Held) {
+        let gain = self.chain.hold(
+            &self.slow,
+            &mut self.fast_state,
+            &mut self.slow_state,
+            held,
+        );
+        self.gain = gain.map(|g| S::gain(g, &self.scale));
     }
 
     fn no_rows(&self) -> Rows {

@@ -3,7 +3,7 @@
 use crate::design;
 use crate::numeric::arithmetic::{Arithmetic, Block, Port, StateVisitor};
 use crate::numeric::cast::{Cast, Label, Target};
-use crate::numeric::format::{Overflow, Rounding};
+use crate::numeric::format::{Overflow, Rounding, pow2};
 
 /// The phase loop's configuration.
 #[derive(Debug, Clone)]
@@ -67,6 +67,22 @@ impl PhaseLoop {
             integral: ar.constant(0, 0),
         }
     }
+
+    /// The state that holds a correction of `steps` tuning word steps at no phase error, limited to
+    /// what the integrator holds: `steps * 2^shift / ki`, to the nearest integer.
+    pub fn holding<A: Arithmetic>(&self, ar: &A, steps: f64) -> PhaseLoopState<A::Word> {
+        let gain = self.integral as f64 * pow2(self.integral_shift.gain);
+        let half = 1i128 << (self.integrator_bits - 1);
+        let integral = if gain == 0.0 { 0.0 } else { steps / gain };
+        PhaseLoopState {
+            integral: ar.constant((integral.round() as i128).clamp(-half, half - 1), 0),
+        }
+    }
+
+    /// The phase that the loop holds, as a word.
+    pub fn setpoint<A: Arithmetic>(&self, ar: &A) -> A::Word {
+        ar.constant(self.setpoint, self.angle_bits as i32)
+    }
 }
 
 impl<A: Arithmetic> Block<A, 1, 1> for PhaseLoop {
@@ -93,7 +109,7 @@ impl<A: Arithmetic> Block<A, 1, 1> for PhaseLoop {
         [phase]: [A::Word; 1],
     ) -> [A::Word; 1] {
         let angle = self.angle_bits as i32;
-        let off = ar.sub(phase, ar.constant(self.setpoint, angle));
+        let off = ar.sub(phase, self.setpoint(ar));
         let error = ar.read_as(ar.wrap(off, self.angle_bits, angle), angle);
         state.integral = ar.cast(ar.add(state.integral, error), &self.accumulate, &[]);
         let p = ar.mul(error, ar.constant(self.proportional, 0));

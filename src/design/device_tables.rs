@@ -92,8 +92,21 @@ pub(super) fn gyro(t: &Table, base: Option<&Gyro>) -> Result<Gyro> {
             Real::Within(-1e-3, 1e-3),
             "the stiffness's relative fall in 1/K; 49.39 ppm/K is 4.939e-5",
         )?,
+        stiffness_law: t.take("stiffness_law", base.map(|g| g.stiffness_law), |v| {
+            v.choice(&[
+                ("linear", StiffnessLaw::Linear),
+                ("square_root", StiffnessLaw::SquareRoot),
+            ])
+        })?,
+        demodulation_error_rad: real(
+            "demodulation_error_rad",
+            |g| g.demodulation_error_rad,
+            Real::Within(-1.2, 1.2),
+            "radians between the demodulation and the rate at T0",
+        )?,
         bias_dps: bias(&t.section("bias")?, base)?,
         electronics: electronics(&t.section("electronics")?, base)?,
+        thermal: thermal(&t.section("thermal")?, base)?,
         effects: effects(t, base)?,
     })
 }
@@ -130,6 +143,57 @@ fn electronics(t: &Table, base: Option<&Gyro>) -> Result<ElectronicsPhase> {
             "reference_temperature_degc",
             base.map(|e| e.reference_temperature_degc),
             |v| v.real(Real::Celsius, "degrees Celsius"),
+        )?,
+        loop_share: t.take("loop_share", base.map(|e| e.loop_share), |v| {
+            v.real(
+                Real::Within(0.0, 1.0),
+                "the share of this phase that a phase loop sees",
+            )
+        })?,
+    })
+}
+
+fn thermal(t: &Table, base: Option<&Gyro>) -> Result<ThermalNetwork> {
+    let base = base.map(|g| &g.thermal);
+    let real = |key, from: fn(&ThermalNetwork) -> f64, accepted, meaning| {
+        t.take(key, base.map(from), |v| v.real(accepted, meaning))
+    };
+    Ok(ThermalNetwork {
+        structure_heat_j_per_k: real(
+            "structure_heat_j_per_k",
+            |n| n.structure_heat_j_per_k,
+            Real::Positive,
+            "the structure's heat capacity in J/K",
+        )?,
+        structure_chamber_w_per_k: real(
+            "structure_chamber_w_per_k",
+            |n| n.structure_chamber_w_per_k,
+            Real::Positive,
+            "the heat flow from structure to chamber in W/K",
+        )?,
+        electronics_heat_j_per_k: real(
+            "electronics_heat_j_per_k",
+            |n| n.electronics_heat_j_per_k,
+            Real::Positive,
+            "the electronics' heat capacity in J/K",
+        )?,
+        electronics_chamber_w_per_k: real(
+            "electronics_chamber_w_per_k",
+            |n| n.electronics_chamber_w_per_k,
+            Real::Positive,
+            "the heat flow from electronics to chamber in W/K",
+        )?,
+        exchange_w_per_k: real(
+            "exchange_w_per_k",
+            |n| n.exchange_w_per_k,
+            Real::NotNegative,
+            "the heat flow from structure to electronics in W/K",
+        )?,
+        power_w: real(
+            "power_w",
+            |n| n.power_w,
+            Real::NotNegative,
+            "the electronics' heat in W",
         )?,
     })
 }
@@ -193,6 +257,12 @@ pub(super) fn thermal_run(t: &Table, base: Option<&ThermalRun>) -> Result<Therma
             Real::Positive,
             "the distance of two dwells in K",
         )?,
+        ramp_k_per_min: real(
+            "ramp_k_per_min",
+            |r| r.ramp_k_per_min,
+            Real::Positive,
+            "the chamber's ramp between dwells in K/min",
+        )?,
         dwell_s: real(
             "dwell_s",
             |r| r.dwell_s,
@@ -240,6 +310,24 @@ pub(super) fn thermal_run(t: &Table, base: Option<&ThermalRun>) -> Result<Therma
             |r| r.rate_noise_dps_rthz,
             Real::NotNegative,
             "the white rate noise in deg/s/sqrt(Hz)",
+        )?,
+        flicker_dph: real(
+            "flicker_dph",
+            |r| r.flicker_dph,
+            Real::NotNegative,
+            "the bias instability in deg/h",
+        )?,
+        rate_random_walk_dph_rth: real(
+            "rate_random_walk_dph_rth",
+            |r| r.rate_random_walk_dph_rth,
+            Real::NotNegative,
+            "the rate random walk in deg/h/sqrt(h)",
+        )?,
+        scale_rate_dps: real(
+            "scale_rate_dps",
+            |r| r.scale_rate_dps,
+            Real::Positive,
+            "the table's rate for the scale factor in deg/s",
         )?,
         seed: t.take("seed", base.map(|r| r.seed), |v| {
             v.integer(0..=i128::from(u64::MAX), "the seed of all noise")

@@ -242,10 +242,16 @@ pub struct Gyro {
     pub reference_temperature_k: f64,
     /// kappa: relative fall of the stiffness, 1/K (eq. 1, 2).
     pub stiffness_tempco_per_k: f64,
+    /// How the resonance follows from the stiffness: eq. 4 (default) or eq. 3.
+    pub stiffness_law: StiffnessLaw,
+    /// How far the sense channel's demodulation is turned away from the rate at T0, rad.
+    pub demodulation_error_rad: f64,
     /// `[gyro.bias]`: eq. 9 in the measured drive phase, deg/s, deg/s/rad, deg/s/rad^2.
     pub bias_dps: [f64; 3],
     /// `[gyro.electronics]`: what the electronics add to the measured drive phase.
     pub electronics: ElectronicsPhase,
+    /// `[gyro.thermal]`: the two-node thermal network.
+    pub thermal: ThermalNetwork,
     /// `[gyro.effects.*]`: what the device does beyond the declared model.
     pub effects: Effects,
 }
@@ -259,6 +265,37 @@ pub struct ElectronicsPhase {
     pub phase_slope_rad_per_k: f64,
     /// degC.
     pub reference_temperature_degc: f64,
+    /// Share of this phase that a phase loop sees, 0 to 1.
+    pub loop_share: f64,
+}
+
+/// How the natural frequency follows from the stiffness.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum StiffnessLaw {
+    /// `square_root`, eq. 3: omega_n = omega_n(T0) * sqrt(1 - kappa (T - T0)).
+    SquareRoot,
+    /// `linear`, eq. 4, the first order of eq. 3: omega_n = omega_n(T0) * (1 - kappa/2 (T - T0)). The
+    /// law that the paper's printed figures were made with, and the default.
+    #[default]
+    Linear,
+}
+
+/// `[gyro.thermal]`: structure and electronics, each a heat capacity, both coupled to the chamber
+/// and to each other.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ThermalNetwork {
+    /// Heat capacity of the structure, J/K.
+    pub structure_heat_j_per_k: f64,
+    /// Structure to chamber, W/K.
+    pub structure_chamber_w_per_k: f64,
+    /// Heat capacity of the electronics, J/K.
+    pub electronics_heat_j_per_k: f64,
+    /// Electronics to chamber, W/K.
+    pub electronics_chamber_w_per_k: f64,
+    /// Structure to electronics, W/K.
+    pub exchange_w_per_k: f64,
+    /// Heat of the electronics, W.
+    pub power_w: f64,
 }
 
 /// `[gyro.effects]`: departures of the simulated device from the declared model, by effect id.
@@ -288,6 +325,8 @@ pub struct ThermalRun {
     pub stop_degc: f64,
     /// K between dwells.
     pub step_k: f64,
+    /// The chamber's ramp between dwells, K/min.
+    pub ramp_k_per_min: f64,
     /// s at each dwell before the readings.
     pub dwell_s: f64,
     /// Readings at each dwell.
@@ -304,6 +343,12 @@ pub struct ThermalRun {
     pub adc_noise_lsb: f64,
     /// White rate noise, one-sided density, deg/s/sqrt(Hz).
     pub rate_noise_dps_rthz: f64,
+    /// Bias instability (1/f noise), deg/h.
+    pub flicker_dph: f64,
+    /// Rate random walk, deg/h/sqrt(h).
+    pub rate_random_walk_dph_rth: f64,
+    /// Rate of the table, both ways, that the scale factor is measured with, deg/s.
+    pub scale_rate_dps: f64,
     /// Seed of all noise.
     pub seed: u64,
 }

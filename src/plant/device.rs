@@ -1,6 +1,6 @@
 //! The device: what its measured drive phase and its bias are at a temperature.
 
-use super::resonator::{Resonator, StiffnessLaw};
+use super::resonator::Resonator;
 use crate::design::{Effects, ElectronicsPhase, Gyro, ModeCrossing};
 
 /// A gyro in thermal equilibrium.
@@ -21,14 +21,14 @@ pub struct Device {
 }
 
 impl Device {
-    /// From `[gyro]`; frequencies by eq. 4, the excitation at the drive's resonance at T0.
+    /// From `[gyro]`; the excitation at the drive's resonance at T0.
     pub fn new(gyro: &Gyro) -> Self {
         let mode = |frequency_hz, q| Resonator {
             frequency_hz,
             q,
             reference_k: gyro.reference_temperature_k,
             tempco_per_k: gyro.stiffness_tempco_per_k,
-            law: StiffnessLaw::Linear,
+            law: gyro.stiffness_law,
         };
         Device {
             drive: mode(gyro.drive_frequency_hz, gyro.drive_q),

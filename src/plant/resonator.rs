@@ -1,20 +1,10 @@
 //! One vibration mode whose stiffness falls linearly with temperature (seed paper, eq. 1 to 8).
 
+pub use crate::design::StiffnessLaw;
 use std::f64::consts::FRAC_PI_2;
 
 /// 0 degC in K.
 pub const ZERO_CELSIUS_K: f64 = 273.15;
-
-/// How the natural frequency follows from the stiffness.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum StiffnessLaw {
-    /// Eq. 3: omega_n = omega_n(T0) * sqrt(1 - kappa (T - T0)).
-    SquareRoot,
-    /// Eq. 4, the first order of eq. 3: omega_n = omega_n(T0) * (1 - kappa/2 (T - T0)). The law
-    /// that the paper's printed figures were made with, and the default.
-    #[default]
-    Linear,
-}
 
 /// A mode: a torsional or linear oscillator with viscous damping.
 #[derive(Debug, Clone, Copy, PartialEq)]
