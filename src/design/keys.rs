@@ -120,7 +120,7 @@ pub(super) const KEYS: &[(&str, &[(&str, &str)])] = &[
             ("reference_temperature_k", "300.0"),
             ("stiffness_tempco_per_k", "4.939e-5"),
             ("stiffness_law", "\"linear\""),
-            ("demodulation_error_rad", "0.4625"),
+            ("demodulation_error_rad", "0.436"),
             ("bias", "["),
             ("electronics", "["),
             ("thermal", "["),

@@ -45,11 +45,16 @@ impl Device {
         self.drive.response(degc, self.excitation_hz).phase_rad
     }
 
-    /// The measured drive phase, structure and electronics, rad: the virtual thermometer.
-    pub fn measured_phase_rad(&self, degc: f64) -> f64 {
+    /// What the electronics at a temperature add to the measured phase, rad.
+    pub fn electronics_phase_rad(&self, degc: f64) -> f64 {
         let e = &self.electronics;
-        let above = degc - e.reference_temperature_degc;
-        self.structural_phase_rad(degc) + e.phase_offset_rad + e.phase_slope_rad_per_k * above
+        e.phase_offset_rad + e.phase_slope_rad_per_k * (degc - e.reference_temperature_degc)
+    }
+
+    /// The measured drive phase, structure and electronics at one temperature, rad: the virtual
+    /// thermometer.
+    pub fn measured_phase_rad(&self, degc: f64) -> f64 {
+        self.structural_phase_rad(degc) + self.electronics_phase_rad(degc)
     }
 
     /// Eq. 9 at a measured drive phase, deg/s.

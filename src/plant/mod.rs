@@ -6,8 +6,11 @@
 //! All that a plant knows of the circuit is [`thermal_run::Sampling`].
 
 pub mod device;
+pub mod gyroscope;
 pub mod noise;
+pub mod profile;
 pub mod resonator;
+pub mod thermal;
 pub mod thermal_run;
 pub mod turn;
 

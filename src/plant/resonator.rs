@@ -38,7 +38,12 @@ impl Resonator {
 
     /// omega_n(T) / 2 pi, Hz, by eq. 3 or 4; 0 where the law has no stiffness left.
     pub fn natural_frequency_hz(&self, degc: f64) -> f64 {
-        let fall = self.tempco_per_k * self.above_reference_k(degc);
+        self.softened_frequency_hz(degc, 0.0)
+    }
+
+    /// The same where the stiffness has fallen by `more` (relative) beside kappa (T - T0).
+    pub fn softened_frequency_hz(&self, degc: f64, more: f64) -> f64 {
+        let fall = self.tempco_per_k * self.above_reference_k(degc) + more;
         let ratio = match self.law {
             StiffnessLaw::SquareRoot => (1.0 - fall).max(0.0).sqrt(),
             StiffnessLaw::Linear => (1.0 - fall / 2.0).max(0.0),

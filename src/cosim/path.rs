@@ -1,0 +1,254 @@
+//! One circuit, float or fixed, around one gyro.
+
+use super::rest::{self, Rest};
+use crate::circuit::engine::{self, ArithmeticKind, Engine, Rows};
+use crate::design::Design;
+use crate::error::{Error, Result};
+use crate::numeric::format::pow2;
+use crate::plant::gyroscope::{Conditions, Drive, Reference};
+use crate::plant::noise::Noise;
+use crate::plant::{Converter, Gyroscope};
+use std::f64::consts::TAU;
+
+/// What a decimated sample says, in physical units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RealRow {
+    /// Drive I, drive Q, sense I, sense Q, as values of the decimator's output.
+    pub channels: [f64; 4],
+    /// Drive phase, rad, in [-pi, pi).
+    pub phase_rad: f64,
+    /// Drive magnitude, as a value of the decimator's output.
+    pub magnitude: f64,
+    /// Compensated rate, deg/s; NaN without compensation in the chain.
+    pub rate_dps: f64,
+    /// The oscillator's frequency while this row's samples were taken, Hz.
+    pub freq_hz: f64,
+    /// The drive gain while this row's samples were taken, 0 to 1.
+    pub gain: f64,
+}
+
+/// A circuit in closed loop with a gyro. Both start at sample 0.
+pub struct Path {
+    engine: Box<dyn Engine>,
+    kind: ArithmeticKind,
+    /// The gyro.
+    pub gyroscope: Gyroscope,
+    converters: [Converter; 2],
+    units: Units,
+    /// rms of what is added to the drive and to the sense input, LSB.
+    noise_lsb: [f64; 2],
+    nominal_gain: f64,
+    drive_lsb: Vec<f64>,
+    sense_lsb: Vec<f64>,
+    codes: [Vec<i32>; 2],
+    rows: Rows,
+    sample: u64,
+}
+
+/// From a row's columns to physical units.
+#[derive(Debug, Clone)]
+struct Units {
+    sample_rate_hz: f64,
+    /// Positions of phase, magnitude and rate.
+    phase: usize,
+    magnitude: usize,
+    rate: Option<usize>,
+    columns: usize,
+    channel_lsb: f64,
+    phase_lsb_rad: f64,
+    rate_lsb_dps: f64,
+}
+
+impl Units {
+    fn new(design: &Design, kind: ArithmeticKind) -> Self {
+        let columns = engine::columns(design);
+        let position = |name: &str| columns.iter().position(|c| *c == name);
+        let circuit = &design.circuit;
+        let turn = pow2(-(circuit.cordic.angle_bits as i32)) * TAU;
+        let rate_lsb = design.compensation.as_ref().map(|c| c.output.format.lsb());
+        let fixed = kind == ArithmeticKind::Fixed;
+        let unit = |lsb: f64, real: f64| if fixed { lsb } else { real };
+        Units {
+            sample_rate_hz: circuit.sample_rate_hz,
+            phase: position("phase").unwrap_or(0),
+            magnitude: position("magnitude").unwrap_or(0),
+            rate: position("rate"),
+            columns: columns.len(),
+            channel_lsb: unit(circuit.decimator.output.format.lsb(), 1.0),
+            phase_lsb_rad: unit(turn, TAU),
+            rate_lsb_dps: unit(rate_lsb.unwrap_or(1.0), 1.0),
+        }
+    }
+}
+
+/// What an amplitude at the drive ADC (LSB) is, for a magnitude of 1: a product with the carrier
+/// halves it, and the decimator's gain is (R M)^N / 2^G.
+pub fn amplitude_lsb_per_magnitude(design: &Design) -> f64 {
+    let circuit = &design.circuit;
+    let decimator = &circuit.decimator;
+    let span = f64::from(decimator.ratio * decimator.differential_delay);
+    let gain = span.powi(decimator.stages as i32) * pow2(-(decimator.gain_bits() as i32));
+    let table = circuit.nco.table;
+    let carrier = (pow2(table.bits() as i32 - 1) - 1.0) * table.lsb();
+    2.0 / (carrier * gain) / circuit.adc.format.lsb()
+}
+
+impl Path {
+    /// A circuit and a gyro that have not started.
+    pub fn new(design: &Design, kind: ArithmeticKind) -> Self {
+        let circuit = &design.circuit;
+        let run = &design.thermal_run;
+        let adc_bits = circuit.adc.format.bits();
+        let full_scale_lsb = pow2(adc_bits as i32 - 1);
+        let reference = Reference {
+            sample_rate_hz: circuit.sample_rate_hz,
+            full_scale_lsb,
+            excitation_hz: rest::oscillator_hz(design),
+            tracking: circuit.phase_loop.is_some(),
+            held_amplitude: circuit.amplitude_loop.is_some(),
+            nominal_gain: rest::nominal_gain(design),
+        };
+        // White noise of rms s at the sense input has, demodulated, the one-sided density 2 s / sqrt(fs).
+        let rate_lsb = full_scale_lsb / run.sense_full_scale_dps
+            * run.rate_noise_dps_rthz
+            * circuit.sample_rate_hz.sqrt()
+            / 2.0;
+        let engine = engine::engine(design, kind);
+        let ratio = circuit.decimator.ratio as usize;
+        Path {
+            rows: engine.no_rows(),
+            engine,
+            kind,
+            gyroscope: Gyroscope::new(&design.gyro, run, reference),
+            converters: [Converter::new(adc_bits), Converter::new(adc_bits)],
+            units: Units::new(design, kind),
+            noise_lsb: [run.adc_noise_lsb, rate_lsb.hypot(run.adc_noise_lsb)],
+            nominal_gain: rest::nominal_gain(design),
+            drive_lsb: vec![0.0; ratio],
+            sense_lsb: vec![0.0; ratio],
+            codes: [vec![0; ratio], vec![0; ratio]],
+            sample: 0,
+        }
+    }
+
+    /// Puts gyro and loops into the steady state under `conditions`; the decimator and the oscillator's phase
+    /// stay where they are.
+    ///
+    /// # Errors
+    /// A phase loop whose setpoint is no phase of the resonance.
+    pub fn warm_start(&mut self, design: &Design, conditions: Conditions) -> Result<Rest> {
+        self.gyroscope.set(conditions);
+        let rest = rest::rest(design, &self.gyroscope)?;
+        self.engine.hold(rest.held);
+        self.gyroscope.settle(self.drive());
+        Ok(rest)
+    }
+
+    /// What the circuit drives the gyro with now.
+    pub fn drive(&self) -> Drive {
+        let e = self.engine.excitation();
+        Drive {
+            phase: e.phase,
+            step: e.step,
+            gain: e.gain.unwrap_or(self.nominal_gain),
+        }
+    }
+
+    /// The drive gain relative to nominal.
+    pub fn relative_gain(&self, row: &RealRow) -> f64 {
+        row.gain / self.nominal_gain
+    }
+
+    /// ADC samples so far.
+    pub fn samples(&self) -> u64 {
+        self.sample
+    }
+
+    /// One decimation period. `noise`: a stream that is indexed by the sample's number.
+    ///
+    /// # Errors
+    /// A circuit that stops on an overflow.
+    pub fn period(&mut self, noise: &Noise) -> Result<RealRow> {
+        let drive = self.drive();
+        self.gyroscope
+            .block(drive, &mut self.drive_lsb, &mut self.sense_lsb);
+        self.add_noise(noise);
+        self.sample += self.drive_lsb.len() as u64;
+        self.clear_rows();
+        match self.kind {
+            ArithmeticKind::Float => self.engine.process_inputs(
+                &self.drive_lsb,
+                &self.sense_lsb,
+                &mut self.rows,
+            ),
+            ArithmeticKind::Fixed => {
+                let [d, s] = &mut self.codes;
+                let [drive, sense] = &self.converters;
+                let convert = |codes: &mut [i32], inputs: &[f64], adc: &Converter| {
+                    for (code, input) in codes.iter_mut().zip(inputs) {
+                        *code = adc.code(*input);
+                    }
+                };
+                convert(d, &self.drive_lsb, drive);
+                convert(s, &self.sense_lsb, sense);
+                self.engine.process(d, s, &mut self.rows)
+            }
+        }
+        .map_err(|o| Error::Check(o.to_string()))?;
+        Ok(self.real_row(drive))
+    }
+
+    /// The codes of the last period, drive and sense (bit-accurate path only).
+    pub fn codes(&self) -> [&[i32]; 2] {
+        [&self.codes[0], &self.codes[1]]
+    }
+
+    fn add_noise(&mut self, noise: &Noise) {
+        let [drive_rms, sense_rms] = self.noise_lsb;
+        let [drive_adc, sense_adc] = &self.converters;
+        let silent = drive_rms == 0.0 && sense_rms == 0.0;
+        let inputs = self.drive_lsb.iter_mut().zip(&mut self.sense_lsb);
+        for (index, (d, s)) in (self.sample..).zip(inputs) {
+            if !silent {
+                let (a, b) = noise.gaussian_pair(index);
+                *d += drive_rms * a;
+                *s += sense_rms * b;
+            }
+            *d = drive_adc.analog(*d);
+            *s = sense_adc.analog(*s);
+        }
+    }
+
+    fn clear_rows(&mut self) {
+        match &mut self.rows {
+            Rows::Integer(words) => words.clear(),
+            Rows::Real(values) => values.clear(),
+        }
+    }
+
+    fn real_row(&self, drive: Drive) -> RealRow {
+        let u = &self.units;
+        let mut row = [0.0; 9];
+        match &self.rows {
+            Rows::Integer(words) => {
+                for (to, from) in row.iter_mut().zip(words.iter().take(u.columns)) {
+                    *to = *from as f64;
+                }
+            }
+            Rows::Real(values) => {
+                for (to, from) in row.iter_mut().zip(values.iter().take(u.columns)) {
+                    *to = *from;
+                }
+            }
+        }
+        let [a, b, c, d, ..] = row;
+        RealRow {
+            channels: [a, b, c, d].map(|v| v * u.channel_lsb),
+            phase_rad: row[u.phase] * u.phase_lsb_rad,
+            magnitude: row[u.magnitude] * u.channel_lsb,
+            rate_dps: u.rate.map_or(f64::NAN, |k| row[k] * u.rate_lsb_dps),
+            freq_hz: drive.step as i64 as f64 * pow2(-64) * u.sample_rate_hz,
+            gain: drive.gain,
+        }
+    }
+}

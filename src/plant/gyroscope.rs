@@ -1,0 +1,423 @@
+//! The gyro in motion: drive and sense resonator under the circuit's excitation, at the ADC rate.
+//!
+//! Lengths are scaled to what the ADCs see: the drive motion x is in LSB of the drive ADC, the sense
+//! motion y in LSB of the sense ADC; u = x'/w0 and v = y'/w0 with w0 the drive's resonance at T0.
+//!
+//! - drive: x'' + (w1/Q1) x' + w1^2 x = g F sin(theta) (eq. 5; theta: the oscillator's phase, g: the
+//!   drive gain), with F such that at resonance and nominal gain |x| is the design's drive amplitude;
+//! - sense: y'' + (w2/Q2) y' + w2^2 y = K (Om x'/w0 - q x): Coriolis force and quadrature. The rate Om
+//!   that acts is the applied one and the in-phase coupling, an error force in phase with the
+//!   Coriolis force that is stated as a rate;
+//! - drive ADC: x turned by the electronics' phase; sense ADC: y turned by a fixed angle, so that at T0
+//!   a rate comes out in phase with the oscillator's sine, but for the demodulation error.
+//!
+//! The discretisation is exact. The excitation is the band-limited sinusoid through the oscillator's
+//! phases, so that the steady state is eq. 5 to 7 without any hold's or DAC's phase. The motion is
+//! that steady state P(theta) plus a deviation w that decays freely, w(t + h) = exp(A h) w(t); where frequency,
+//! gain, rate or temperature change, P changes and w takes up the difference, so the motion itself
+//! is continuous. In equilibrium w is 0, which is also the warm start.
+//!
+//! In-phase coupling: eq. 9 states what the authors measured at the *output*. A fixed-frequency
+//! demodulator turns with the drive's phase, so part of that is quadrature. The coupling is what
+//! has to be added to the device's quadrature so that a fixed-frequency circuit with held amplitude
+//! reads eq. 9 at every temperature; a circuit that tracks the resonance sees the same device.
+
+use super::device::Device;
+use super::thermal::Temperatures;
+use super::turn;
+use crate::design::{Gyro, ThermalRun};
+use nalgebra::{Complex, Matrix2, Matrix4, Vector2};
+use std::f64::consts::TAU;
+
+type C = Complex<f64>;
+
+/// 2^64: steps of a phase in one turn.
+const TURN: f64 = 18_446_744_073_709_551_616.0;
+
+/// All that the plant knows of the circuit beside its excitation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reference {
+    /// ADC sample rate, Hz.
+    pub sample_rate_hz: f64,
+    /// Full scale of both ADCs, LSB.
+    pub full_scale_lsb: f64,
+    /// The frequency of the excitation, Hz: fixed, or where a phase loop starts.
+    pub excitation_hz: f64,
+    /// A phase loop moves the frequency.
+    pub tracking: bool,
+    /// An amplitude loop moves the gain.
+    pub held_amplitude: bool,
+    /// The gain that gives the design's drive amplitude at resonance at T0, 0 to 1.
+    pub nominal_gain: f64,
+}
+
+/// What the circuit drives the gyro with during a block of samples.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Drive {
+    /// The oscillator's phase at the sample before the block, 2^-64 turn.
+    pub phase: u64,
+    /// Its advance before each sample, 2^-64 turn.
+    pub step: u64,
+    /// Drive gain, 0 to 1.
+    pub gain: f64,
+}
+
+/// What acts on the gyro during a block of samples.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Conditions {
+    /// Structure and electronics.
+    pub temperatures: Temperatures,
+    /// The applied rate as the sensor sees it, deg/s.
+    pub rate_dps: f64,
+    /// What adds to the bias at the output beside eq. 9, deg/s.
+    pub extra_bias_dps: f64,
+    /// What pulls the measured drive phase beside structure and electronics, rad.
+    pub phase_pull_rad: f64,
+    /// Quality factor of the drive mode.
+    pub drive_q: f64,
+    /// Relative fall of the stiffness beside kappa (T - T0).
+    pub softening: f64,
+}
+
+/// A gyro in motion.
+#[derive(Debug, Clone)]
+pub struct Gyroscope {
+    device: Device,
+    reference: Reference,
+    /// Force per mass at gain 1, LSB rad^2/s^2.
+    force: f64,
+    /// K, sense force per deg/s and LSB of drive motion.
+    coupling: f64,
+    /// Quadrature, deg/s.
+    quadrature_dps: f64,
+    /// LSB of the sense ADC in a deg/s.
+    lsb_per_dps: f64,
+    /// By which the sense channel is turned, rad.
+    sense_turn_rad: f64,
+    conditions: Conditions,
+    modes: Modes,
+    /// Steady state at the drive at hand.
+    steady: Steady,
+    drive: Drive,
+    /// Deviation from the steady state: x, u, y, v.
+    deviation: [f64; 4],
+}
+
+/// What depends on the temperature alone.
+#[derive(Debug, Clone, Copy)]
+struct Modes {
+    /// w1, w2, rad/s, and the widths w1/Q1, w2/Q2.
+    w: [f64; 2],
+    width: [f64; 2],
+    /// exp(A h) of the drive and of the sense mode.
+    drive: Matrix2<f64>,
+    sense: Matrix2<f64>,
+    /// Its lower left block for a force K = 1 on u and on x.
+    by_velocity: Matrix2<f64>,
+    by_position: Matrix2<f64>,
+    /// The electronics' phase that the drive channel adds, rad.
+    electronics_rad: f64,
+    /// The in-phase coupling, deg/s.
+    in_phase_dps: f64,
+}
+
+/// The steady motion under a drive, as phasors of exp(i theta), sin(theta) being the imaginary part.
+#[derive(Debug, Clone, Copy, Default)]
+struct Steady {
+    state: [C; 4],
+    /// What both ADCs see.
+    outputs: [C; 2],
+    /// Outputs of the deviation: rows on (x, u) and (y, v).
+    drive_row: [f64; 2],
+    sense_row: [f64; 2],
+    /// The rate that acts, deg/s.
+    rate_dps: f64,
+}
+
+impl Gyroscope {
+    /// The gyro `gyro` with amplitudes as in `run`, at rest at T0.
+    pub fn new(gyro: &Gyro, run: &ThermalRun, reference: Reference) -> Self {
+        let device = Device::new(gyro);
+        let (w0, w2) = (TAU * gyro.drive_frequency_hz, TAU * gyro.sense_frequency_hz);
+        let amplitude_lsb = reference.full_scale_lsb * run.drive_amplitude;
+        let lsb_per_dps = reference.full_scale_lsb / run.sense_full_scale_dps;
+        let sense = response(w2, w2 / gyro.sense_q, w0);
+        let error = gyro.demodulation_error_rad;
+        let t0 = gyro.reference_temperature_k - super::resonator::ZERO_CELSIUS_K;
+        let temperatures = Temperatures {
+            chamber_degc: t0,
+            structure_degc: t0,
+            electronics_degc: t0,
+            lagged_degc: t0,
+            structure_k_per_s: 0.0,
+        };
+        let conditions = Conditions {
+            temperatures,
+            rate_dps: 0.0,
+            extra_bias_dps: 0.0,
+            phase_pull_rad: 0.0,
+            drive_q: gyro.drive_q,
+            softening: 0.0,
+        };
+        let mut gyroscope = Gyroscope {
+            force: amplitude_lsb * w0 * w0 / (gyro.drive_q * reference.nominal_gain),
+            coupling: lsb_per_dps / (error.cos() * amplitude_lsb * sense.norm()),
+            quadrature_dps: run.quadrature_dps * error.cos(),
+            lsb_per_dps,
+            sense_turn_rad: error - sense.arg(),
+            conditions,
+            modes: Modes {
+                w: [w0, w2],
+                width: [w0 / gyro.drive_q, w2 / gyro.sense_q],
+                drive: Matrix2::identity(),
+                sense: Matrix2::identity(),
+                by_velocity: Matrix2::zeros(),
+                by_position: Matrix2::zeros(),
+                electronics_rad: 0.0,
+                in_phase_dps: 0.0,
+            },
+            steady: Steady::default(),
+            drive: Drive {
+                phase: 0,
+                step: 0,
+                gain: 0.0,
+            },
+            deviation: [0.0; 4],
+            device,
+            reference,
+        };
+        gyroscope.modes = gyroscope.modes_at(&conditions);
+        gyroscope
+    }
+
+    /// The declared model.
+    pub fn device(&self) -> &Device {
+        &self.device
+    }
+
+    /// Where a phase loop with this setpoint comes to rest, Hz, if the resonance has such a phase.
+    ///
+    /// Eq. 7 solved for the excitation: with a = -phase of the motion in (0, pi), w^2 + w (w1/Q1) cot a -
+    /// w1^2 = 0.
+    pub fn locked_hz(&self, setpoint_rad: f64) -> Option<f64> {
+        let pull = self.modes.electronics_rad + self.conditions.phase_pull_rad;
+        let lag = (pull - setpoint_rad).rem_euclid(TAU);
+        let inside = lag > 1e-3 && lag < TAU / 2.0 - 1e-3;
+        let (w1, width) = (self.modes.w[0], self.modes.width[0]);
+        let b = width / lag.tan();
+        inside.then(|| ((b * b + 4.0 * w1 * w1).sqrt() - b) / 2.0 / TAU)
+    }
+
+    /// The drive gain at which the drive ADC sees `amplitude_lsb` at an excitation of `hz`.
+    pub fn gain_for(&self, amplitude_lsb: f64, hz: f64) -> f64 {
+        let w = TAU * hz;
+        let x = response(self.modes.w[0], self.modes.width[0], w);
+        amplitude_lsb / (self.force * x.norm())
+    }
+
+    /// Sense I per deg/s of rate relative to nominal in the steady state at hand, 1.
+    pub fn scale_factor(&self) -> f64 {
+        let u = self.steady.state[1];
+        self.rate_phasor(&self.modes, u, self.omega()).re / self.lsb_per_dps
+    }
+
+    fn omega(&self) -> f64 {
+        self.drive.step as i64 as f64 / TURN * TAU * self.reference.sample_rate_hz
+    }
+
+    /// Sets what acts from the next block on. The motion stays continuous.
+    pub fn set(&mut self, conditions: Conditions) {
+        let before = &self.conditions;
+        let same_modes = before.temperatures == conditions.temperatures
+            && (before.drive_q, before.softening) == (conditions.drive_q, conditions.softening);
+        if !same_modes {
+            self.modes = self.modes_at(&conditions);
+        }
+        self.conditions = conditions;
+        self.move_to(self.drive);
+    }
+
+    /// Puts the gyro into the steady state under a drive.
+    pub fn settle(&mut self, drive: Drive) {
+        self.move_to(drive);
+        self.deviation = [0.0; 4];
+    }
+
+    /// Stops all motion.
+    pub fn stop(&mut self) {
+        let (sin, cos) = turn::sin_cos(self.drive.phase);
+        self.deviation = self.steady.state.map(|p| -(p.re * sin + p.im * cos));
+    }
+
+    /// The drive's samples of a block, before any noise or converter: drive and sense input, LSB.
+    pub fn block(&mut self, drive: Drive, drive_lsb: &mut [f64], sense_lsb: &mut [f64]) {
+        if drive != self.drive {
+            self.move_to(drive);
+        }
+        let m = &self.modes;
+        let (a, b) = (m.drive, m.sense);
+        let c = self.coupling
+            * (m.by_velocity * self.steady.rate_dps - m.by_position * self.quadrature_dps);
+        let [drive_out, sense_out] = self.steady.outputs;
+        let ([dx, du], [dy, dv]) = (self.steady.drive_row, self.steady.sense_row);
+        let [mut x, mut u, mut y, mut v] = self.deviation;
+        let mut phase = drive.phase;
+        for (d, s) in drive_lsb.iter_mut().zip(sense_lsb) {
+            (x, u, y, v) = (
+                a.m11 * x + a.m12 * u,
+                a.m21 * x + a.m22 * u,
+                c.m11 * x + c.m12 * u + b.m11 * y + b.m12 * v,
+                c.m21 * x + c.m22 * u + b.m21 * y + b.m22 * v,
+            );
+            phase = phase.wrapping_add(drive.step);
+            let (sin, cos) = turn::sin_cos(phase);
+            *d = drive_out.re * sin + drive_out.im * cos + dx * x + du * u;
+            *s = sense_out.re * sin + sense_out.im * cos + dy * y + dv * v;
+        }
+        self.deviation = [x, u, y, v];
+        self.drive.phase = phase;
+    }
+
+    /// Takes up the difference of two steady states, so that the motion is continuous.
+    fn move_to(&mut self, drive: Drive) {
+        let before = self.steady;
+        self.drive = drive;
+        self.steady = self.steady_at(drive);
+        let (sin, cos) = turn::sin_cos(drive.phase);
+        for (k, w) in self.deviation.iter_mut().enumerate() {
+            let change = before.state[k] - self.steady.state[k];
+            *w += change.re * sin + change.im * cos;
+        }
+    }
+
+    /// The sense ADC's phasor for a rate of 1 deg/s under the drive velocity u.
+    fn rate_phasor(&self, modes: &Modes, u: C, w: f64) -> C {
+        u * self.coupling * self.sense_response(modes, w)
+    }
+
+    /// The sense ADC's phasor of the quadrature under the drive motion x.
+    fn quadrature_phasor(&self, modes: &Modes, x: C, w: f64) -> C {
+        x * -self.coupling * self.quadrature_dps * self.sense_response(modes, w)
+    }
+
+    /// From a force on the sense mode to what its ADC sees.
+    fn sense_response(&self, modes: &Modes, w: f64) -> C {
+        response(modes.w[1], modes.width[1], w) * C::cis(self.sense_turn_rad)
+    }
+
+    fn steady_at(&self, drive: Drive) -> Steady {
+        let c = &self.conditions;
+        let w = drive.step as i64 as f64 / TURN * TAU * self.reference.sample_rate_hz;
+        let w0 = TAU * self.device.drive.frequency_hz;
+        let ratio = C::new(0.0, w / w0);
+        let x = response(self.modes.w[0], self.modes.width[0], w) * self.force * drive.gain;
+        let u = ratio * x;
+        let per_dps = self.rate_phasor(&self.modes, u, w);
+        // An effect states what it adds to the output; the force that does so is larger where the
+        // output is less sensitive. Without motion there is no output at all.
+        let sensitivity = per_dps.re / self.lsb_per_dps;
+        let extra = if sensitivity > 1e-3 {
+            c.extra_bias_dps / sensitivity
+        } else {
+            0.0
+        };
+        let rate_dps = c.rate_dps + self.modes.in_phase_dps + extra;
+        let untwisted = C::cis(-self.sense_turn_rad);
+        let y = (per_dps * rate_dps + self.quadrature_phasor(&self.modes, x, w)) * untwisted;
+        let v = ratio * y;
+        // A phase is a time; of what stands still it shows nothing.
+        let per_velocity = if w == 0.0 { 0.0 } else { w0 / w };
+        let turned = |angle: f64| [angle.cos(), per_velocity * angle.sin()];
+        let drive_turn = self.modes.electronics_rad + c.phase_pull_rad;
+        let (drive_row, sense_row) = (turned(drive_turn), turned(self.sense_turn_rad));
+        Steady {
+            state: [x, u, y, v],
+            outputs: [
+                x * drive_row[0] + u * drive_row[1],
+                y * sense_row[0] + v * sense_row[1],
+            ],
+            drive_row,
+            sense_row,
+            rate_dps,
+        }
+    }
+
+    fn modes_at(&self, c: &Conditions) -> Modes {
+        let t = &c.temperatures;
+        let soft = |mode: &super::Resonator| {
+            TAU * mode.softened_frequency_hz(t.structure_degc, c.softening)
+        };
+        let w = [soft(&self.device.drive), soft(&self.device.sense)];
+        let width = [w[0] / c.drive_q, w[1] / self.device.sense.q];
+        let w0 = TAU * self.device.drive.frequency_hz;
+        let h = 1.0 / self.reference.sample_rate_hz;
+        let mode = |k: usize| {
+            Matrix2::new(0.0, w0, -w[k] * w[k] / w0, -width[k]) * h
+        };
+        // Below: the force K on v' of the sense mode, by x and by u.
+        let joined = |by: Vector2<f64>| {
+            let mut a = Matrix4::zeros();
+            a.fixed_view_mut::<2, 2>(0, 0).copy_from(&mode(0));
+            a.fixed_view_mut::<2, 2>(2, 2).copy_from(&mode(1));
+            a.fixed_view_mut::<1, 2>(3, 0)
+                .copy_from(&(by.transpose() * (h / w0)));
+            a.exp()
+        };
+        let (position, velocity) = (
+            joined(Vector2::new(1.0, 0.0)),
+            joined(Vector2::new(0.0, 1.0)),
+        );
+        let block = |m: &Matrix4<f64>, row, column| m.fixed_view::<2, 2>(row, column).into_owned();
+        let electronics = self.device.electronics_phase_rad(t.electronics_degc);
+        let share = if self.reference.tracking {
+            self.device.electronics.loop_share
+        } else {
+            1.0
+        };
+        let mut modes = Modes {
+            w,
+            width,
+            drive: block(&velocity, 0, 0),
+            sense: block(&velocity, 2, 2),
+            by_velocity: block(&velocity, 2, 0),
+            by_position: block(&position, 2, 0),
+            electronics_rad: electronics * share,
+            in_phase_dps: 0.0,
+        };
+        modes.in_phase_dps = self.in_phase_coupling_dps(&modes, electronics);
+        modes
+    }
+
+    /// The in-phase coupling at the modes' temperature: what makes a fixed-frequency circuit read
+    /// eq. 9 (module documentation), deg/s.
+    fn in_phase_coupling_dps(&self, modes: &Modes, electronics_rad: f64) -> f64 {
+        let reference = &self.reference;
+        let w0 = TAU * self.device.drive.frequency_hz;
+        let w = if reference.tracking {
+            w0
+        } else {
+            TAU * reference.excitation_hz
+        };
+        let mut x = response(modes.w[0], modes.width[0], w);
+        let measured_rad = x.arg() + electronics_rad;
+        let nominal_lsb = self.force * reference.nominal_gain * self.device.drive.q / (w0 * w0);
+        if reference.tracking || reference.held_amplitude {
+            x *= nominal_lsb / x.norm();
+        } else {
+            x *= self.force * reference.nominal_gain;
+        }
+        let u = C::new(0.0, w / w0) * x;
+        let wanted_lsb = self.device.bias_at_phase_dps(measured_rad) * self.lsb_per_dps;
+        let gain = self.rate_phasor(modes, u, w).re;
+        (wanted_lsb - self.quadrature_phasor(modes, x, w).re) / gain
+    }
+}
+
+/// 1 / (wn^2 - w^2 + i w width): a mode's displacement under a unit force of frequency w (eq. 5).
+fn response(wn: f64, width: f64, w: f64) -> C {
+    C::new(wn * wn - w * w, w * width).inv()
+}
+
+#[cfg(test)]
+#[path = "gyroscope_tests.rs"]
+mod tests;
