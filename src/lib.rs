@@ -1,11 +1,14 @@
 //! gyrogen: from a MEMS vibratory gyroscope's thermal drift to trusted fixed-point firmware.
 //!
 //! In reading order: [`numeric`] (formats and arithmetics), [`circuit`] (the detection circuit,
-//! written once), [`design`] (what a user writes), [`record`] (what was measured).
+//! written once), [`design`] (what a user writes), [`plant`] (the simulated gyro), [`cosim`] (both in closed loop),
+//! [`record`] (what was measured), [`closure`] (what a record says), [`job`] (the main job), [`emit`] and [`verify`]
+//! (C and Rust, and that they are the model), [`report`].
 
 pub mod circuit;
 pub mod cli;
 pub mod closure;
+pub mod cosim;
 pub mod design;
 pub mod emit;
 pub mod error;

@@ -11,6 +11,7 @@
 pub mod path;
 pub mod readings;
 pub mod rest;
+pub mod scale;
 pub mod stream;
 pub mod surroundings;
 

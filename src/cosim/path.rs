@@ -144,6 +144,12 @@ impl Path {
         Ok(rest)
     }
 
+    /// Puts the gyro into the motion that the circuit as it starts excites; the loops act from there.
+    pub fn start(&mut self, conditions: Conditions) {
+        self.gyroscope.set(conditions);
+        self.gyroscope.settle(self.drive());
+    }
+
     /// What the circuit drives the gyro with now.
     pub fn drive(&self) -> Drive {
         let e = self.engine.excitation();

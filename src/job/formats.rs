@@ -1,9 +1,10 @@
 //! The thermometer of the firmware, and formats where the design leaves them open.
 
 use crate::closure::BaselineFit;
+use crate::cosim::scale::{nominal_full_scale_dps, power_of_two_near};
 use crate::design::{ChannelInput, Compensation, CompensationInput, Design, RecordMapping};
 use crate::error::{InputError, Result};
-use crate::numeric::format::{Format, Overflow, Quantizer, Rounding, pow2};
+use crate::numeric::format::{Format, Overflow, Quantizer, Rounding};
 use crate::record::ThermalRecord;
 
 /// Bits of a chosen coefficient and of a chosen output.
@@ -125,20 +126,6 @@ pub fn fill(design: &mut Design, fit: &BaselineFit, record: &ThermalRecord) -> R
     ));
     design.compensation = Some(compensation);
     Ok(said)
-}
-
-/// What sense I is to be multiplied with, deg/s: twice the sense channel's full scale, since a product
-/// with a carrier of the same frequency halves the amplitude, over the decimator's gain (R M)^N / 2^G.
-pub fn nominal_full_scale_dps(design: &Design) -> f64 {
-    let decimator = &design.circuit.decimator;
-    let span = f64::from(decimator.ratio * decimator.differential_delay);
-    let gain = span.powi(decimator.stages as i32) * pow2(-(decimator.gain_bits() as i32));
-    2.0 * design.thermal_run.sense_full_scale_dps / gain
-}
-
-/// The power of two nearest to `value`, by ratio.
-pub fn power_of_two_near(value: f64) -> f64 {
-    pow2(value.log2().round() as i32)
 }
 
 /// The shortest signed format in `bits` whose values reach `peak` and whose LSB is at most `step`;

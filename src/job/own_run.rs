@@ -1,4 +1,4 @@
-//! The design's own thermal run: plant, ADC codes, circuit, in one stream without a break.
+//! The design's own thermal run: plant and circuit in closed loop, in one stream without a break.
 
 use super::firmware::Firmware;
 use super::formats;
@@ -6,97 +6,63 @@ use super::outcome::Point;
 use super::{clamped_bias, compensation, warning};
 use crate::circuit::engine::{self, ArithmeticKind, Rows};
 use crate::closure::BaselineFit;
+use crate::cosim::scale::{full_scale_dps, nominal_full_scale_dps};
+use crate::cosim::surroundings::Moment;
+use crate::cosim::{readings, stream};
 use crate::design::{CompensationInput, Design};
 use crate::error::{Error, InputError, Result};
 use crate::numeric::format::pow2;
-use crate::plant::{Reading, Sampling, ThermalPlant};
+use crate::plant::profile::{Profile, Reading};
 use crate::record::Warning;
 use std::f64::consts::TAU;
-
-/// Rows dropped at the start of a reading, beyond the decimator's memory.
-const SETTLING_ROWS: usize = 8;
 
 /// Codes of the whole run and what the uncompensated circuit makes of them.
 pub struct OwnRun {
     readings: Vec<Reading>,
-    drive: Vec<i32>,
-    sense: Vec<i32>,
-    rows_per_reading: usize,
-    settling_rows: usize,
-    /// Mean phase (rad) and rate output (deg/s) of each reading, bit-accurate.
+    moments: Vec<Moment>,
+    stream: stream::Stream,
+    /// Mean thermometer (rad or Hz) and rate output (deg/s) of each reading, bit-accurate.
     measured: Vec<(f64, f64)>,
+    tracking: bool,
 }
 
 impl OwnRun {
     /// Simulates the run and passes it through the circuit without compensation.
     ///
     /// # Errors
-    /// A circuit that stops on an overflow; a design whose readings are too long to hold.
+    /// A circuit that stops on an overflow or a loop that does not settle; a design whose readings are too
+    /// long to hold; a compensation in a channel that the run does not have.
     pub fn simulate(design: &Design) -> Result<Self> {
-        let circuit = &design.circuit;
-        let run = &design.thermal_run;
-        if circuit.phase_loop.is_some() {
-            return Err(InputError::new(
-                "the design has a phase loop, which holds the drive phase: it is no thermometer then, and \
-                 the own thermal run drives at a fixed frequency",
-            )
-            .help("leave [circuit.phase_loop] out, or give a measured record with --record")
-            .into());
-        }
-        let plant = ThermalPlant::new(
-            &design.gyro,
-            run,
-            Sampling {
-                sample_rate_hz: circuit.sample_rate_hz,
-                adc_bits: circuit.adc.format.bits(),
-                tuning_word: circuit.nco.tuning_word,
-                phase_bits: circuit.nco.phase_bits,
-            },
-        );
         let own = design
             .compensation
             .as_ref()
             .filter(|_| design.compensation_is_own);
         if let Some(c) = own
-            && c.input != CompensationInput::Phase
+            && let CompensationInput::Channel(_) = c.input
         {
             return Err(InputError::new(format!(
-                "the compensation's input is {}, the own thermal run's thermometer is the drive phase",
+                "the compensation's input is {}, the own thermal run's thermometer is the circuit's own",
                 formats::column_of(c)
             ))
-            .help("give a measured record with --record, or set compensation.input = \"phase\"")
+            .help("give a measured record with --record, or set compensation.input to \"phase\" or \"tuning_word\"")
             .into());
         }
-        let ratio = circuit.decimator.ratio as usize;
-        let memory = (circuit.decimator.stages * circuit.decimator.differential_delay) as usize;
-        let settling_rows = memory + SETTLING_ROWS;
-        let rows_per_reading = settling_rows + run.samples_per_reading as usize;
-        let samples = rows_per_reading * ratio;
-        let readings = plant.readings(samples as f64 / circuit.sample_rate_hz);
-        const LIMIT: usize = 1 << 28;
-        if samples.saturating_mul(readings.len()) > LIMIT {
-            return Err(InputError::new(format!(
-                "the thermal run has {} readings of {samples} ADC samples, more than {LIMIT} in all",
-                readings.len()
-            ))
-            .help("lower thermal_run.samples_per_reading or readings_per_dwell, or raise step_k")
-            .into());
-        }
-        let (mut drive, mut sense) = (Vec::new(), Vec::new());
-        for (k, reading) in readings.iter().enumerate() {
-            // The NCO runs on from reading to reading, and so does the excitation.
-            let first = crate::plant::thermal_run::FIRST_SAMPLE + (k * samples) as u64;
-            let (d, s) = plant.codes_from(reading, first, samples);
-            drive.extend(d);
-            sense.extend(s);
-        }
+        let uncompensated = Design {
+            compensation: None,
+            ..design.clone()
+        };
+        let rows = stream::rows_per_reading(design)?;
+        let samples = rows * design.circuit.decimator.ratio as usize;
+        let reading_s = samples as f64 / design.circuit.sample_rate_hz;
+        let (profile, readings) = Profile::of_run(&design.thermal_run, reading_s);
+        let moments = readings::moments(design, &profile, &readings);
+        let stream = stream::stream(&uncompensated, &moments)?;
         let mut own = OwnRun {
             readings,
-            drive,
-            sense,
-            rows_per_reading,
-            settling_rows,
+            moments,
+            stream,
             measured: Vec::new(),
+            tracking: design.circuit.phase_loop.is_some(),
         };
         own.measured = own.uncompensated(design, ArithmeticKind::Fixed)?;
         Ok(own)
@@ -104,11 +70,13 @@ impl OwnRun {
 
     /// The run as a thermal record (`docs/manual.md`): what the closure sees of it.
     pub fn record_csv(&self) -> String {
-        let mut text = String::from("time_s,chamber_degc,phase_rad,rate_out_dps\n");
-        for (reading, (phase, rate)) in self.readings.iter().zip(&self.measured) {
+        let thermometer = if self.tracking { "freq_hz" } else { "phase_rad" };
+        let mut text = format!("time_s,chamber_degc,{thermometer},rate_out_dps\n");
+        let rows = self.readings.iter().zip(&self.moments).zip(&self.measured);
+        for ((reading, moment), (thermometer, rate)) in rows {
             text += &format!(
-                "{:.3},{:.3},{phase:.9},{rate:.7}\n",
-                reading.time_s, reading.chamber_degc
+                "{:.3},{:.3},{thermometer:.9},{rate:.7}\n",
+                reading.time_s, moment.temperatures.chamber_degc
             );
         }
         text
@@ -127,7 +95,7 @@ impl OwnRun {
                 format!("the NCO runs at {nco_hz:.3} Hz, the gyro resonates at {drive_hz} Hz"),
             ));
         }
-        let nominal = formats::nominal_full_scale_dps(design);
+        let nominal = nominal_full_scale_dps(design);
         if let Some(c) = &design.compensation
             && (c.rate_full_scale_dps / nominal - 1.0).abs() > 0.01
         {
@@ -144,15 +112,15 @@ impl OwnRun {
         warnings
     }
 
-    /// Mean phase and rate output of each reading, without compensation.
+    /// Mean thermometer and rate output of each reading, without compensation.
     fn uncompensated(&self, design: &Design, kind: ArithmeticKind) -> Result<Vec<(f64, f64)>> {
         let rows = self.rows(design, kind)?;
-        let scale = full_scale(design);
+        let scale = full_scale_dps(design);
         Ok(rows
             .iter()
             .map(|reading| {
-                let phase = mean(reading.iter().map(|r| r.phase_rad));
-                (phase, mean(reading.iter().map(|r| r.sense_i * scale)))
+                let thermometer = mean(reading.iter().map(|r| r.thermometer));
+                (thermometer, mean(reading.iter().map(|r| r.sense_i * scale)))
             })
             .collect())
     }
@@ -165,28 +133,36 @@ impl OwnRun {
         let mut engine = engine::engine(&design, kind);
         let mut rows = engine.no_rows();
         engine
-            .process(&self.drive, &self.sense, &mut rows)
+            .process(&self.stream.drive, &self.stream.sense, &mut rows)
             .map_err(|o| Error::Check(o.to_string()))?;
-        let lsb = design.circuit.decimator.output.format.lsb();
-        let turn = pow2(-(design.circuit.cordic.angle_bits as i32));
+        let circuit = &design.circuit;
+        let lsb = circuit.decimator.output.format.lsb();
+        let turn = pow2(-(circuit.cordic.angle_bits as i32)) * TAU;
+        let word_hz = circuit.sample_rate_hz * pow2(-(circuit.nco.phase_bits as i32));
+        // Sense I, thermometer: their columns, and what an LSB is.
+        let (column, integer, real) = if self.tracking {
+            (TUNING_WORD, word_hz, 1.0)
+        } else {
+            (PHASE, turn, TAU)
+        };
+        let row = |sense_i: f64, thermometer: f64| RealRow {
+            sense_i,
+            thermometer,
+        };
         let real: Vec<RealRow> = match &rows {
             Rows::Integer(words) => words
                 .chunks_exact(columns)
-                .map(|r| RealRow {
-                    sense_i: r[2] as f64 * lsb,
-                    phase_rad: r[4] as f64 * turn * TAU,
-                })
+                .map(|r| row(r[SENSE_I] as f64 * lsb, r[column] as f64 * integer))
                 .collect(),
             Rows::Real(values) => values
                 .chunks_exact(columns)
-                .map(|r| RealRow {
-                    sense_i: r[2],
-                    phase_rad: r[4] * TAU,
-                })
+                .map(|r| row(r[SENSE_I], r[column] * real))
                 .collect(),
         };
-        let readings = real.chunks_exact(self.rows_per_reading);
-        Ok(readings.map(|r| r[self.settling_rows..].to_vec()).collect())
+        let readings = real.chunks_exact(self.stream.rows_per_reading);
+        Ok(readings
+            .map(|r| r[self.stream.settling_rows..].to_vec())
+            .collect())
     }
 
     /// Every reading through every path: float with the fit's own coefficients, the bit-accurate
@@ -200,14 +176,14 @@ impl OwnRun {
         fit: &BaselineFit,
         firmware: &Firmware,
     ) -> Result<Vec<Point>> {
-        let scale = full_scale(design);
+        let scale = full_scale_dps(design);
         let float: Vec<f64> = self
             .rows(design, ArithmeticKind::Float)?
             .iter()
             .map(|rows| {
                 let rates = rows
                     .iter()
-                    .map(|r| r.sense_i * scale - clamped_bias(fit, r.phase_rad));
+                    .map(|r| r.sense_i * scale - clamped_bias(fit, r.thermometer));
                 mean(rates)
             })
             .collect();
@@ -218,30 +194,28 @@ impl OwnRun {
         let mut engine = engine::engine(design, ArithmeticKind::Fixed);
         let mut rows = engine.no_rows();
         engine
-            .process(&self.drive, &self.sense, &mut rows)
+            .process(&self.stream.drive, &self.stream.sense, &mut rows)
             .map_err(|o| Error::Check(o.to_string()))?;
         let fixed: Vec<i64> = match rows {
             Rows::Integer(words) => words.iter().map(|w| *w as i64).collect(),
             Rows::Real(_) => Vec::new(),
         };
         let fixed = rate_of(&fixed);
-        let c = rate_of(&firmware.c.chain(&self.drive, &self.sense, columns.len())?);
+        let c = rate_of(&firmware.c.chain(&self.stream.drive, &self.stream.sense, columns.len())?);
         let rust = rate_of(
             &firmware
                 .rust
-                .chain(&self.drive, &self.sense, columns.len())?,
+                .chain(&self.stream.drive, &self.stream.sense, columns.len())?,
         );
         let missing = f64::NAN;
         let at = |values: &[f64], k: usize| values.get(k).copied().unwrap_or(missing);
-        Ok(self
-            .readings
-            .iter()
-            .zip(&self.measured)
+        let readings = self.readings.iter().zip(&self.moments).zip(&self.measured);
+        Ok(readings
             .enumerate()
-            .map(|(k, (reading, (phase, rate)))| Point {
+            .map(|(k, ((reading, moment), (thermometer, rate)))| Point {
                 time_s: reading.time_s,
-                thermometer: *phase,
-                temperature_degc: reading.chamber_degc,
+                thermometer: *thermometer,
+                temperature_degc: moment.temperatures.chamber_degc,
                 heating: reading.heating,
                 before_dps: *rate,
                 float_dps: at(&float, k),
@@ -255,9 +229,9 @@ impl OwnRun {
     /// The mean of a column over each reading after settling.
     fn mean_column(&self, words: &[i64], columns: usize, column: usize, lsb: f64) -> Vec<f64> {
         words
-            .chunks_exact(columns * self.rows_per_reading)
+            .chunks_exact(columns * self.stream.rows_per_reading)
             .map(|reading| {
-                let rows = reading.chunks_exact(columns).skip(self.settling_rows);
+                let rows = reading.chunks_exact(columns).skip(self.stream.settling_rows);
                 mean(rows.map(|row| row[column] as f64 * lsb))
             })
             .collect()
@@ -267,16 +241,16 @@ impl OwnRun {
 #[derive(Debug, Clone, Copy)]
 struct RealRow {
     sense_i: f64,
-    phase_rad: f64,
+    /// rad or Hz.
+    thermometer: f64,
 }
+
+/// Columns of a row without compensation ([`engine::columns`]).
+const SENSE_I: usize = 2;
+const PHASE: usize = 4;
+const TUNING_WORD: usize = 6;
 
 fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = values.fold((0.0, 0usize), |(s, n), v| (s + v, n + 1));
     sum / count.max(1) as f64
-}
-
-/// Sense I in deg/s is its value times this.
-fn full_scale(design: &Design) -> f64 {
-    let own = design.compensation.as_ref().map(|c| c.rate_full_scale_dps);
-    own.unwrap_or_else(|| formats::power_of_two_near(formats::nominal_full_scale_dps(design)))
 }

@@ -1,22 +1,25 @@
 //! The simulated gyro: physics and the ADCs' inputs, nothing of the detection circuit.
 //!
 //! In reading order: [`resonator`] (eq. 1 to 8 of the seed paper), [`device`] (measured phase and
-//! bias, eq. 9 and the effects beyond it), [`noise`] (noise that depends on its place alone),
-//! [`thermal_run`] (chamber schedule and ADC codes); [`turn`] holds the elementary functions.
-//! All that a plant knows of the circuit is [`thermal_run::Sampling`].
+//! bias, eq. 9 and the effects beyond it), [`profile`] and [`thermal`] (chamber and heat), [`gyroscope`]
+//! (the motion at the ADC rate), [`converter`] (the ADCs), [`noise`] (noise that depends on its place
+//! alone); [`turn`] holds the elementary functions. All that a plant knows of the circuit is
+//! [`gyroscope::Reference`] and [`gyroscope::Drive`].
 
+pub mod converter;
 pub mod device;
 pub mod gyroscope;
 pub mod noise;
 pub mod profile;
 pub mod resonator;
 pub mod thermal;
-pub mod thermal_run;
 pub mod turn;
 
+pub use converter::Converter;
 pub use device::Device;
+pub use gyroscope::Gyroscope;
 pub use resonator::{Resonator, StiffnessLaw};
-pub use thermal_run::{Reading, Sampling, ThermalPlant};
+pub use thermal::{Temperatures, Thermal};
 
 #[cfg(test)]
 mod study_tests;

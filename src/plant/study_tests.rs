@@ -3,21 +3,16 @@
 use super::device::{Device, mode_crossing_dps};
 use crate::design::ModeCrossing;
 use crate::design::template::default_design;
-use crate::plant::{Sampling, ThermalPlant};
+use crate::plant::profile;
 
 /// The default device and the temperature of every reading of the default run, degC.
 fn default_run() -> (Device, Vec<f64>) {
     let design = default_design().unwrap();
-    let sampling = Sampling {
-        sample_rate_hz: 56_000.0,
-        adc_bits: 16,
-        tuning_word: 1 << 27,
-        phase_bits: 32,
-    };
-    let plant = ThermalPlant::new(&design.gyro, &design.thermal_run, sampling);
-    let readings = plant.readings(1.0);
-    let temperatures = readings.iter().map(|r| r.chamber_degc).collect();
-    (plant.device, temperatures)
+    let dwells = profile::dwells(&design.thermal_run);
+    (
+        Device::new(&design.gyro),
+        dwells.iter().map(|d| d.0).collect(),
+    )
 }
 
 /// What least squares by a quadratic in `x` leaves of `y` (modified Gram-Schmidt).
