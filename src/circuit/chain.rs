@@ -6,7 +6,7 @@ use super::compensation::{Bias, Rate};
 use super::cordic::Vectoring;
 use super::decimator::{Cic, CicState, Decimate, Integrate};
 use super::demodulator::Mixer;
-use super::nco::{Oscillator, OscillatorState, Retune};
+use super::nco::{Detuning, Oscillator, OscillatorState, Retune};
 use super::phase_loop::{PhaseLoop, PhaseLoopState};
 use crate::design::{Circuit, Compensation, CompensationInput, Design};
 use crate::numeric::arithmetic::{Arithmetic, Block, Port};
@@ -29,8 +29,10 @@ pub struct Chain<const N: usize> {
     pub cics: [Cic<N>; 4],
     /// Vectoring on the drive channels.
     pub cordic: Vectoring,
-    /// The compensation, where its thermometer is the chain's own phase.
+    /// The compensation, where its thermometer is the chain's own.
     pub compensation: Option<(Bias, Rate)>,
+    /// That thermometer is the tuning word (else the phase).
+    by_tuning_word: bool,
     /// The phase loop.
     pub phase_loop: Option<PhaseLoop>,
     /// The amplitude loop.
@@ -114,7 +116,7 @@ impl<const N: usize> Chain<N> {
                 mixers[k].product_range(code_range, carrier),
             )
         });
-        let on_phase = compensation.filter(|c| c.input == CompensationInput::Phase);
+        let of_chain = compensation.filter(|c| c.input.is_of_chain());
         let angle_bits = circuit.cordic.angle_bits;
         let output = circuit.decimator.output.format;
         Chain {
@@ -124,7 +126,9 @@ impl<const N: usize> Chain<N> {
             mixers,
             cics,
             cordic: Vectoring::new(circuit),
-            compensation: on_phase.map(|c| (Bias::new(circuit, c), Rate::new(circuit, c))),
+            by_tuning_word: of_chain
+                .is_some_and(|c| matches!(c.input, CompensationInput::TuningWord(_))),
+            compensation: of_chain.map(|c| (Bias::new(circuit, c), Rate::new(circuit, c))),
             phase_loop: circuit
                 .phase_loop
                 .as_ref()
@@ -133,7 +137,7 @@ impl<const N: usize> Chain<N> {
                 .amplitude_loop
                 .as_ref()
                 .map(|l| AmplitudeLoop::new(l, output.fraction_bits)),
-            meanings: meanings(circuit, on_phase),
+            meanings: meanings(circuit, of_chain),
         }
     }
 
@@ -276,7 +280,12 @@ impl<const N: usize> Chain<N> {
         let [drive_i, drive_q, sense_i, _] = channels;
         let [phase, magnitude] = ar.call(&self.cordic, "", &mut (), [drive_i, drive_q]);
         let compensation = self.compensation.as_ref().map(|(bias, rate)| {
-            let [bias] = ar.call(bias, "", &mut (), [phase]);
+            let thermometer = if self.by_tuning_word {
+                ar.call(&Detuning(&self.nco), "nco", &mut fast.oscillator, [])
+            } else {
+                [phase]
+            };
+            let [bias] = ar.call(bias, "", &mut (), thermometer);
             let [rate] = ar.call(rate, "", &mut (), [sense_i, bias]);
             [bias, rate]
         });

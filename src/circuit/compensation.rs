@@ -53,6 +53,16 @@ impl Bias {
                     1,
                     format!("phase in units of 2^-{angle_bits} turn"),
                 ),
+                CompensationInput::TuningWord(tuning) => {
+                    let bits = circuit.nco.phase_bits;
+                    (
+                        Interval::of_bits(bits),
+                        bits as i32,
+                        tuning.offset_raw,
+                        bits as i32 - tuning.scale_bits as i32,
+                        "what the phase loop adds to the tuning word".to_owned(),
+                    )
+                }
                 CompensationInput::Channel(channel) => {
                     let fraction_bits = channel.format.fraction_bits as i32;
                     (
@@ -164,7 +174,9 @@ impl Rate {
     /// From the design's `[compensation]`.
     pub fn new(circuit: &Circuit, compensation: &Compensation) -> Self {
         let (format, what) = match &compensation.input {
-            CompensationInput::Phase => (circuit.decimator.output.format, "sense I"),
+            CompensationInput::Phase | CompensationInput::TuningWord(_) => {
+                (circuit.decimator.output.format, "sense I")
+            }
             CompensationInput::Channel(channel) => (channel.rate_format, "uncompensated rate"),
         };
         let output = compensation.output;

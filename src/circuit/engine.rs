@@ -91,7 +91,7 @@ fn has_rate(design: &Design) -> bool {
     design
         .compensation
         .as_ref()
-        .is_some_and(|c| c.input == crate::design::CompensationInput::Phase)
+        .is_some_and(|c| c.input.is_of_chain())
 }
 
 /// The engine of a design.

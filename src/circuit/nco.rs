@@ -105,6 +105,41 @@ impl<A: Arithmetic> Block<A, 0, 2> for Oscillator {
     }
 }
 
+/// What the tuning word is off the design's, in turns a sample: the resonance's drift where a phase
+/// loop tracks it.
+#[derive(Debug, Clone, Copy)]
+pub struct Detuning<'a>(pub &'a Oscillator);
+
+impl<A: Arithmetic> Block<A, 0, 1> for Detuning<'_> {
+    type State = OscillatorState<A::Residue>;
+    const NAME: &'static str = "detuning";
+    const STATE: &'static str = "oscillator";
+
+    fn inputs(&self) -> [Port; 0] {
+        []
+    }
+
+    fn outputs(&self) -> [Port; 1] {
+        [Port::new("correction", "tuning word steps")]
+    }
+
+    #[inline(always)]
+    fn step(
+        &self,
+        ar: &A,
+        state: &mut OscillatorState<A::Residue>,
+        []: [A::Word; 0],
+    ) -> [A::Word; 1] {
+        let ring = &self.0.ring;
+        let given = ar.residue_constant(self.0.tuning_word, ring);
+        [ar.centered(ar.residue_sub(state.tuning, given, ring), ring)]
+    }
+
+    fn visit(&self, state: &mut OscillatorState<A::Residue>, visitor: &mut dyn StateVisitor<A>) {
+        self.0.visit_state(state, visitor);
+    }
+}
+
 /// Gives the oscillator a new tuning word: the design's plus a correction in FCW steps.
 #[derive(Debug, Clone, Copy)]
 pub struct Retune<'a>(pub &'a Oscillator);

@@ -192,7 +192,7 @@ const CHANNEL_KEYS: [&str; 4] = [
 
 /// Reads `[compensation]`, which belongs to `circuit`.
 pub(super) fn compensation(t: &Table, circuit: &Circuit) -> Result<Compensation> {
-    let input = compensation_input(t)?;
+    let input = compensation_input(t, circuit)?;
     let format_value = t.need("coefficient_format")?;
     let coefficient_format = format_value.format()?;
     let accumulator = t.need("accumulator")?.quantizer()?;
@@ -250,9 +250,39 @@ fn is_power_of_two(x: f64) -> bool {
     }
 }
 
-fn compensation_input(t: &Table) -> Result<CompensationInput> {
+/// The tuning word moves only where a phase loop moves it.
+fn tuning_input(t: &Table, circuit: &Circuit, input: &Value) -> Result<CompensationInput> {
+    if circuit.phase_loop.is_none() {
+        return Err(input
+            .error("is \"tuning_word\", which stands still without a phase loop")
+            .help("add [circuit.phase_loop], or set `input = \"phase\"`")
+            .into());
+    }
+    if let Some(extra) = ["input_format", "rate_input_format"].iter().find_map(|k| t.get(k)) {
+        return Err(extra
+            .error("goes only with a thermometer that is not the chain's own")
+            .help("delete it")
+            .into());
+    }
+    let bits = circuit.nco.phase_bits;
+    let half = 1i128 << (bits - 1);
+    Ok(CompensationInput::TuningWord(TuningInput {
+        offset_raw: t.take("input_offset_raw", Some(0), |v| {
+            v.integer(-half..=half - 1, "tuning word steps")
+        })?,
+        scale_bits: t.take("input_scale_bits", Some(bits - 1), |v| {
+            v.integer(
+                0..=64,
+                "the polynomial's variable is (steps - offset) * 2^-bits",
+            )
+        })?,
+    }))
+}
+
+fn compensation_input(t: &Table, circuit: &Circuit) -> Result<CompensationInput> {
     let value = t.need("input")?;
-    let words: Vec<(&str, &str)> = std::iter::once("phase")
+    let words: Vec<(&str, &str)> = ["phase", "tuning_word"]
+        .into_iter()
         .chain(THERMOMETERS.iter().copied())
         .map(|w| (w, w))
         .collect();
@@ -268,6 +298,9 @@ fn compensation_input(t: &Table) -> Result<CompensationInput> {
                 .into());
         }
         return Ok(CompensationInput::Phase);
+    }
+    if column == "tuning_word" {
+        return tuning_input(t, circuit, &value);
     }
     let format = t.need("input_format")?.format()?;
     let offset_raw = t.take("input_offset_raw", Some(0), |v| {
@@ -334,6 +367,10 @@ fn clamp(t: &Table, input: &CompensationInput, circuit: &Circuit) -> Result<Opti
         CompensationInput::Phase => {
             let half = 1i128 << (circuit.cordic.angle_bits - 1);
             (-half..=half - 1, "a raw phase of angle_bits")
+        }
+        CompensationInput::TuningWord(_) => {
+            let half = 1i128 << (circuit.nco.phase_bits - 1);
+            (-half..=half - 1, "tuning word steps")
         }
         CompensationInput::Channel(channel) => (
             channel.format.min_raw()..=channel.format.max_raw(),

@@ -178,10 +178,15 @@ fn cordic(c: &Circuit) -> Result<(), Excess> {
 
 /// The polynomial's variable: its bits and its fraction bits. A phase has `angle_bits`, one less
 /// of them fractional; a channel's word less its offset has the bits that its format's two ends
-/// less the offset need.
+/// less the offset need; so has what a phase loop adds to the tuning word.
 fn variable(c: &Circuit, k: &Compensation) -> (u32, u32) {
     match &k.input {
         CompensationInput::Phase => (c.cordic.angle_bits, c.cordic.angle_bits - 1),
+        CompensationInput::TuningWord(t) => {
+            let half = 1i128 << (c.nco.phase_bits - 1);
+            let bits = |end: i128| integer_bits(end - t.offset_raw);
+            (bits(-half).max(bits(half - 1)), t.scale_bits)
+        }
         CompensationInput::Channel(channel) => {
             let bits = |end: i128| integer_bits(end - channel.offset_raw);
             let ends = bits(channel.format.min_raw()).max(bits(channel.format.max_raw()));
@@ -243,7 +248,7 @@ fn outputs(c: &Circuit, k: &Compensation) -> Result<(), Excess> {
         ],
     )?;
     let rate = match &k.input {
-        CompensationInput::Phase => c.decimator.output.format,
+        CompensationInput::Phase | CompensationInput::TuningWord(_) => c.decimator.output.format,
         CompensationInput::Channel(channel) => channel.rate_format,
     };
     let from = i64::from(rate.fraction_bits) - i64::from(k.rate_full_scale_exponent());

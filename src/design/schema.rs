@@ -194,6 +194,13 @@ pub struct Compensation {
     pub clamp_raw: Option<(i128, i128)>,
 }
 
+impl CompensationInput {
+    /// True if the chain has the thermometer, so that its rows have a compensated rate.
+    pub fn is_of_chain(&self) -> bool {
+        !matches!(self, CompensationInput::Channel(_))
+    }
+}
+
 impl Compensation {
     /// log2 of `rate_full_scale_dps`, which is a power of two.
     pub fn rate_full_scale_exponent(&self) -> i32 {
@@ -206,12 +213,24 @@ impl Compensation {
 pub enum CompensationInput {
     /// `input = "phase"`: the CORDIC's phase as half turns in [-1, 1); the rate input is sense I.
     Phase,
+    /// `input = "tuning_word"`: what the phase loop adds to the tuning word, in its steps; the rate input
+    /// is sense I. p = (steps - offset_raw) * 2^-scale_bits.
+    TuningWord(TuningInput),
     /// `input = "die_degc"` (or another column of a thermal record that firmware can see):
     /// p = (raw - offset_raw) * 2^-scale_bits; the rate input is a word of its own, in deg/s.
     Channel(ChannelInput),
 }
 
-/// A thermometer that is not the chain's own phase.
+/// The drive's frequency as thermometer: the resonance that a phase loop tracks.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TuningInput {
+    /// `input_offset_raw`: the polynomial's zero, tuning word steps, default 0.
+    pub offset_raw: i128,
+    /// `input_scale_bits`: 0..=64, default `phase_bits` - 1.
+    pub scale_bits: u32,
+}
+
+/// A thermometer that is not the chain's own.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChannelInput {
     /// The record's column: `die_degc`, `freq_hz`, `phase_rad`, `chamber_degc`.

@@ -5,7 +5,7 @@ use super::lower::lower;
 use super::machine::{Lowered, Type, residue_type, word_type};
 use crate::circuit::compensation::{Bias, Rate};
 use crate::circuit::engine;
-use crate::design::{CompensationInput, Design};
+use crate::design::Design;
 use crate::numeric::arithmetic::{Arithmetic, Block, Port};
 use crate::numeric::trace::Trace;
 use crate::numeric::trace::ir::{Program, SlotKind};
@@ -68,7 +68,7 @@ impl Bundle {
         let on_phase = design
             .compensation
             .as_ref()
-            .is_none_or(|c| c.input == CompensationInput::Phase);
+            .is_none_or(|c| c.input.is_of_chain());
         let has_chain = part == Part::Tables || part == Part::Chain && on_phase;
         let program = if has_chain {
             engine::trace(design)

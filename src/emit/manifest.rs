@@ -192,6 +192,10 @@ pub fn facts(design: &Design, bundle: &Bundle) -> Vec<String> {
 fn input(input: &CompensationInput) -> String {
     match input {
         CompensationInput::Phase => "phase, p in half turns".into(),
+        CompensationInput::TuningWord(t) => format!(
+            "what the phase loop adds to the tuning word, p = (steps - {}) * 2^-{}",
+            t.offset_raw, t.scale_bits
+        ),
         CompensationInput::Channel(c) => format!(
             "{} {}, p = (raw - {}) * 2^-{}",
             c.column, c.format, c.offset_raw, c.scale_bits

@@ -46,9 +46,10 @@ pub fn budget(design: &Design, fit: &BaselineFit, rounded: &Rounded) -> Budget {
         output_lsb: dps / output_lsb,
         kind,
     };
-    let (_, scale) = variable(c);
+    let (_, scale) = variable(&design.circuit, c);
     let input_step = match &c.input {
         CompensationInput::Phase => 2.0 * pow2(-(design.circuit.cordic.angle_bits as i32)),
+        CompensationInput::TuningWord(t) => pow2(-(t.scale_bits as i32)),
         CompensationInput::Channel(channel) => pow2(-(channel.scale_bits as i32)),
     };
     let slope = (0..=100)

@@ -3,7 +3,7 @@
 use super::{compensation, thermometer_raw};
 use crate::closure::BaselineFit;
 use crate::closure::polynomial;
-use crate::design::{Compensation, CompensationInput, Design};
+use crate::design::{Circuit, Compensation, CompensationInput, Design};
 use crate::error::{InputError, Result};
 use crate::numeric::format::{Format, pow2};
 
@@ -19,10 +19,15 @@ pub struct Rounded {
 }
 
 /// The firmware's variable: T = offset + scale * p.
-pub fn variable(c: &Compensation) -> (f64, f64) {
+pub fn variable(circuit: &Circuit, c: &Compensation) -> (f64, f64) {
     match &c.input {
         // p counts half turns.
         CompensationInput::Phase => (0.0, std::f64::consts::PI),
+        CompensationInput::TuningWord(t) => {
+            let step_hz = tuning_step_hz(circuit);
+            let zero = (i128::from(circuit.nco.tuning_word) + t.offset_raw) as f64;
+            (zero * step_hz, pow2(t.scale_bits as i32) * step_hz)
+        }
         CompensationInput::Channel(channel) => {
             let lsb = channel.format.lsb();
             (
@@ -33,13 +38,18 @@ pub fn variable(c: &Compensation) -> (f64, f64) {
     }
 }
 
+/// The frequency of one tuning word step, Hz.
+pub fn tuning_step_hz(circuit: &Circuit) -> f64 {
+    circuit.sample_rate_hz * pow2(-(circuit.nco.phase_bits as i32))
+}
+
 /// Puts the fit into the design: coefficients, and the calibrated range as the input's limits.
 ///
 /// # Errors
 /// A coefficient that its format cannot hold; a phase beyond half a turn.
 pub fn round(design: &mut Design, fit: &BaselineFit) -> Result<Rounded> {
     let c = compensation(design)?;
-    let (offset, scale) = variable(c);
+    let (offset, scale) = variable(&design.circuit, c);
     let p = |t: f64| (t - offset) / scale;
     let p_range = (p(fit.range.0), p(fit.range.1));
     if c.input == CompensationInput::Phase && (p_range.0 < -1.0 || p_range.1 >= 1.0) {

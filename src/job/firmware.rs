@@ -1,6 +1,6 @@
 //! The firmware in both languages: emitted, built, compared.
 
-use crate::design::{CompensationInput, Design};
+use crate::design::Design;
 use crate::emit::bundle::{Bundle, Part};
 use crate::emit::files::{self, EmittedFile};
 use crate::emit::views::Language;
@@ -43,7 +43,7 @@ impl Firmware {
         let on_phase = design
             .compensation
             .as_ref()
-            .is_none_or(|c| c.input == CompensationInput::Phase);
+            .is_none_or(|c| c.input.is_of_chain());
         let part = if on_phase {
             Part::Chain
         } else {

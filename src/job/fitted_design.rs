@@ -40,6 +40,11 @@ fn compensation(c: &Compensation) -> String {
     let mut text = String::from("[compensation]\n");
     match &c.input {
         CompensationInput::Phase => text += "input = \"phase\"\n",
+        CompensationInput::TuningWord(t) => {
+            text += "input = \"tuning_word\"\n";
+            _ = writeln!(text, "input_offset_raw = {}", t.offset_raw);
+            _ = writeln!(text, "input_scale_bits = {}", t.scale_bits);
+        }
         CompensationInput::Channel(channel) => {
             _ = writeln!(text, "input = \"{}\"", channel.column);
             _ = writeln!(text, "input_format = \"{}\"", channel.format);

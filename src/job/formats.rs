@@ -2,7 +2,9 @@
 
 use crate::closure::BaselineFit;
 use crate::cosim::scale::{nominal_full_scale_dps, power_of_two_near};
-use crate::design::{ChannelInput, Compensation, CompensationInput, Design, RecordMapping};
+use crate::design::{
+    ChannelInput, Circuit, Compensation, CompensationInput, Design, RecordMapping, TuningInput,
+};
 use crate::error::{InputError, Result};
 use crate::numeric::format::{Format, Overflow, Quantizer, Rounding};
 use crate::record::ThermalRecord;
@@ -58,6 +60,7 @@ pub fn choose_thermometer(
 pub fn column_of(compensation: &Compensation) -> &str {
     match &compensation.input {
         CompensationInput::Phase => "phase_rad",
+        CompensationInput::TuningWord(_) => "freq_hz",
         CompensationInput::Channel(channel) => &channel.column,
     }
 }
@@ -69,7 +72,9 @@ pub fn column_of(compensation: &Compensation) -> &str {
 /// Ranges that no word holds.
 pub fn fill(design: &mut Design, fit: &BaselineFit, record: &ThermalRecord) -> Result<Vec<String>> {
     let own = design.compensation_is_own;
-    let usable = |c: &Compensation| column_of(c) == fit.thermometer && (own || holds(c, fit));
+    let usable = |c: &Compensation| {
+        column_of(c) == fit.thermometer && (own || holds(&design.circuit, c, fit))
+    };
     if design.compensation.as_ref().is_some_and(usable) {
         return Ok(Vec::new());
     }
@@ -82,11 +87,12 @@ pub fn fill(design: &mut Design, fit: &BaselineFit, record: &ThermalRecord) -> R
     // Rate and bias, and their difference, with a factor of two to spare.
     let step = fit.noise_floor_rms_dps / 64.0;
     let output = no_finer_than(4.0 * greatest, step, 16..=WORD_BITS)?;
-    let (input, mut said) = if fit.thermometer == "phase_rad" {
-        (CompensationInput::Phase, Vec::new())
-    } else {
-        channel(fit, output)?
+    let (input, mut said) = match fit.thermometer.as_str() {
+        "phase_rad" => (CompensationInput::Phase, Vec::new()),
+        "freq_hz" if design.circuit.phase_loop.is_some() => tuning_word(design, fit),
+        _ => channel(fit, output)?,
     };
+    let of_chain = input.is_of_chain();
     let mut compensation = Compensation {
         input,
         coefficients_raw: vec![0],
@@ -96,10 +102,10 @@ pub fn fill(design: &mut Design, fit: &BaselineFit, record: &ThermalRecord) -> R
         output: Quantizer::default_of(output),
         clamp_raw: None,
     };
-    if fit.thermometer == "phase_rad" {
+    if of_chain {
         compensation.rate_full_scale_dps = power_of_two_near(nominal_full_scale_dps(design));
     }
-    let (offset, scale) = super::coefficients::variable(&compensation);
+    let (offset, scale) = super::coefficients::variable(&design.circuit, &compensation);
     let exact = fit.scaled_to(offset, scale);
     let largest = exact.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
     let sum: f64 = exact.iter().map(|v| v.abs()).sum();
@@ -144,8 +150,8 @@ fn no_finer_than(peak: f64, step: f64, bits: std::ops::RangeInclusive<u32>) -> R
 }
 
 /// True if the formats hold every coefficient of the fit.
-fn holds(c: &Compensation, fit: &BaselineFit) -> bool {
-    let (offset, scale) = super::coefficients::variable(c);
+fn holds(circuit: &Circuit, c: &Compensation, fit: &BaselineFit) -> bool {
+    let (offset, scale) = super::coefficients::variable(circuit, c);
     let exact = fit.scaled_to(offset, scale);
     let format = c.coefficient_format;
     let fits = |v: &f64| format.contains((v / format.lsb()).round() as i128);
@@ -163,6 +169,23 @@ fn signed_for(peak: f64, bits: u32) -> Result<Format> {
         );
     }
     Ok(Format::q(integer_bits as u32, bits - integer_bits as u32))
+}
+
+/// The circuit's own tuning word as thermometer: its zero in the middle of the calibrated range, its unit
+/// the least power of two of steps that reaches the ends.
+fn tuning_word(design: &Design, fit: &BaselineFit) -> (CompensationInput, Vec<String>) {
+    let step_hz = super::coefficients::tuning_step_hz(&design.circuit);
+    let given = design.circuit.nco.tuning_word as f64;
+    let reach = (fit.half_span / step_hz).max(1.0);
+    let input = TuningInput {
+        offset_raw: (fit.centre / step_hz - given).round() as i128,
+        scale_bits: (reach.log2().ceil() as u32).clamp(1, 64),
+    };
+    let said = vec![format!(
+        "input tuning_word: the phase loop holds the phase, the frequency is the thermometer; a step is \
+         {step_hz:.3e} Hz"
+    )];
+    (CompensationInput::TuningWord(input), said)
 }
 
 /// A word for the thermometer: one LSB moves the bias by at most a sixteenth of the noise floor.

@@ -58,6 +58,14 @@ pub fn run(
         (None, None) => unreachable!("either a record or an own run"),
     };
 
+    if simulated.is_some() && gives_up_held_phase(&mut design) {
+        warnings.push(warning(
+            "phase_is_held",
+            "the phase loop holds the drive phase, so it is no thermometer: the compensation's input is \
+             tuning_word instead"
+                .to_owned(),
+        ));
+    }
     say("fitting the bias polynomial");
     let mut mapping = if simulated.is_some() {
         Default::default()
@@ -117,6 +125,18 @@ pub fn run(
     }))
 }
 
+/// A compensation by the phase is of no use where a phase loop holds it: its formats are chosen anew.
+fn gives_up_held_phase(design: &mut Design) -> bool {
+    let by_phase = |c: &Compensation| c.input == CompensationInput::Phase;
+    let held = design.circuit.phase_loop.is_some()
+        && design.compensation_is_own
+        && design.compensation.as_ref().is_some_and(by_phase);
+    if held {
+        design.compensation_is_own = false;
+    }
+    held
+}
+
 /// The compensation of a design that has been filled in.
 fn compensation(design: &Design) -> Result<&Compensation> {
     design.compensation.as_ref().ok_or_else(|| {
@@ -141,6 +161,12 @@ fn thermometer_raw(design: &Design, compensation: &Compensation, reading: f64) -
                 -half,
                 half - 1,
             )
+        }
+        CompensationInput::TuningWord(_) => {
+            let steps = reading / coefficients::tuning_step_hz(&design.circuit);
+            let half = 1i128 << (design.circuit.nco.phase_bits - 1);
+            let given = design.circuit.nco.tuning_word as f64;
+            to_raw(steps - given, -half, half - 1)
         }
         CompensationInput::Channel(channel) => {
             let format = channel.format;

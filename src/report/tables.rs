@@ -87,6 +87,11 @@ pub fn orders(shown: &Shown) -> Vec<Order> {
 pub fn variable(shown: &Shown) -> String {
     match shown.design.compensation.as_ref().map(|c| &c.input) {
         Some(CompensationInput::Phase) => "the drive phase in half turns, −1 to 1".to_owned(),
+        Some(CompensationInput::TuningWord(t)) => format!(
+            "(steps − {}) · 2{}, steps = what the phase loop adds to the tuning word",
+            t.offset_raw,
+            superscript(-(t.scale_bits as i32))
+        ),
         Some(CompensationInput::Channel(channel)) => format!(
             "(raw − {}) · 2{}, raw = the word of {} in {}",
             channel.offset_raw,
@@ -138,6 +143,13 @@ pub fn formats(shown: &Shown) -> Vec<[String; 2]> {
                 format!("signed {bits} bits, a full turn"),
             )]
         }
+        CompensationInput::TuningWord(_) => {
+            let step = crate::job::coefficients::tuning_step_hz(&shown.design.circuit);
+            vec![line(
+                "input: tuning word",
+                format!("a step is {} Hz", significant(step, 4)),
+            )]
+        }
         CompensationInput::Channel(channel) => vec![
             line(
                 "input: thermometer",
@@ -166,7 +178,7 @@ pub fn formats(shown: &Shown) -> Vec<[String; 2]> {
         line("accumulator", word(c.accumulator.format)),
         line("output: bias and rate", word(c.output.format)),
     ]);
-    if c.input == CompensationInput::Phase {
+    if c.input.is_of_chain() {
         lines.push(line(
             "input: rate",
             format!("sense I times {} deg/s", c.rate_full_scale_dps),
