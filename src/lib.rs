@@ -18,4 +18,5 @@ pub mod output;
 pub mod plant;
 pub mod record;
 pub mod report;
+pub mod simulation;
 pub mod verify;

@@ -7,6 +7,7 @@ mod emit;
 mod init;
 mod replay;
 mod run;
+mod simulate;
 mod verify;
 
 use crate::error::{Error, Result};
@@ -28,6 +29,7 @@ enum Command {
     Init(init::Arguments),
     Replay(replay::Arguments),
     Run(run::Arguments),
+    Simulate(simulate::Arguments),
     Verify(verify::Arguments),
 }
 
@@ -49,6 +51,7 @@ pub fn main() -> ExitCode {
         Command::Init(arguments) => init::run(arguments),
         Command::Replay(arguments) => replay::run(arguments),
         Command::Run(arguments) => run::run(arguments),
+        Command::Simulate(arguments) => simulate::run(arguments),
         Command::Verify(arguments) => verify::run(arguments),
     };
     match result {
@@ -66,6 +69,14 @@ pub fn main() -> ExitCode {
 /// Reads the design named on the command line, or the embedded default.
 fn design(path: Option<&std::path::Path>) -> Result<crate::design::Design> {
     crate::design::reader::read(path)
+}
+
+/// The threads that were asked for, or as many as the machine has.
+fn threads(asked: Option<u16>) -> usize {
+    asked.map_or_else(
+        || std::thread::available_parallelism().map_or(1, usize::from),
+        usize::from,
+    )
 }
 
 /// Indented JSON with a final newline: what is written and what `--format json` prints.

@@ -3,12 +3,13 @@
 //! Rust, and all of them are run beside each other.
 //!
 //! [`own_run`] is the design's own thermal run through the circuit, [`from_record`] a measured
-//! record through the compensation alone; [`formats`] chooses formats that the design leaves open,
+//! record through the compensation alone; [`calibration`] fits, [`formats`] chooses formats that the design leaves open,
 //! [`coefficients`] rounds the fit into them, [`budget`] adds up what each step costs; [`firmware`]
 //! emits, builds and compares; [`fitted_design`] is the
 //! design that reproduces it; [`outcome`] is what comes of it.
 
 pub mod budget;
+pub mod calibration;
 pub mod coefficients;
 pub mod firmware;
 pub mod fitted_design;
@@ -17,8 +18,8 @@ pub mod from_record;
 pub mod outcome;
 pub mod own_run;
 
-use crate::closure::{self, BaselineFit};
-use crate::design::{Compensation, CompensationInput, Design, FitOptions, FitOrder};
+use crate::closure::BaselineFit;
+use crate::design::{Compensation, CompensationInput, Design};
 use crate::error::Result;
 use crate::record::{self, Warning};
 use outcome::{Outcome, Point};
@@ -58,44 +59,13 @@ pub fn run(
         (None, None) => unreachable!("either a record or an own run"),
     };
 
-    if simulated.is_some() && gives_up_held_phase(&mut design) {
-        warnings.push(warning(
-            "phase_is_held",
-            "the phase loop holds the drive phase, so it is no thermometer: the compensation's input is \
-             tuning_word instead"
-                .to_owned(),
-        ));
-    }
     say("fitting the bias polynomial");
-    let mut mapping = if simulated.is_some() {
-        Default::default()
-    } else {
-        design.record.clone()
-    };
-    formats::choose_thermometer(&design, &record, &mut mapping)?;
-    let options = FitOptions {
-        order: match (design.fit.order, &simulated) {
-            (FitOrder::ByRecord, Some(_)) => FitOrder::Fixed(2),
-            (FitOrder::ByRecord, None) => FitOrder::Auto,
-            (order, _) => order,
-        },
-        ..design.fit.clone()
-    };
-    let fit = closure::fit(&record, &mapping, &options)?;
-    warnings.extend(fit.warnings.iter().cloned());
-    let chosen = formats::fill(&mut design, &fit, &record)?;
+    let calibration = calibration::calibrate(&mut design, &record, simulated.is_some())?;
+    warnings.extend(calibration.warnings);
     if let Some(run) = &simulated {
         warnings.extend(run.warnings(&design));
     }
-    let rounded = coefficients::round(&mut design, &fit)?;
-    // A fit of another order than the file's has other products.
-    crate::design::limits::check(&design).map_err(|excess| {
-        let message = format!(
-            "{} needs {} bits, more than 127: {}",
-            excess.key, excess.bits, excess.sum
-        );
-        crate::error::InputError::new(message).help(excess.remedy())
-    })?;
+    let (fit, chosen, rounded) = (calibration.fit, calibration.chosen, calibration.rounded);
     let budget = budget::budget(&design, &fit, &rounded);
 
     say("emitting, building and comparing C and Rust");
@@ -123,18 +93,6 @@ pub fn run(
         points,
         seconds: started.elapsed().as_secs_f64(),
     }))
-}
-
-/// A compensation by the phase is of no use where a phase loop holds it: its formats are chosen anew.
-fn gives_up_held_phase(design: &mut Design) -> bool {
-    let by_phase = |c: &Compensation| c.input == CompensationInput::Phase;
-    let held = design.circuit.phase_loop.is_some()
-        && design.compensation_is_own
-        && design.compensation.as_ref().is_some_and(by_phase);
-    if held {
-        design.compensation_is_own = false;
-    }
-    held
 }
 
 /// The compensation of a design that has been filled in.

@@ -71,6 +71,14 @@ impl Profile {
         (Profile { corners, has }, readings)
     }
 
+    /// A chamber that stays at a temperature.
+    pub fn constant(chamber_degc: f64) -> Profile {
+        Profile {
+            corners: vec![at_rest(0.0, chamber_degc)],
+            has: [false; 3],
+        }
+    }
+
     /// Reads a CSV file with the columns `time_s` and `chamber_degc`, and, where wanted, `rate_dps`,
     /// `supply_v`, `accel_g`; other columns are not looked at.
     ///

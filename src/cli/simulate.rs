@@ -1,0 +1,261 @@
+//! `gyrogen simulate`: plant and circuit in closed loop, float and fixed.
+
+use super::OutputFormat;
+use crate::error::{Error, Result};
+use crate::simulation::outcome::{Both, Outcome};
+use crate::simulation::{self, Course, Request, record_csv};
+use std::path::PathBuf;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+/// Plant and circuit in closed loop, float and fixed: thermal record, traces, figures.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Design file; the embedded default if left out.
+    design: Option<PathBuf>,
+    /// Simulate every ADC sample of the first so many seconds of the design's own run.
+    #[arg(long, value_name = "S", conflicts_with = "profile")]
+    duration: Option<f64>,
+    /// Chamber over time (CSV: time_s, chamber_degc, and where wanted rate_dps, supply_v, accel_g).
+    #[arg(long, value_name = "FILE")]
+    profile: Option<PathBuf>,
+    /// Readings along a profile.
+    #[arg(long, default_value_t = 500, value_parser = clap::value_parser!(u64).range(10..=1_000_000))]
+    readings: u64,
+    /// Folder for the results; made if it does not exist.
+    #[arg(long)]
+    out: PathBuf,
+    /// Threads; the results do not depend on it. Default: as many as the machine has.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// How the result is printed.
+    #[arg(long, value_enum, default_value = "text")]
+    format: OutputFormat,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// An unusable design or profile (exit 2); a circuit that stops on an overflow, a phase loop that does not lock (exit 1).
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let design = super::design(arguments.design.as_deref())?;
+    let request = Request {
+        course: match (&arguments.duration, &arguments.profile) {
+            (Some(seconds), _) => Course::Continuous(*seconds),
+            (None, Some(path)) => Course::Profile(path.clone()),
+            (None, None) => Course::ThermalRun,
+        },
+        profile_readings: arguments.readings,
+        threads: super::threads(arguments.threads),
+        command: command(arguments),
+    };
+    let bar = Bar::default();
+    let progress = |what: &str, done: u64, total: u64| bar.show(what, done, total);
+    let outcome = simulation::simulate(&design, &request, &progress)?;
+    bar.done();
+    let json = super::json(&outcome.summary);
+    write(&outcome, &arguments.out, &json)?;
+    match arguments.format {
+        OutputFormat::Json => print!("{json}"),
+        OutputFormat::Text => print(&outcome, &arguments.out),
+    }
+    for warning in &outcome.summary.warnings {
+        eprintln!("warning: {} [{}]", warning.message, warning.code);
+    }
+    let failures = outcome.failures();
+    if failures.is_empty() {
+        return Ok(());
+    }
+    Err(Error::Check(failures.join("; ")))
+}
+
+/// The command that gives the same results.
+fn command(arguments: &Arguments) -> String {
+    let mut command = String::from("gyrogen simulate");
+    if let Some(path) = &arguments.design {
+        command += &format!(" {}", path.display());
+    }
+    if let Some(seconds) = arguments.duration {
+        command += &format!(" --duration {seconds}");
+    }
+    if let Some(path) = &arguments.profile {
+        command += &format!(" --profile {} --readings {}", path.display(), arguments.readings);
+    }
+    command
+}
+
+fn write(outcome: &Outcome, out: &std::path::Path, json: &str) -> Result<()> {
+    super::make_folder(out)?;
+    let parts = &outcome.parts;
+    let whole = |name: &str, text: &str| {
+        crate::output::write_whole(&out.join(name), text.as_bytes())
+    };
+    whole("record.csv", &parts.record_csv)?;
+    whole(
+        "readings.csv",
+        &record_csv::both_paths(&parts.run.taken, parts.after.as_deref()),
+    )?;
+    if let Some((fitted, _)) = &parts.calibrated {
+        whole("design.toml", &crate::job::fitted_design::text(fitted))?;
+    }
+    whole("simulate.json", json)
+}
+
+fn print(outcome: &Outcome, out: &std::path::Path) {
+    let s = &outcome.summary;
+    if !s.paper.is_empty() {
+        let mut table = super::table(&["published figure", "source", "published", "obtained", "by", ""]);
+        for f in &s.paper {
+            let decimals = decimals(f.tolerance);
+            table.add_row([
+                f.what.to_owned(),
+                f.source.to_owned(),
+                format!("{:.decimals$} {}", f.published, f.unit),
+                format!("{:.decimals$} {}", f.obtained, f.unit),
+                f.by.to_owned(),
+                if f.agrees { "agrees" } else { "differs" }.to_owned(),
+            ]);
+        }
+        println!("{table}");
+    }
+    let mut table = super::table(&["rate output", "drift pp, deg/s", "rms, deg/s", "of before"]);
+    let mut rows = |name: &str, both: &Both| {
+        for (path, drift, before) in [
+            ("float", both.float, s.before.float),
+            ("fixed", both.fixed, s.before.fixed),
+        ] {
+            let whole = before.drift_pp_dps.max(f64::MIN_POSITIVE);
+            table.add_row([
+                format!("{name}, {path}"),
+                format!("{:.4}", drift.drift_pp_dps),
+                format!("{:.4}", drift.rms_dps),
+                format!("{:.2} %", 100.0 * drift.drift_pp_dps / whole),
+            ]);
+        }
+    };
+    rows("before compensation", &s.before);
+    if let Some(after) = &s.after {
+        rows("after", after);
+    }
+    for column in table.column_iter_mut().skip(1) {
+        column.set_cell_alignment(comfy_table::CellAlignment::Right);
+    }
+    println!("{table}");
+    if !s.loops.is_empty() {
+        println!("{}", loops(outcome));
+    }
+    print_sentences(outcome);
+    println!("wrote {} ({:.1} s)", out.display(), s.seconds);
+}
+
+fn print_sentences(outcome: &Outcome) {
+    let s = &outcome.summary;
+    let a = &s.float_fixed;
+    println!(
+        "{} readings, drive at {}; float and fixed are at most {:.2e} rad, {:.2e} Hz, {:.2e} deg/s (uncompensated) apart",
+        s.readings,
+        s.drive.replace('_', " "),
+        a.phase_rad,
+        a.freq_hz,
+        a.rate_out_dps
+    );
+    if let Some(lock) = &s.lock {
+        println!(
+            "phase loop: {}, mean phase within {:.2e} rad of the setpoint, frequency within {:.2e} Hz of the resonance, {:.2} ppm/K",
+            if lock.locked { "locked everywhere" } else { "not locked everywhere" },
+            lock.phase_error_rad,
+            lock.freq_error_hz,
+            lock.tempco_ppm_per_k
+        );
+    }
+    let time = |t: Option<f64>| t.map_or("not seen".to_owned(), |t| format!("{:.0} ms", 1e3 * t));
+    let up = &s.startup;
+    println!(
+        "power-on at {} degC: amplitude within 1 % after {}, phase within 0.1 deg after {}{}",
+        up.chamber_degc,
+        time(up.amplitude_s),
+        time(up.phase_s),
+        match up.lock_s {
+            Some(t) => format!(", frequency within 10 ppm after {}", time(Some(t))),
+            None => String::new(),
+        }
+    );
+}
+
+fn loops(outcome: &Outcome) -> comfy_table::Table {
+    let mut table = super::table(&[
+        "loop without noise",
+        "degC",
+        "output pp",
+        "predicted",
+        "error pp, LSB",
+        "predicted",
+        "mean error, LSB",
+        "dead band predicted",
+    ]);
+    for h in &outcome.summary.loops {
+        table.add_row([
+            h.name.to_owned(),
+            format!("{}", h.chamber_degc),
+            format!("{:.0} {}", h.output_pp_lsb, h.output_unit),
+            format!("{:.0}", h.predicted_output_pp_lsb),
+            format!("{:.0}", h.error_pp_lsb),
+            format!("{:.0}", h.predicted_error_pp_lsb),
+            format!("{:.3}", h.error_mean_lsb),
+            format!("{:.0} LSB", h.predicted_dead_band_lsb),
+        ]);
+    }
+    for column in table.column_iter_mut().skip(1) {
+        column.set_cell_alignment(comfy_table::CellAlignment::Right);
+    }
+    table
+}
+
+/// Decimals that show a tolerance.
+fn decimals(tolerance: f64) -> usize {
+    (-tolerance.log10()).ceil().max(0.0) as usize
+}
+
+/// A bar on a terminal for what takes over two seconds.
+struct Bar {
+    started: Instant,
+    state: Mutex<Option<(String, indicatif::ProgressBar)>>,
+}
+
+impl Default for Bar {
+    fn default() -> Self {
+        Bar {
+            started: Instant::now(),
+            state: Mutex::new(None),
+        }
+    }
+}
+
+impl Bar {
+    fn show(&self, what: &str, done: u64, total: u64) {
+        if self.started.elapsed() < Duration::from_secs(2) {
+            return;
+        }
+        // A poisoned lock means that another thread panics already.
+        let Ok(mut state) = self.state.lock() else {
+            return;
+        };
+        if state.as_ref().is_none_or(|(shown, _)| shown != what) {
+            // Draws to stderr, and only on a terminal.
+            let bar = indicatif::ProgressBar::new(total);
+            bar.set_message(what.to_owned());
+            *state = Some((what.to_owned(), bar));
+        }
+        if let Some((_, bar)) = state.as_ref() {
+            bar.set_position(done);
+        }
+    }
+
+    fn done(&self) {
+        if let Ok(mut state) = self.state.lock()
+            && let Some((_, bar)) = state.take()
+        {
+            bar.finish_and_clear();
+        }
+    }
+}

@@ -1,0 +1,123 @@
+//! Every ADC sample of a stretch of the design's own run, float and fixed side by side.
+
+use super::{Progress, Run};
+use crate::circuit::engine::ArithmeticKind;
+use crate::cosim::path::Path;
+use crate::cosim::readings::{Averager, Mean, Taken, in_parallel};
+use crate::cosim::rest::rows_per_s;
+use crate::cosim::surroundings::{Moment, World};
+use crate::design::Design;
+use crate::error::{InputError, Result};
+use crate::plant::noise::Noise;
+use crate::plant::profile::{Profile, Reading};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Temperatures and what surrounds the gyro are brought up to date so often, Hz. In between they
+/// stand still: at 1 K/min the structure moves by 0.3 mK, the bias by a thousandth of a deg/s.
+const UPDATES_HZ: f64 = 50.0;
+
+/// The stream of noise; those of readings are numbered from 0.
+const STREAM: u64 = u64::MAX;
+
+/// The longest run, s.
+const LONGEST_S: f64 = 1e6;
+
+/// Simulates `seconds` seconds. The record has a row a second, ten rows at least; the first is
+/// warm-started, and all that follows is one unbroken motion.
+///
+/// # Errors
+/// A duration that is no time, or too short for ten rows; a circuit that stops on an overflow.
+pub fn run(design: &Design, seconds: f64, threads: usize, progress: Progress) -> Result<Run> {
+    let least_s = 10.0 / rows_per_s(design);
+    if !(seconds >= least_s && seconds <= LONGEST_S) {
+        return Err(InputError::new(format!(
+            "a run of {seconds} s is not between {least_s} (ten decimated samples) and {LONGEST_S} s"
+        ))
+        .help("give `--duration` in seconds")
+        .into());
+    }
+    let records = (seconds.floor() as u64).max(10);
+    let rows_per_record = (seconds * rows_per_s(design) / records as f64).floor() as u64;
+    let kinds = [ArithmeticKind::Fixed, ArithmeticKind::Float];
+    let done = AtomicU64::new(0);
+    let total = 2 * records;
+    let said = || {
+        let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+        progress("seconds of both paths", done, total);
+    };
+    let quiet = |_: usize| ();
+    let mut paths = in_parallel(&kinds, threads, &quiet, |kind| {
+        one_path(design, *kind, records, rows_per_record, &said)
+    })
+    .into_iter();
+    let (Some(fixed), Some(float)) = (paths.next(), paths.next()) else {
+        unreachable!("two kinds give two paths");
+    };
+    let taken = fixed?.into_iter().zip(float?).enumerate();
+    let taken = taken
+        .map(|(k, ((moment, fixed), (_, float)))| Taken {
+            reading: Reading {
+                index: k as u64,
+                time_s: moment.time_s,
+                heating: moment.temperatures.structure_k_per_s >= 0.0,
+            },
+            moment,
+            fixed,
+            float,
+        })
+        .collect();
+    Ok(Run {
+        taken,
+        has: [false; 3],
+        profile: None,
+        continuous: true,
+    })
+}
+
+/// The means of one path, each with the moment in the middle of it.
+fn one_path(
+    design: &Design,
+    kind: ArithmeticKind,
+    records: u64,
+    rows_per_record: u64,
+    said: &(dyn Fn() + Sync),
+) -> Result<Vec<(Moment, Mean)>> {
+    let decimator = &design.circuit.decimator;
+    let memory = u64::from(decimator.stages * decimator.differential_delay);
+    let (profile, _) = Profile::of_run(&design.thermal_run, 0.0);
+    let mut world = World::new(design, profile);
+    let rate = rows_per_s(design);
+    let every = (rate / UPDATES_HZ).ceil() as u64;
+    let noise = Noise::new(design.thermal_run.seed, STREAM);
+    let mut path = Path::new(design, kind);
+    let mut moment = world.advance_to(0.0);
+    path.warm_start(design, moment.conditions)?;
+    // The decimator fills before the first row counts.
+    for _ in 0..memory {
+        path.period(&noise)?;
+    }
+    let mut means = Vec::new();
+    let mut row = 0u64;
+    for _ in 0..records {
+        let mut averager = Averager::new(design);
+        let mut middle = moment;
+        for k in 0..rows_per_record {
+            if row.is_multiple_of(every) {
+                moment = world.advance_to(row as f64 / rate);
+                path.gyroscope.set(moment.conditions);
+            }
+            if k == rows_per_record / 2 {
+                middle = Moment {
+                    time_s: row as f64 / rate,
+                    ..moment
+                };
+            }
+            let real = path.period(&noise)?;
+            averager.add(&real, path.relative_gain(&real));
+            row += 1;
+        }
+        means.push((middle, averager.mean()));
+        said();
+    }
+    Ok(means)
+}

@@ -1,0 +1,279 @@
+//! What quantisation leaves of the loops: dead band and limit cycle, measured in the closed loop
+//! without noise and predicted by a reduced model.
+//!
+//! **Dead band.** A loop whose integrator drops the error's low bits stands still while |error| < LSB of the
+//! integrator / ki. Here the integrators add the error as it is and the gain comes after them, so no error
+//! is lost: the predicted dead band is 0, and a bounded integrator forces the *mean* error to 0.
+//! What is left of it over a finite time is at most the integrator's travel over the number of rows.
+//!
+//! **Limit cycle.** The loop's output is an integer (`>>` is a floor), the equilibrium in general is not. So the
+//! output hunts between its neighbours, and the resonator's envelope and the decimator smooth that
+//! into a small wave of amplitude and phase. The reduced model has exactly these parts at the
+//! decimated rate: envelope as a first-order lag of 2 Q1 / w1, the decimator's response in rows, rounding
+//! to the phase's or the magnitude's LSB, and the loop's own block. It has no carrier, no ADC, no CORDIC.
+
+use super::startup::silent;
+use crate::circuit::amplitude_loop::AmplitudeLoop;
+use crate::circuit::engine::ArithmeticKind;
+use crate::circuit::phase_loop::PhaseLoop;
+use crate::cosim::path::Path;
+use crate::cosim::rest::{self, Rest, rows_per_s};
+use crate::cosim::surroundings::World;
+use crate::design::Design;
+use crate::error::Result;
+use crate::numeric::arithmetic::Block;
+use crate::numeric::fixed::Fixed;
+use crate::numeric::format::pow2;
+use crate::plant::noise::Noise;
+use crate::plant::profile::{self, Profile};
+use serde::Serialize;
+use std::f64::consts::TAU;
+
+type Integers = Fixed<i128, i128>;
+
+/// Rows that are looked at, after as many time constants as a start takes.
+const ROWS: usize = 8192;
+
+/// A loop at one temperature.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Hunting {
+    /// `phase_loop` or `amplitude_loop`.
+    pub name: &'static str,
+    /// Chamber, degC.
+    pub chamber_degc: f64,
+    /// Of the loop's output (tuning word or gain), steps.
+    pub output_unit: &'static str,
+    /// Greatest less least output, measured in the closed loop, LSB.
+    pub output_pp_lsb: f64,
+    /// The same by the reduced model.
+    pub predicted_output_pp_lsb: f64,
+    /// Greatest less least error (phase or magnitude), measured, LSB of the error.
+    pub error_pp_lsb: f64,
+    /// The same by the reduced model.
+    pub predicted_error_pp_lsb: f64,
+    /// Mean error, measured, LSB: the dead band's mark.
+    pub error_mean_lsb: f64,
+    /// Width of the dead band by theory, LSB of the error.
+    pub predicted_dead_band_lsb: f64,
+    /// The wave of the error in physical units, peak to peak: rad, or relative amplitude.
+    pub error_pp: f64,
+}
+
+/// Both loops at the run's start, middle and top.
+///
+/// # Errors
+/// A circuit that stops on an overflow, a loop that does not settle.
+pub fn hunting(design: &Design) -> Result<Vec<Hunting>> {
+    let design = silent(design);
+    let circuit = &design.circuit;
+    if circuit.phase_loop.is_none() && circuit.amplitude_loop.is_none() {
+        return Ok(Vec::new());
+    }
+    let dwells = profile::dwells(&design.thermal_run);
+    let up = dwells.iter().filter(|d| d.1).count();
+    let places = [0, up / 2, up.saturating_sub(1)];
+    let mut found = Vec::new();
+    for place in places {
+        let Some((degc, _)) = dwells.get(place) else {
+            continue;
+        };
+        found.extend(at(&design, *degc)?);
+    }
+    Ok(found)
+}
+
+fn at(design: &Design, degc: f64) -> Result<Vec<Hunting>> {
+    let circuit = &design.circuit;
+    let moment = World::new(design, Profile::constant(degc)).advance_to(0.0);
+    let mut path = Path::new(design, ArithmeticKind::Fixed);
+    let rest = path.warm_start(design, moment.conditions)?;
+    let noise = Noise::new(0, 0);
+    for _ in 0..rest::settling_rows(design)? {
+        path.period(&noise)?;
+    }
+    let mut rows = Vec::with_capacity(ROWS);
+    for _ in 0..ROWS {
+        rows.push(path.period(&noise)?);
+    }
+    let mut found = Vec::new();
+    if let Some(l) = &circuit.phase_loop {
+        let turn = pow2(circuit.cordic.angle_bits as i32);
+        let step_hz = circuit.sample_rate_hz * pow2(-(circuit.nco.phase_bits as i32));
+        let block = PhaseLoop::new(l, circuit.cordic.angle_bits);
+        let predicted = reduced_phase_loop(design, &block, &rest);
+        let outputs: Vec<f64> = rows.iter().map(|r| r.freq_hz / step_hz).collect();
+        let errors: Vec<f64> = rows
+            .iter()
+            .map(|r| r.phase_rad / TAU * turn - l.setpoint_raw as f64)
+            .collect();
+        found.push(Hunting {
+            name: "phase_loop",
+            chamber_degc: degc,
+            output_unit: "tuning word step",
+            error_pp: peak_to_peak(&errors) / turn * TAU,
+            ..compare(&outputs, &errors, &predicted)
+        });
+    }
+    if let Some(l) = &circuit.amplitude_loop {
+        let output = circuit.decimator.output.format;
+        let block = AmplitudeLoop::new(l, output.fraction_bits);
+        let predicted = reduced_amplitude_loop(design, &block, &rest);
+        let gain = pow2(l.gain_bits as i32 - 1);
+        let outputs: Vec<f64> = rows.iter().map(|r| r.gain * gain).collect();
+        let errors: Vec<f64> = rows
+            .iter()
+            .map(|r| l.setpoint_raw as f64 - r.magnitude / output.lsb())
+            .collect();
+        found.push(Hunting {
+            name: "amplitude_loop",
+            chamber_degc: degc,
+            output_unit: "gain LSB",
+            error_pp: peak_to_peak(&errors) / l.setpoint_raw as f64,
+            ..compare(&outputs, &errors, &predicted)
+        });
+    }
+    Ok(found)
+}
+
+/// Outputs and errors, row by row.
+type Series = (Vec<f64>, Vec<f64>);
+
+fn compare(outputs: &[f64], errors: &[f64], (by_model, errors_by_model): &Series) -> Hunting {
+    Hunting {
+        name: "",
+        chamber_degc: 0.0,
+        output_unit: "",
+        output_pp_lsb: peak_to_peak(outputs),
+        predicted_output_pp_lsb: peak_to_peak(by_model),
+        error_pp_lsb: peak_to_peak(errors),
+        predicted_error_pp_lsb: peak_to_peak(errors_by_model),
+        error_mean_lsb: errors.iter().sum::<f64>() / errors.len().max(1) as f64,
+        predicted_dead_band_lsb: 0.0,
+        error_pp: 0.0,
+    }
+}
+
+fn peak_to_peak(values: &[f64]) -> f64 {
+    let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    high - values.iter().copied().fold(f64::INFINITY, f64::min)
+}
+
+/// A first-order lag followed by the decimator, at the decimated rate.
+struct Envelope {
+    decay: f64,
+    level: f64,
+    weights: Vec<f64>,
+    /// Newest first.
+    recent: Vec<f64>,
+}
+
+impl Envelope {
+    fn new(design: &Design, level: f64) -> Self {
+        let weights = row_weights(design);
+        Envelope {
+            decay: (-1.0 / (rest::envelope_s(design) * rows_per_s(design))).exp(),
+            level,
+            recent: vec![level; weights.len()],
+            weights,
+        }
+    }
+
+    /// A row in which the lag goes toward `target`.
+    fn row(&mut self, target: f64) -> f64 {
+        self.level = target + (self.level - target) * self.decay;
+        self.recent.rotate_right(1);
+        if let Some(newest) = self.recent.first_mut() {
+            *newest = self.level;
+        }
+        let terms = self.recent.iter().zip(&self.weights);
+        terms.map(|(level, weight)| level * weight).sum()
+    }
+}
+
+/// The decimator's response to something that is constant within rows: the sums of its N-fold
+/// convolved boxes of R M samples over rows, newest first; they add up to 1.
+fn row_weights(design: &Design) -> Vec<f64> {
+    let d = &design.circuit.decimator;
+    let (span, ratio) = ((d.ratio * d.differential_delay) as usize, d.ratio as usize);
+    let mut response = vec![1.0];
+    for _ in 0..d.stages {
+        let mut next = vec![0.0; response.len() + span - 1];
+        for (k, r) in response.iter().enumerate() {
+            for n in next.iter_mut().skip(k).take(span) {
+                *n += r / span as f64;
+            }
+        }
+        response = next;
+    }
+    response.chunks(ratio).map(|c| c.iter().sum()).collect()
+}
+
+fn reduced_amplitude_loop(design: &Design, block: &AmplitudeLoop, rest: &Rest) -> Series {
+    let ar = Integers::new();
+    let Some(l) = &design.circuit.amplitude_loop else {
+        return (Vec::new(), Vec::new());
+    };
+    let setpoint = l.setpoint_raw as f64;
+    let lsb = pow2(l.gain_bits as i32 - 1);
+    let per_lsb = setpoint / (rest.gain * lsb);
+    let mut state = block.holding(&ar, rest.gain);
+    let mut envelope = Envelope::new(design, setpoint);
+    let mut gain = (rest.gain * lsb).round();
+    let count = ROWS * 2;
+    let (mut outputs, mut errors) = (Vec::new(), Vec::new());
+    for _ in 0..count {
+        let magnitude = envelope.row(gain * per_lsb).round();
+        outputs.push(gain);
+        errors.push(setpoint - magnitude);
+        let [next] = block.step(&ar, &mut state, [magnitude as i128]);
+        gain = next as f64;
+    }
+    (outputs.split_off(ROWS), errors.split_off(ROWS))
+}
+
+fn reduced_phase_loop(design: &Design, block: &PhaseLoop, rest: &Rest) -> Series {
+    let ar = Integers::new();
+    let setpoint = block.setpoint(&ar);
+    let per_step = rest::phase_lsb_per_step(design);
+    let wanted = rest.held.correction_steps;
+    let mut state = block.holding(&ar, wanted);
+    // Relative to the setpoint: more frequency, more lag.
+    let mut envelope = Envelope::new(design, 0.0);
+    let mut steps = wanted.round();
+    let (mut outputs, mut errors) = (Vec::new(), Vec::new());
+    for _ in 0..ROWS * 2 {
+        let error = envelope.row(-(steps - wanted) * per_step).round();
+        outputs.push(steps);
+        errors.push(error);
+        let [next] = block.step(&ar, &mut state, [setpoint + error as i128]);
+        steps = next as f64;
+    }
+    (outputs.split_off(ROWS), errors.split_off(ROWS))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::design::template::default_design;
+
+    #[test]
+    fn the_decimator_in_rows_is_a_cubic_spline_for_three_stages() {
+        let design = default_design().expect("the default");
+        let weights = row_weights(&design);
+        let sum: f64 = weights.iter().sum();
+        assert!((sum - 1.0).abs() < 1e-12);
+        // Three boxes of 32: 1/6, 2/3, 1/6 in the limit of long rows.
+        for (w, limit) in weights.iter().zip([1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0]) {
+            assert!((w - limit).abs() < 0.02, "{weights:?}");
+        }
+    }
+
+    #[test]
+    fn the_amplitude_loop_hunts_as_predicted_and_loses_no_error() {
+        let design = default_design().expect("the default");
+        for h in hunting(&design).expect("a run") {
+            assert!(h.output_pp_lsb <= h.predicted_output_pp_lsb + 1.0, "{h:?}");
+            assert!(h.error_mean_lsb.abs() < 1.0, "{h:?}");
+        }
+    }
+}

@@ -1,0 +1,192 @@
+//! `gyrogen simulate`: a run of plant and circuit in closed loop, float and fixed; its record, the
+//! compensation that it gives, what the loops do, and the published figures beside it.
+//!
+//! [`profile_run`] is a thermal run of warm-started readings, [`continuous`] simulates every sample;
+//! [`record_csv`] writes the record, [`startup`] switches the gyro on, [`hunting`] looks at what
+//! quantisation leaves of the loops, [`paper`] has the published figures; [`outcome`] is `simulate.json`.
+
+pub mod continuous;
+pub mod hunting;
+pub mod outcome;
+pub mod paper;
+pub mod record_csv;
+pub mod startup;
+
+use crate::cosim::readings::{self, Options, Taken};
+use crate::design::Design;
+use crate::error::{InputError, Result};
+use crate::job::calibration::{self, Calibration};
+use crate::plant::profile::{Profile, Reading};
+use crate::record;
+use outcome::Outcome;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// What is simulated.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Course {
+    /// The design's own thermal run, each reading warm-started.
+    ThermalRun,
+    /// The chamber (and table, supply, acceleration) of a profile, each reading warm-started.
+    Profile(PathBuf),
+    /// The first so many seconds of the design's own run, every ADC sample.
+    Continuous(f64),
+}
+
+/// How it is simulated.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Request {
+    /// What.
+    pub course: Course,
+    /// Readings along a profile.
+    pub profile_readings: u64,
+    /// Threads; the result does not depend on it.
+    pub threads: usize,
+    /// The command, for the results.
+    pub command: String,
+}
+
+/// Told of progress: a step, how much of it is done and how much there is.
+pub type Progress<'a> = &'a (dyn Fn(&str, u64, u64) + Sync);
+
+/// The readings of a run, and what they were taken along.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    /// Uncompensated, float and fixed.
+    pub taken: Vec<Taken>,
+    /// Which of rate, supply and acceleration are worth a column.
+    pub has: [bool; 3],
+    /// The profile's file, if there is one.
+    pub profile: Option<PathBuf>,
+    /// Every sample was simulated.
+    pub continuous: bool,
+}
+
+/// Simulates. Nothing is written.
+///
+/// # Errors
+/// A design or profile that cannot be used; a circuit that stops on an overflow.
+pub fn simulate(design: &Design, request: &Request, progress: Progress) -> Result<Outcome> {
+    let started = Instant::now();
+    let uncompensated = Design {
+        compensation: None,
+        ..design.clone()
+    };
+    let run = match &request.course {
+        Course::ThermalRun => {
+            let (profile, readings) = Profile::of_run(&design.thermal_run, reading_s(design));
+            let taken = warm(&uncompensated, &profile, &readings, request.threads, progress)?;
+            Run {
+                taken,
+                has: profile.has,
+                profile: None,
+                continuous: false,
+            }
+        }
+        Course::Profile(path) => {
+            let profile = Profile::read(path)?;
+            let readings = readings_along(&profile, path, request.profile_readings)?;
+            let taken = warm(&uncompensated, &profile, &readings, request.threads, progress)?;
+            Run {
+                taken,
+                has: profile.has,
+                profile: Some(path.clone()),
+                continuous: false,
+            }
+        }
+        Course::Continuous(seconds) => {
+            continuous::run(&uncompensated, *seconds, request.threads, progress)?
+        }
+    };
+    let csv = record_csv::text(design, &run);
+    let calibrated = if run.taken.len() < record::thermal::LEAST_ROWS || run.has[0] {
+        None
+    } else {
+        Some(calibrate(design, &csv)?)
+    };
+    let after = match &calibrated {
+        Some((fitted, _)) if !run.continuous => {
+            let readings: Vec<Reading> = run.taken.iter().map(|t| t.reading).collect();
+            let moments: Vec<_> = run.taken.iter().map(|t| t.moment).collect();
+            let rows = rows(fitted);
+            let options = Options {
+                rows,
+                threads: request.threads,
+            };
+            let total = readings.len() as u64;
+            let said = |done: usize| progress("compensated readings", done as u64, total);
+            Some(readings::take(fitted, &readings, &moments, options, &said)?)
+        }
+        _ => None,
+    };
+    let startup = startup::startup(&uncompensated)?;
+    let hunting = hunting::hunting(&uncompensated)?;
+    let scale_factor = if run.continuous {
+        Vec::new()
+    } else {
+        paper::scale_factors(&uncompensated, &run.taken, request.threads)?
+    };
+    Ok(Outcome::new(outcome::Parts {
+        design: design.clone(),
+        command: request.command.clone(),
+        run,
+        record_csv: csv,
+        calibrated,
+        after,
+        startup,
+        hunting,
+        scale_factor,
+        seconds: started.elapsed().as_secs_f64(),
+    }))
+}
+
+/// Decimated samples of a reading.
+fn rows(design: &Design) -> usize {
+    design.thermal_run.samples_per_reading as usize
+}
+
+/// How long a reading takes, s.
+fn reading_s(design: &Design) -> f64 {
+    rows(design) as f64 / crate::cosim::rest::rows_per_s(design)
+}
+
+fn warm(
+    design: &Design,
+    profile: &Profile,
+    readings: &[Reading],
+    threads: usize,
+    progress: Progress,
+) -> Result<Vec<Taken>> {
+    let moments = readings::moments(design, profile, readings);
+    let options = Options {
+        rows: rows(design),
+        threads,
+    };
+    let total = readings.len() as u64;
+    let said = |done: usize| progress("readings", done as u64, total);
+    readings::take(design, readings, &moments, options, &said)
+}
+
+fn readings_along(profile: &Profile, path: &Path, count: u64) -> Result<Vec<Reading>> {
+    if profile.duration_s() <= 0.0 {
+        return Err(InputError::new("lasts no time")
+            .in_file(path)
+            .help("give at least two rows with different times")
+            .into());
+    }
+    Ok(profile.even_readings(count))
+}
+
+/// The compensation that the record gives, through the same door as a measured one.
+fn calibrate(design: &Design, csv: &str) -> Result<(Design, Calibration)> {
+    let (record, mut warnings) = record::thermal::parse(
+        csv.as_bytes(),
+        Path::new("record.csv"),
+        &Default::default(),
+    )?;
+    let mut fitted = design.clone();
+    let mut calibration = calibration::calibrate(&mut fitted, &record, true)?;
+    warnings.append(&mut calibration.warnings);
+    calibration.warnings = warnings;
+    Ok((fitted, calibration))
+}
