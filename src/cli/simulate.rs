@@ -190,6 +190,7 @@ fn loops(outcome: &Outcome) -> comfy_table::Table {
         "predicted",
         "error pp, LSB",
         "predicted",
+        "ADC and NCO, bound",
         "mean error, LSB",
         "dead band predicted",
     ]);
@@ -201,6 +202,7 @@ fn loops(outcome: &Outcome) -> comfy_table::Table {
             format!("{:.0}", h.predicted_output_pp_lsb),
             format!("{:.0}", h.error_pp_lsb),
             format!("{:.0}", h.predicted_error_pp_lsb),
+            format!("{:.0}", h.converters_pp_lsb),
             format!("{:.3}", h.error_mean_lsb),
             format!("{:.0} LSB", h.predicted_dead_band_lsb),
         ]);

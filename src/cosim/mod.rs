@@ -16,3 +16,6 @@ pub mod stream;
 pub mod surroundings;
 
 pub use path::{Path, RealRow};
+
+#[cfg(test)]
+mod tests;

@@ -131,14 +131,25 @@ impl Path {
         }
     }
 
-    /// Puts gyro and loops into the steady state under `conditions`; the decimator and the oscillator's phase
-    /// stay where they are.
+    /// Puts gyro, loops and decimator into the steady state under `conditions`: the loops are held at
+    /// rest, row after row, until the decimator has forgotten what was before.
     ///
     /// # Errors
-    /// A phase loop whose setpoint is no phase of the resonance.
-    pub fn warm_start(&mut self, design: &Design, conditions: Conditions) -> Result<Rest> {
+    /// A phase loop whose setpoint is no phase of the resonance; a circuit that stops on an overflow.
+    pub fn warm_start(
+        &mut self,
+        design: &Design,
+        conditions: Conditions,
+        noise: &Noise,
+    ) -> Result<Rest> {
         self.gyroscope.set(conditions);
         let rest = rest::rest(design, &self.gyroscope)?;
+        let decimator = &design.circuit.decimator;
+        for _ in 0..decimator.stages * decimator.differential_delay {
+            self.engine.hold(rest.held);
+            self.gyroscope.settle(self.drive());
+            self.period(noise)?;
+        }
         self.engine.hold(rest.held);
         self.gyroscope.settle(self.drive());
         Ok(rest)

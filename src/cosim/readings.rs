@@ -11,9 +11,6 @@ use crate::plant::noise::Noise;
 use crate::plant::profile::{Profile, Reading};
 use serde::Serialize;
 
-/// Rows dropped at the start of a warm-started reading, beyond the decimator's memory.
-const SETTLING_ROWS: usize = 8;
-
 /// The mean of a reading's rows.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Mean {
@@ -102,17 +99,13 @@ pub fn mean(
     moment: &Moment,
     rows: usize,
 ) -> Result<Mean> {
-    let decimator = &design.circuit.decimator;
-    let memory = (decimator.stages * decimator.differential_delay) as usize;
     let noise = Noise::new(design.thermal_run.seed, reading.index);
     let mut path = Path::new(design, kind);
-    path.warm_start(design, moment.conditions)?;
+    path.warm_start(design, moment.conditions, &noise)?;
     let mut averager = Averager::new(design);
-    for k in 0..memory + SETTLING_ROWS + rows {
+    for _ in 0..rows {
         let row = path.period(&noise)?;
-        if k >= memory + SETTLING_ROWS {
-            averager.add(&row, path.relative_gain(&row));
-        }
+        averager.add(&row, path.relative_gain(&row));
     }
     Ok(averager.mean())
 }

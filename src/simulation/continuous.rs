@@ -82,8 +82,6 @@ fn one_path(
     rows_per_record: u64,
     said: &(dyn Fn() + Sync),
 ) -> Result<Vec<(Moment, Mean)>> {
-    let decimator = &design.circuit.decimator;
-    let memory = u64::from(decimator.stages * decimator.differential_delay);
     let (profile, _) = Profile::of_run(&design.thermal_run, 0.0);
     let mut world = World::new(design, profile);
     let rate = rows_per_s(design);
@@ -91,11 +89,7 @@ fn one_path(
     let noise = Noise::new(design.thermal_run.seed, STREAM);
     let mut path = Path::new(design, kind);
     let mut moment = world.advance_to(0.0);
-    path.warm_start(design, moment.conditions)?;
-    // The decimator fills before the first row counts.
-    for _ in 0..memory {
-        path.period(&noise)?;
-    }
+    path.warm_start(design, moment.conditions, &noise)?;
     let mut means = Vec::new();
     let mut row = 0u64;
     for _ in 0..records {

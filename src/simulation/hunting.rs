@@ -10,7 +10,8 @@
 //! output hunts between its neighbours, and the resonator's envelope and the decimator smooth that
 //! into a small wave of amplitude and phase. The reduced model has exactly these parts at the
 //! decimated rate: envelope as a first-order lag of 2 Q1 / w1, the decimator's response in rows, rounding
-//! to the phase's or the magnitude's LSB, and the loop's own block. It has no carrier, no ADC, no CORDIC.
+//! to the phase's or the magnitude's LSB, and the loop's own block. It has no carrier, no ADC, no CORDIC;
+//! what those add is bounded beside it.
 
 use super::startup::silent;
 use crate::circuit::amplitude_loop::AmplitudeLoop;
@@ -51,6 +52,10 @@ pub struct Hunting {
     pub error_pp_lsb: f64,
     /// The same by the reduced model.
     pub predicted_error_pp_lsb: f64,
+    /// What ADC and oscillator may add to the error, a bound, LSB peak to peak: the model has neither. One
+    /// ADC step over the amplitude, and the address truncation's 2 pi / 2^a where the tuning word has
+    /// bits below the address; the same for phase (rad) and relative amplitude.
+    pub converters_pp_lsb: f64,
     /// Mean error, measured, LSB: the dead band's mark.
     pub error_mean_lsb: f64,
     /// Width of the dead band by theory, LSB of the error.
@@ -86,8 +91,8 @@ fn at(design: &Design, degc: f64) -> Result<Vec<Hunting>> {
     let circuit = &design.circuit;
     let moment = World::new(design, Profile::constant(degc)).advance_to(0.0);
     let mut path = Path::new(design, ArithmeticKind::Fixed);
-    let rest = path.warm_start(design, moment.conditions)?;
     let noise = Noise::new(0, 0);
+    let rest = path.warm_start(design, moment.conditions, &noise)?;
     for _ in 0..rest::settling_rows(design)? {
         path.period(&noise)?;
     }
@@ -95,6 +100,10 @@ fn at(design: &Design, degc: f64) -> Result<Vec<Hunting>> {
     for _ in 0..ROWS {
         rows.push(path.period(&noise)?);
     }
+    // One LSB of the drive ADC over the amplitude.
+    let amplitude = rows.last().map_or(0.0, |r| r.magnitude)
+        * crate::cosim::path::amplitude_lsb_per_magnitude(design);
+    let converters = 1.0 / amplitude.max(1.0) + address_truncation_rad(design);
     let mut found = Vec::new();
     if let Some(l) = &circuit.phase_loop {
         let turn = pow2(circuit.cordic.angle_bits as i32);
@@ -110,6 +119,7 @@ fn at(design: &Design, degc: f64) -> Result<Vec<Hunting>> {
             name: "phase_loop",
             chamber_degc: degc,
             output_unit: "tuning word step",
+            converters_pp_lsb: turn / TAU * converters,
             error_pp: peak_to_peak(&errors) / turn * TAU,
             ..compare(&outputs, &errors, &predicted)
         });
@@ -128,11 +138,25 @@ fn at(design: &Design, degc: f64) -> Result<Vec<Hunting>> {
             name: "amplitude_loop",
             chamber_degc: degc,
             output_unit: "gain LSB",
+            converters_pp_lsb: l.setpoint_raw as f64 * converters,
             error_pp: peak_to_peak(&errors) / l.setpoint_raw as f64,
             ..compare(&outputs, &errors, &predicted)
         });
     }
     Ok(found)
+}
+
+/// How far the address truncation may turn the carrier, rad, peak to peak; 0 for a tuning word that
+/// meets the table's entries only.
+fn address_truncation_rad(design: &Design) -> f64 {
+    let nco = &design.circuit.nco;
+    let below = (1i128 << (nco.phase_bits - nco.table_address_bits)) - 1;
+    let coherent = i128::from(nco.tuning_word) & below == 0;
+    if coherent && design.circuit.phase_loop.is_none() {
+        0.0
+    } else {
+        TAU * pow2(-(nco.table_address_bits as i32))
+    }
 }
 
 /// Outputs and errors, row by row.
@@ -147,6 +171,7 @@ fn compare(outputs: &[f64], errors: &[f64], (by_model, errors_by_model): &Series
         predicted_output_pp_lsb: peak_to_peak(by_model),
         error_pp_lsb: peak_to_peak(errors),
         predicted_error_pp_lsb: peak_to_peak(errors_by_model),
+        converters_pp_lsb: 0.0,
         error_mean_lsb: errors.iter().sum::<f64>() / errors.len().max(1) as f64,
         predicted_dead_band_lsb: 0.0,
         error_pp: 0.0,
@@ -269,11 +294,38 @@ mod tests {
     }
 
     #[test]
-    fn the_amplitude_loop_hunts_as_predicted_and_loses_no_error() {
-        let design = default_design().expect("the default");
-        for h in hunting(&design).expect("a run") {
-            assert!(h.output_pp_lsb <= h.predicted_output_pp_lsb + 1.0, "{h:?}");
-            assert!(h.error_mean_lsb.abs() < 1.0, "{h:?}");
+    fn the_loops_hunt_within_what_is_predicted_and_lose_no_error() {
+        let fixed = default_design().expect("the default");
+        let tracking = tracking_design();
+        for (design, count) in [(fixed, 3), (tracking, 6)] {
+            let found = hunting(&design).expect("a run");
+            assert_eq!(found.len(), count);
+            for h in found {
+                let bound = h.predicted_error_pp_lsb + h.converters_pp_lsb;
+                assert!(h.error_pp_lsb <= bound, "{h:?}");
+                assert!(h.error_mean_lsb.abs() < 1.0, "{h:?}");
+            }
         }
+    }
+
+    /// The default with its phase loop switched on.
+    fn tracking_design() -> Design {
+        let mut design = default_design().expect("the default");
+        let gain = |raw, shift| crate::design::LoopGain { raw, shift };
+        design.circuit.phase_loop = Some(crate::design::PhaseLoop {
+            setpoint_raw: -4_194_304,
+            proportional: gain(9, 6),
+            integral: gain(9, 11),
+            integrator_bits: 48,
+        });
+        design
+    }
+
+    #[test]
+    fn a_floor_in_the_loop_makes_the_gain_hunt() {
+        // With the noise-free equilibrium between two gain words the output cannot stand still.
+        let design = default_design().expect("the default");
+        let found = hunting(&design).expect("a run");
+        assert!(found.iter().all(|h| h.output_pp_lsb >= 1.0), "{found:?}");
     }
 }

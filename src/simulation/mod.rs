@@ -17,7 +17,7 @@ use crate::design::Design;
 use crate::error::{InputError, Result};
 use crate::job::calibration::{self, Calibration};
 use crate::plant::profile::{Profile, Reading};
-use crate::record;
+use crate::record::{self, Warning};
 use outcome::Outcome;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -99,10 +99,17 @@ pub fn simulate(design: &Design, request: &Request, progress: Progress) -> Resul
         }
     };
     let csv = record_csv::text(design, &run);
-    let calibrated = if run.taken.len() < record::thermal::LEAST_ROWS || run.has[0] {
-        None
+    let mut warnings = Vec::new();
+    let calibrated = if is_worth_a_fit(&run) {
+        match calibrate(design, &csv) {
+            Ok(calibrated) => Some(calibrated),
+            Err(e) => {
+                warnings.push(Warning::general("not_fitted", e.to_string()));
+                None
+            }
+        }
     } else {
-        Some(calibrate(design, &csv)?)
+        None
     };
     let after = match &calibrated {
         Some((fitted, _)) if !run.continuous => {
@@ -136,8 +143,19 @@ pub fn simulate(design: &Design, request: &Request, progress: Progress) -> Resul
         startup,
         hunting,
         scale_factor,
+        warnings,
         seconds: started.elapsed().as_secs_f64(),
     }))
+}
+
+/// A compensation can be fitted to a run at rest that goes through some temperatures.
+fn is_worth_a_fit(run: &Run) -> bool {
+    /// K.
+    const LEAST_SPAN: f64 = 5.0;
+    let degc = || run.taken.iter().map(|t| t.moment.temperatures.structure_degc);
+    let span = degc().fold(f64::NEG_INFINITY, f64::max) - degc().fold(f64::INFINITY, f64::min);
+    let at_rest = run.taken.iter().all(|t| t.moment.surroundings.rate_dps == 0.0);
+    run.taken.len() >= record::thermal::LEAST_ROWS && span >= LEAST_SPAN && at_rest
 }
 
 /// Decimated samples of a reading.

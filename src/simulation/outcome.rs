@@ -33,6 +33,8 @@ pub struct Parts {
     pub hunting: Vec<Hunting>,
     /// At each dwell.
     pub scale_factor: Vec<ScaleFactor>,
+    /// Of the run.
+    pub warnings: Vec<Warning>,
     /// Wall time.
     pub seconds: f64,
 }
@@ -314,7 +316,7 @@ fn fit(design: &Design, calibration: &Calibration) -> FitSummary {
 }
 
 fn warnings(parts: &Parts) -> Vec<Warning> {
-    let mut warnings = Vec::new();
+    let mut warnings = parts.warnings.clone();
     let design = &parts.design;
     let full_scale = |t: &Taken| t.fixed.magnitude;
     let amplitude = crate::cosim::path::amplitude_lsb_per_magnitude(design);
