@@ -434,12 +434,9 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Engine
     }
 
     fn hold(&mut self, held: Held) {
-        let gain = self.chain.hold(
-            &self.slow,
-            &mut self.fast_state,
-            &mut self.slow_state,
-            held,
-        );
+        let gain = self
+            .chain
+            .hold(&self.slow, &mut self.fast_state, &mut self.slow_state, held);
         self.gain = gain.map(|g| S::gain(g, &self.scale));
     }
 

@@ -54,7 +54,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let outcome = simulation::simulate(&design, &request, &progress)?;
     bar.done();
     let json = super::json(&outcome.summary);
-    write(&outcome, &arguments.out, &json)?;
+    let html = crate::report::simulation::html(&outcome)?;
+    write(&outcome, &arguments.out, &json, &html)?;
     match arguments.format {
         OutputFormat::Json => print!("{json}"),
         OutputFormat::Text => print(&outcome, &arguments.out),
@@ -79,17 +80,20 @@ fn command(arguments: &Arguments) -> String {
         command += &format!(" --duration {seconds}");
     }
     if let Some(path) = &arguments.profile {
-        command += &format!(" --profile {} --readings {}", path.display(), arguments.readings);
+        command += &format!(
+            " --profile {} --readings {}",
+            path.display(),
+            arguments.readings
+        );
     }
     command
 }
 
-fn write(outcome: &Outcome, out: &std::path::Path, json: &str) -> Result<()> {
+fn write(outcome: &Outcome, out: &std::path::Path, json: &str, html: &str) -> Result<()> {
     super::make_folder(out)?;
     let parts = &outcome.parts;
-    let whole = |name: &str, text: &str| {
-        crate::output::write_whole(&out.join(name), text.as_bytes())
-    };
+    let whole =
+        |name: &str, text: &str| crate::output::write_whole(&out.join(name), text.as_bytes());
     whole("record.csv", &parts.record_csv)?;
     whole(
         "readings.csv",
@@ -98,13 +102,21 @@ fn write(outcome: &Outcome, out: &std::path::Path, json: &str) -> Result<()> {
     if let Some((fitted, _)) = &parts.calibrated {
         whole("design.toml", &crate::job::fitted_design::text(fitted))?;
     }
+    whole("report.html", html)?;
     whole("simulate.json", json)
 }
 
 fn print(outcome: &Outcome, out: &std::path::Path) {
     let s = &outcome.summary;
     if !s.paper.is_empty() {
-        let mut table = super::table(&["published figure", "source", "published", "obtained", "by", ""]);
+        let mut table = super::table(&[
+            "published figure",
+            "source",
+            "published",
+            "obtained",
+            "by",
+            "",
+        ]);
         for f in &s.paper {
             let decimals = decimals(f.tolerance);
             table.add_row([
@@ -162,7 +174,11 @@ fn print_sentences(outcome: &Outcome) {
     if let Some(lock) = &s.lock {
         println!(
             "phase loop: {}, mean phase within {:.2e} rad of the setpoint, frequency within {:.2e} Hz of the resonance, {:.2} ppm/K",
-            if lock.locked { "locked everywhere" } else { "not locked everywhere" },
+            if lock.locked {
+                "locked everywhere"
+            } else {
+                "not locked everywhere"
+            },
             lock.phase_error_rad,
             lock.freq_error_hz,
             lock.tempco_ppm_per_k

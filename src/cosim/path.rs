@@ -193,11 +193,10 @@ impl Path {
         self.sample += self.drive_lsb.len() as u64;
         self.clear_rows();
         match self.kind {
-            ArithmeticKind::Float => self.engine.process_inputs(
-                &self.drive_lsb,
-                &self.sense_lsb,
-                &mut self.rows,
-            ),
+            ArithmeticKind::Float => {
+                self.engine
+                    .process_inputs(&self.drive_lsb, &self.sense_lsb, &mut self.rows)
+            }
             ArithmeticKind::Fixed => {
                 let [d, s] = &mut self.codes;
                 let [drive, sense] = &self.converters;

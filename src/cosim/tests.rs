@@ -90,7 +90,11 @@ fn float_readings_are_the_equations_steady_state() {
         assert!((mean.phase_rad - device.measured_phase_rad(degc)).abs() < 1e-9);
         // The table's amplitude is 32767/32768, and the gain a word of 16 bits.
         let expected = device.bias_dps(degc) * 32767.0 / 32768.0;
-        assert!((mean.rate_out_dps / expected - 1.0).abs() < 2e-4, "{degc}: {}", mean.rate_out_dps);
+        assert!(
+            (mean.rate_out_dps / expected - 1.0).abs() < 2e-4,
+            "{degc}: {}",
+            mean.rate_out_dps
+        );
     }
 }
 

@@ -258,7 +258,10 @@ fn tuning_input(t: &Table, circuit: &Circuit, input: &Value) -> Result<Compensat
             .help("add [circuit.phase_loop], or set `input = \"phase\"`")
             .into());
     }
-    if let Some(extra) = ["input_format", "rate_input_format"].iter().find_map(|k| t.get(k)) {
+    if let Some(extra) = ["input_format", "rate_input_format"]
+        .iter()
+        .find_map(|k| t.get(k))
+    {
         return Err(extra
             .error("goes only with a thermometer that is not the chain's own")
             .help("delete it")

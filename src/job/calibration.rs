@@ -84,4 +84,3 @@ fn gives_up_held_phase(design: &mut Design) -> bool {
     }
     held
 }
-

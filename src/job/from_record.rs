@@ -85,7 +85,9 @@ pub fn points(
 /// The word in which firmware reads the uncompensated rate.
 fn rate_format(design: &Design, c: &Compensation) -> Format {
     match &c.input {
-        CompensationInput::Phase | CompensationInput::TuningWord(_) => design.circuit.decimator.output.format,
+        CompensationInput::Phase | CompensationInput::TuningWord(_) => {
+            design.circuit.decimator.output.format
+        }
         CompensationInput::Channel(channel) => channel.rate_format,
     }
 }

@@ -70,7 +70,11 @@ impl OwnRun {
 
     /// The run as a thermal record (`docs/manual.md`): what the closure sees of it.
     pub fn record_csv(&self) -> String {
-        let thermometer = if self.tracking { "freq_hz" } else { "phase_rad" };
+        let thermometer = if self.tracking {
+            "freq_hz"
+        } else {
+            "phase_rad"
+        };
         let mut text = format!("time_s,chamber_degc,{thermometer},rate_out_dps\n");
         let rows = self.readings.iter().zip(&self.moments).zip(&self.measured);
         for ((reading, moment), (thermometer, rate)) in rows {
@@ -201,12 +205,16 @@ impl OwnRun {
             Rows::Real(_) => Vec::new(),
         };
         let fixed = rate_of(&fixed);
-        let c = rate_of(&firmware.c.chain(&self.stream.drive, &self.stream.sense, columns.len())?);
-        let rust = rate_of(
-            &firmware
-                .rust
-                .chain(&self.stream.drive, &self.stream.sense, columns.len())?,
-        );
+        let c = rate_of(&firmware.c.chain(
+            &self.stream.drive,
+            &self.stream.sense,
+            columns.len(),
+        )?);
+        let rust = rate_of(&firmware.rust.chain(
+            &self.stream.drive,
+            &self.stream.sense,
+            columns.len(),
+        )?);
         let missing = f64::NAN;
         let at = |values: &[f64], k: usize| values.get(k).copied().unwrap_or(missing);
         let readings = self.readings.iter().zip(&self.moments).zip(&self.measured);
@@ -231,7 +239,9 @@ impl OwnRun {
         words
             .chunks_exact(columns * self.stream.rows_per_reading)
             .map(|reading| {
-                let rows = reading.chunks_exact(columns).skip(self.stream.settling_rows);
+                let rows = reading
+                    .chunks_exact(columns)
+                    .skip(self.stream.settling_rows);
                 mean(rows.map(|row| row[column] as f64 * lsb))
             })
             .collect()

@@ -351,9 +351,7 @@ impl Gyroscope {
         let width = [w[0] / c.drive_q, w[1] / self.device.sense.q];
         let w0 = TAU * self.device.drive.frequency_hz;
         let h = 1.0 / self.reference.sample_rate_hz;
-        let mode = |k: usize| {
-            Matrix2::new(0.0, w0, -w[k] * w[k] / w0, -width[k]) * h
-        };
+        let mode = |k: usize| Matrix2::new(0.0, w0, -w[k] * w[k] / w0, -width[k]) * h;
         // Below: the force K on v' of the sense mode, by x and by u.
         let joined = |by: Vector2<f64>| {
             let mut a = Matrix4::zeros();

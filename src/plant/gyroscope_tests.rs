@@ -90,7 +90,10 @@ fn from_rest_the_motion_comes_to_the_steady_state_of_eq_5_to_7() {
         let [x, s] = run(&mut g, drive, 1000);
         let expected = drive_mode.response(degc, 1750.0);
         let measured = x.arg() - g.device.electronics_phase_rad(degc);
-        assert!((measured - expected.phase_rad).abs() < 1e-9, "{degc}: {measured}");
+        assert!(
+            (measured - expected.phase_rad).abs() < 1e-9,
+            "{degc}: {measured}"
+        );
         let amplitude = expected.amplitude / 50.0 * 16384.0;
         assert!((x.norm() / amplitude - 1.0).abs() < 1e-9, "{degc}");
         // A settled start gives the same at once.
@@ -161,7 +164,10 @@ fn the_discretisation_is_exact_through_changes_of_everything() {
     g.move_to(drive);
     let start = motion(&g);
     for k in 0..4 {
-        assert!((start[k] - before[k]).abs() < 1e-9 * before[0].hypot(before[1]), "{k}");
+        assert!(
+            (start[k] - before[k]).abs() < 1e-9 * before[0].hypot(before[1]),
+            "{k}"
+        );
     }
     let samples = 100;
     let expected = by_runge_kutta(&g, drive, start, samples);
@@ -170,7 +176,10 @@ fn the_discretisation_is_exact_through_changes_of_everything() {
     let got = motion(&g);
     for k in 0..4 {
         let size = expected[k & !1].hypot(expected[k | 1]);
-        assert!((got[k] - expected[k]).abs() < 1e-7 * size, "{k}: {got:?} {expected:?}");
+        assert!(
+            (got[k] - expected[k]).abs() < 1e-7 * size,
+            "{k}: {got:?} {expected:?}"
+        );
     }
 }
 
@@ -191,7 +200,10 @@ fn a_fixed_frequency_circuit_reads_eq_9_and_a_rate_in_full() {
         let [x, s] = run(&mut g, drive, 0);
         assert!((x.norm() - 16384.0).abs() < 1e-6);
         let bias = s.re / 32.0;
-        assert!((bias - g.device.declared_bias_dps(degc)).abs() < 1e-8, "{degc}: {bias}");
+        assert!(
+            (bias - g.device.declared_bias_dps(degc)).abs() < 1e-8,
+            "{degc}: {bias}"
+        );
         conditions.rate_dps = 100.0;
         conditions.extra_bias_dps = 3.0;
         g.set(conditions);

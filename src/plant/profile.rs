@@ -183,7 +183,9 @@ pub fn dwells(run: &ThermalRun) -> Vec<(f64, bool)> {
 /// A profile from the bytes of a CSV file.
 fn parse(bytes: &[u8], path: &Path) -> Result<Profile> {
     let refuse = |message: String, line: u64, column: Option<usize>| {
-        let e = InputError::new(message).in_file(path).at(line as usize, column.unwrap_or(1));
+        let e = InputError::new(message)
+            .in_file(path)
+            .at(line as usize, column.unwrap_or(1));
         e.help(
             "a profile is a CSV file with the columns time_s and chamber_degc, and, where wanted, \
              rate_dps, supply_v, accel_g",
@@ -200,9 +202,8 @@ fn parse(bytes: &[u8], path: &Path) -> Result<Profile> {
     };
     let header = reader.headers().map_err(broken)?.clone();
     let find = |name: &str| header.iter().position(|h| h == name);
-    let need = |name: &str| {
-        find(name).ok_or_else(|| refuse(format!("has no column {name}"), 1, None))
-    };
+    let need =
+        |name: &str| find(name).ok_or_else(|| refuse(format!("has no column {name}"), 1, None));
     let places = [
         Some(need("time_s")?),
         Some(need("chamber_degc")?),

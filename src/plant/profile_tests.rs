@@ -28,7 +28,10 @@ fn the_default_run_dwells_29_times_and_turns_once() {
     // Every reading is in its dwell's last part, 900 s after the ramp's end.
     for (k, (degc, _)) in dwells(&run).iter().enumerate() {
         assert_eq!(profile.at(readings[3 * k].time_s).chamber_degc, *degc);
-        assert_eq!(profile.at(readings[3 * k].time_s - 899.9).chamber_degc, *degc);
+        assert_eq!(
+            profile.at(readings[3 * k].time_s - 899.9).chamber_degc,
+            *degc
+        );
     }
     assert_eq!(readings[0].time_s, 900.0);
     assert_eq!(readings[3].time_s, 900.0 + 30.0 + 300.0 + 900.0);

@@ -2,12 +2,13 @@
 //!
 //! [`page`] and [`tables`] turn an outcome into what the template prints, [`figures`] draws it on
 //! what [`scene`] prepares, [`svg`] with [`axis`] is the plot writer under the figures, [`text`]
-//! formats numbers. Colours and layout are in `templates/report/`.
+//! formats numbers; [`simulation`] is the page of `simulate`. Colours and layout are in `templates/report/`.
 
 pub mod axis;
 pub mod figures;
 pub mod page;
 pub mod scene;
+pub mod simulation;
 pub mod svg;
 pub mod tables;
 pub mod text;

@@ -75,7 +75,13 @@ pub fn simulate(design: &Design, request: &Request, progress: Progress) -> Resul
     let run = match &request.course {
         Course::ThermalRun => {
             let (profile, readings) = Profile::of_run(&design.thermal_run, reading_s(design));
-            let taken = warm(&uncompensated, &profile, &readings, request.threads, progress)?;
+            let taken = warm(
+                &uncompensated,
+                &profile,
+                &readings,
+                request.threads,
+                progress,
+            )?;
             Run {
                 taken,
                 has: profile.has,
@@ -86,7 +92,13 @@ pub fn simulate(design: &Design, request: &Request, progress: Progress) -> Resul
         Course::Profile(path) => {
             let profile = Profile::read(path)?;
             let readings = readings_along(&profile, path, request.profile_readings)?;
-            let taken = warm(&uncompensated, &profile, &readings, request.threads, progress)?;
+            let taken = warm(
+                &uncompensated,
+                &profile,
+                &readings,
+                request.threads,
+                progress,
+            )?;
             Run {
                 taken,
                 has: profile.has,
@@ -152,9 +164,16 @@ pub fn simulate(design: &Design, request: &Request, progress: Progress) -> Resul
 fn is_worth_a_fit(run: &Run) -> bool {
     /// K.
     const LEAST_SPAN: f64 = 5.0;
-    let degc = || run.taken.iter().map(|t| t.moment.temperatures.structure_degc);
+    let degc = || {
+        run.taken
+            .iter()
+            .map(|t| t.moment.temperatures.structure_degc)
+    };
     let span = degc().fold(f64::NEG_INFINITY, f64::max) - degc().fold(f64::INFINITY, f64::min);
-    let at_rest = run.taken.iter().all(|t| t.moment.surroundings.rate_dps == 0.0);
+    let at_rest = run
+        .taken
+        .iter()
+        .all(|t| t.moment.surroundings.rate_dps == 0.0);
     run.taken.len() >= record::thermal::LEAST_ROWS && span >= LEAST_SPAN && at_rest
 }
 
@@ -197,11 +216,8 @@ fn readings_along(profile: &Profile, path: &Path, count: u64) -> Result<Vec<Read
 
 /// The compensation that the record gives, through the same door as a measured one.
 fn calibrate(design: &Design, csv: &str) -> Result<(Design, Calibration)> {
-    let (record, mut warnings) = record::thermal::parse(
-        csv.as_bytes(),
-        Path::new("record.csv"),
-        &Default::default(),
-    )?;
+    let (record, mut warnings) =
+        record::thermal::parse(csv.as_bytes(), Path::new("record.csv"), &Default::default())?;
     let mut fitted = design.clone();
     let mut calibration = calibration::calibrate(&mut fitted, &record, true)?;
     warnings.append(&mut calibration.warnings);

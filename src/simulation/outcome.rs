@@ -193,9 +193,8 @@ impl Outcome {
             readings: taken.len(),
             before,
             after,
-            ratio: after.map(|a| {
-                a.fixed.drift_pp_dps / before.fixed.drift_pp_dps.max(f64::MIN_POSITIVE)
-            }),
+            ratio: after
+                .map(|a| a.fixed.drift_pp_dps / before.fixed.drift_pp_dps.max(f64::MIN_POSITIVE)),
             fit: parts.calibrated.as_ref().map(|(d, c)| fit(d, c)),
             float_fixed: apart(taken, parts.after.as_deref()),
             lock,
@@ -268,7 +267,9 @@ fn lock(design: &Design, taken: &[Taken]) -> Option<Lock> {
     let turn = crate::numeric::format::pow2(-(design.circuit.cordic.angle_bits as i32)) * TAU;
     let setpoint = l.setpoint_raw as f64 * turn;
     let device = crate::plant::Device::new(&design.gyro);
-    let errors = taken.iter().map(|t| wrapped(t.fixed.phase_rad - setpoint).abs());
+    let errors = taken
+        .iter()
+        .map(|t| wrapped(t.fixed.phase_rad - setpoint).abs());
     let phase_error_rad = errors.fold(0.0, f64::max);
     let off = taken.iter().map(|t| {
         let degc = t.moment.temperatures.structure_degc;
@@ -304,7 +305,10 @@ fn swing(factors: &[ScaleFactor]) -> Option<f64> {
 }
 
 fn fit(design: &Design, calibration: &Calibration) -> FitSummary {
-    let raw = design.compensation.as_ref().map(|c| c.coefficients_raw.clone());
+    let raw = design
+        .compensation
+        .as_ref()
+        .map(|c| c.coefficients_raw.clone());
     FitSummary {
         thermometer: calibration.fit.thermometer.clone(),
         order: calibration.fit.order,
@@ -325,7 +329,9 @@ fn warnings(parts: &Parts) -> Vec<Warning> {
     if largest > 0.99 * adc {
         warnings.push(Warning::general(
             "drive_adc_full",
-            format!("the drive's amplitude is {largest:.0} LSB, the ADC ends at {adc:.0}: it clips"),
+            format!(
+                "the drive's amplitude is {largest:.0} LSB, the ADC ends at {adc:.0}: it clips"
+            ),
         ));
     }
     let hz = rest::oscillator_hz(design);

@@ -113,18 +113,55 @@ pub fn figures(design: &Design, simulated: &Simulated) -> Vec<Figure> {
     let mut figures = by_equation(&Device::new(&design.gyro));
     let mut add = |what, source, unit, published: f64, tolerance: f64, obtained: Option<f64>| {
         if let Some(obtained) = obtained {
-            figures.push(figure(what, source, unit, (published, tolerance), obtained, "simulation"));
+            figures.push(figure(
+                what,
+                source,
+                unit,
+                (published, tolerance),
+                obtained,
+                "simulation",
+            ));
         }
     };
     if design.circuit.phase_loop.is_none() {
-        add("bias drift over 0..70 degC", "abstract, fig. 2", "deg/s", 160.0, 5.0, Some(simulated.before_pp_dps));
-        let left = simulated.after_pp_dps.map(|a| 100.0 * a / simulated.before_pp_dps);
-        add("bias drift left by the quadratic of eq. 9", "abstract, eq. 9", "%", 5.0, 0.5, left);
+        add(
+            "bias drift over 0..70 degC",
+            "abstract, fig. 2",
+            "deg/s",
+            160.0,
+            5.0,
+            Some(simulated.before_pp_dps),
+        );
+        let left = simulated
+            .after_pp_dps
+            .map(|a| 100.0 * a / simulated.before_pp_dps);
+        add(
+            "bias drift left by the quadratic of eq. 9",
+            "abstract, eq. 9",
+            "%",
+            5.0,
+            0.5,
+            left,
+        );
         let swing = simulated.scale_factor_swing.map(|s| 100.0 * s);
-        add("scale factor, half of its range", "fig. 2", "%", 4.3, 0.05, swing);
+        add(
+            "scale factor, half of its range",
+            "fig. 2",
+            "%",
+            4.3,
+            0.05,
+            swing,
+        );
     }
     let tempco = simulated.frequency_tempco_per_k.map(|t| 1e6 * t);
-    add("drive frequency against temperature, tracked", "eq. 4", "ppm/K", -24.7, 0.05, tempco);
+    add(
+        "drive frequency against temperature, tracked",
+        "eq. 4",
+        "ppm/K",
+        -24.7,
+        0.05,
+        tempco,
+    );
     figures
 }
 
@@ -165,22 +202,106 @@ fn by_equation(device: &Device) -> Vec<Figure> {
     let sense_amplitude = |t: f64| sense.response(t, hz).amplitude;
     let relative = |t: f64| 100.0 * (drive.response(t, hz).amplitude / drive.q - 1.0);
     let of = |what, source, unit, published, tolerance, obtained| {
-        figure(what, source, unit, (published, tolerance), obtained, "equation")
+        figure(
+            what,
+            source,
+            unit,
+            (published, tolerance),
+            obtained,
+            "equation",
+        )
     };
     vec![
-        of("drive resonance at 0 degC", "eq. 4", "Hz", 1751.160, 1e-3, drive.natural_frequency_hz(0.0)),
-        of("drive resonance at 70 degC", "eq. 4", "Hz", 1748.135, 1e-3, drive.natural_frequency_hz(70.0)),
-        of("drive phase at 0 degC", "eq. 7", "deg", -86.208, 3e-3, phase_deg(0.0)),
-        of("drive phase at 70 degC", "eq. 7", "deg", -96.085, 3e-3, phase_deg(70.0)),
-        of("drive amplitude at -10 degC against resonance", "eq. 6, fig. 1", "%", -0.50, 5e-3, relative(-10.0)),
-        of("drive amplitude at 70 degC against resonance", "eq. 6, fig. 1", "%", -0.46, 5e-3, relative(70.0)),
-        of("error of the linear phase, peak to peak", "eq. 8 against eq. 7", "deg", 0.0364, 5e-5, linearised),
-        of("the same over the phase's swing", "eq. 8 against eq. 7", "%", 0.32, 5e-3, 100.0 * linearised / swing(linear_deg)),
-        of("sense amplitude, change", "eq. 6, section 2", "%", 0.78, 5e-3, 100.0 * swing(sense_amplitude) / sense_amplitude(70.0)),
-        of("sense phase, change", "eq. 7, section 2", "deg", 0.417, 5e-4, swing(|t| sense.response(t, hz).phase_rad.to_degrees())),
-        of("bias drift of the structure's phase alone", "eq. 9 with eq. 7", "deg/s", 33.2, 0.05, {
-            let bias = |t: f64| device.bias_at_phase_dps(device.structural_phase_rad(t));
-            bias(70.0) - bias(0.0)
-        }),
+        of(
+            "drive resonance at 0 degC",
+            "eq. 4",
+            "Hz",
+            1751.160,
+            1e-3,
+            drive.natural_frequency_hz(0.0),
+        ),
+        of(
+            "drive resonance at 70 degC",
+            "eq. 4",
+            "Hz",
+            1748.135,
+            1e-3,
+            drive.natural_frequency_hz(70.0),
+        ),
+        of(
+            "drive phase at 0 degC",
+            "eq. 7",
+            "deg",
+            -86.208,
+            3e-3,
+            phase_deg(0.0),
+        ),
+        of(
+            "drive phase at 70 degC",
+            "eq. 7",
+            "deg",
+            -96.085,
+            3e-3,
+            phase_deg(70.0),
+        ),
+        of(
+            "drive amplitude at -10 degC against resonance",
+            "eq. 6, fig. 1",
+            "%",
+            -0.50,
+            5e-3,
+            relative(-10.0),
+        ),
+        of(
+            "drive amplitude at 70 degC against resonance",
+            "eq. 6, fig. 1",
+            "%",
+            -0.46,
+            5e-3,
+            relative(70.0),
+        ),
+        of(
+            "error of the linear phase, peak to peak",
+            "eq. 8 against eq. 7",
+            "deg",
+            0.0364,
+            5e-5,
+            linearised,
+        ),
+        of(
+            "the same over the phase's swing",
+            "eq. 8 against eq. 7",
+            "%",
+            0.32,
+            5e-3,
+            100.0 * linearised / swing(linear_deg),
+        ),
+        of(
+            "sense amplitude, change",
+            "eq. 6, section 2",
+            "%",
+            0.78,
+            5e-3,
+            100.0 * swing(sense_amplitude) / sense_amplitude(70.0),
+        ),
+        of(
+            "sense phase, change",
+            "eq. 7, section 2",
+            "deg",
+            0.417,
+            5e-4,
+            swing(|t| sense.response(t, hz).phase_rad.to_degrees()),
+        ),
+        of(
+            "bias drift of the structure's phase alone",
+            "eq. 9 with eq. 7",
+            "deg/s",
+            33.2,
+            0.05,
+            {
+                let bias = |t: f64| device.bias_at_phase_dps(device.structural_phase_rad(t));
+                bias(70.0) - bias(0.0)
+            },
+        ),
     ]
 }

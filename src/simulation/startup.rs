@@ -87,9 +87,7 @@ pub fn startup(design: &Design) -> Result<Startup> {
     Ok(Startup {
         chamber_degc: moment.temperatures.chamber_degc,
         amplitude_s: settled(&|row, end| (row.magnitude / end.magnitude - 1.0).abs() < 0.01),
-        phase_s: settled(&|row, end| {
-            (row.phase_rad - end.phase_rad).abs() < 0.1f64.to_radians()
-        }),
+        phase_s: settled(&|row, end| (row.phase_rad - end.phase_rad).abs() < 0.1f64.to_radians()),
         lock_s: if design.circuit.phase_loop.is_some() {
             settled(&|row, _| (row.freq_hz / resonance_hz - 1.0).abs() < 1e-5)
         } else {

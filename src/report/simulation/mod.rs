@@ -1,0 +1,196 @@
+//! The page of a simulation.
+
+pub mod figures;
+
+use super::figures::Figure;
+use super::text::{decimals_of, fixed, percent, significant};
+use crate::error::{InputError, Result};
+use crate::simulation::outcome::{Drift, Outcome};
+use askama::Template;
+
+/// The page.
+#[derive(Debug, Template)]
+#[template(path = "report/simulate.html")]
+struct Page {
+    name: String,
+    headline: String,
+    finding: String,
+    /// Path, peak to peak, rms, share of before.
+    drift: Vec<[String; 4]>,
+    /// What, source, published, obtained, by, agrees.
+    paper: Vec<([String; 5], bool)>,
+    figures: Vec<Figure>,
+    /// Loop, temperature, output (measured, predicted), error (measured, predicted, bound), mean.
+    loops: Vec<[String; 8]>,
+    /// Name, value.
+    facts: Vec<[String; 2]>,
+    /// Code, column, message.
+    warnings: Vec<[String; 3]>,
+    provenance: Vec<[String; 2]>,
+}
+
+/// The report as one HTML file.
+///
+/// # Errors
+/// A page that cannot be rendered, which would be a fault of this program.
+pub fn html(outcome: &Outcome) -> Result<String> {
+    let s = &outcome.summary;
+    let page = Page {
+        name: outcome.parts.design.name.clone(),
+        headline: headline(outcome),
+        finding: format!(
+            "{} readings, {}; float and fixed differ by at most {} deg/s before compensation.",
+            s.readings,
+            s.mode.replace('_', " "),
+            significant(s.float_fixed.rate_out_dps, 2)
+        ),
+        drift: drift(outcome),
+        paper: s
+            .paper
+            .iter()
+            .map(|f| {
+                let decimals = decimals_of(f.tolerance);
+                let value = |v: f64| format!("{} {}", fixed(v, decimals), f.unit);
+                let cells = [
+                    f.what.to_owned(),
+                    f.source.to_owned(),
+                    value(f.published),
+                    value(f.obtained),
+                    f.by.to_owned(),
+                ];
+                (cells, f.agrees)
+            })
+            .collect(),
+        figures: figures::all(outcome),
+        loops: loops(outcome),
+        facts: facts(outcome),
+        warnings: s
+            .warnings
+            .iter()
+            .map(|w| {
+                let column = w.column.clone().unwrap_or_else(|| "–".to_owned());
+                [w.code.to_owned(), column, w.message.clone()]
+            })
+            .collect(),
+        provenance: [
+            ("command", s.command.clone()),
+            ("version", s.version.to_owned()),
+            ("design's SHA-256", s.design_sha256.clone()),
+        ]
+        .map(|(name, value)| [name.to_owned(), value])
+        .to_vec(),
+    };
+    page.render()
+        .map_err(|e| InputError::new(format!("the report cannot be rendered: {e}")).into())
+}
+
+fn headline(outcome: &Outcome) -> String {
+    let s = &outcome.summary;
+    let before = s.before.fixed.drift_pp_dps;
+    let drive = s.drive.replace('_', " ");
+    match &s.after {
+        Some(after) => format!(
+            "Drive at {drive}: the rate output at rest drifts by {} deg/s, compensated in the bit-accurate chain by {} deg/s ({}).",
+            significant(before, 4),
+            significant(after.fixed.drift_pp_dps, 4),
+            percent(after.fixed.drift_pp_dps, before)
+        ),
+        None => format!(
+            "Drive at {drive}: the rate output's error goes over {} deg/s.",
+            significant(before, 4)
+        ),
+    }
+}
+
+fn drift(outcome: &Outcome) -> Vec<[String; 4]> {
+    let s = &outcome.summary;
+    let row = |name: &str, drift: Drift, before: Drift| {
+        [
+            name.to_owned(),
+            fixed(drift.drift_pp_dps, 4),
+            fixed(drift.rms_dps, 4),
+            percent(drift.drift_pp_dps, before.drift_pp_dps),
+        ]
+    };
+    let before = &s.before;
+    let mut rows = vec![
+        row("before compensation, float", before.float, before.float),
+        row("before compensation, fixed", before.fixed, before.fixed),
+    ];
+    if let Some(after) = &s.after {
+        rows.push(row("after, float", after.float, before.float));
+        rows.push(row("after, fixed", after.fixed, before.fixed));
+    }
+    rows
+}
+
+fn loops(outcome: &Outcome) -> Vec<[String; 8]> {
+    let row = |h: &crate::simulation::hunting::Hunting| {
+        [
+            h.name.replace('_', " "),
+            fixed(h.chamber_degc, 1),
+            format!("{} {}", fixed(h.output_pp_lsb, 0), h.output_unit),
+            fixed(h.predicted_output_pp_lsb, 0),
+            fixed(h.error_pp_lsb, 0),
+            fixed(h.predicted_error_pp_lsb, 0),
+            fixed(h.converters_pp_lsb, 0),
+            fixed(h.error_mean_lsb, 3),
+        ]
+    };
+    outcome.summary.loops.iter().map(row).collect()
+}
+
+fn facts(outcome: &Outcome) -> Vec<[String; 2]> {
+    let s = &outcome.summary;
+    let mut facts = Vec::new();
+    let mut add = |name: &str, value: String| facts.push([name.to_owned(), value]);
+    if let Some(fit) = &s.fit {
+        add("thermometer", fit.thermometer.clone());
+        add("order", fit.order.to_string());
+        add(
+            "residual of the fit",
+            format!("{} deg/s rms", significant(fit.residual_rms_dps, 3)),
+        );
+        add("coefficients, raw", format!("{:?}", fit.coefficients_raw));
+        for chosen in &fit.chosen {
+            add("chosen", chosen.clone());
+        }
+    }
+    if let Some(lock) = &s.lock {
+        add(
+            "phase loop",
+            if lock.locked {
+                "locked at every reading"
+            } else {
+                "not locked everywhere"
+            }
+            .to_owned(),
+        );
+        add(
+            "mean phase off the setpoint, at most",
+            format!("{} rad", significant(lock.phase_error_rad, 2)),
+        );
+        add(
+            "mean frequency off the resonance, at most",
+            format!("{} Hz", significant(lock.freq_error_hz, 2)),
+        );
+        add(
+            "frequency against temperature",
+            format!("{} ppm/K", significant(lock.tempco_ppm_per_k, 4)),
+        );
+    }
+    let time = |t: Option<f64>| {
+        t.map_or("not seen".to_owned(), |t| {
+            format!("{} ms", significant(1e3 * t, 3))
+        })
+    };
+    add(
+        "power-on: amplitude within 1 %",
+        time(s.startup.amplitude_s),
+    );
+    add("power-on: phase within 0.1 deg", time(s.startup.phase_s));
+    if s.lock.is_some() {
+        add("power-on: frequency within 10 ppm", time(s.startup.lock_s));
+    }
+    facts
+}
