@@ -9,7 +9,9 @@
 //! the phase reference: ADC sample n (counted from 1, for the oscillator adds its tuning word
 //! before it is used) sees the reference at n * word * 2^-bits turns, exactly.
 
+use super::converter::{Channel, Converter};
 use super::device::Device;
+use super::effects::{self, Instant};
 use super::noise::Noise;
 use super::turn;
 use crate::design::{Gyro, ThermalRun};
@@ -124,7 +126,14 @@ impl ThermalPlant {
 
     /// The bias without noise, deg/s.
     pub fn true_bias_dps(&self, reading: &Reading) -> f64 {
-        self.device.bias_dps(reading.chamber_degc)
+        let device = &self.device;
+        let at = Instant {
+            time_s: reading.time_s,
+            power_on_s: reading.time_s,
+            quadrature_dps: self.run.quadrature_dps,
+            ..device.equilibrium(reading.chamber_degc)
+        };
+        device.declared_bias_dps(reading.chamber_degc) + effects::bias_dps(&device.effects, &at)
     }
 
     /// Drive and sense codes of `settle_samples + samples` ADC samples from [`FIRST_SAMPLE`] on.
@@ -163,7 +172,9 @@ impl ThermalPlant {
     ) -> (Vec<i32>, Vec<i32>) {
         let (run, sampling) = (&self.run, &self.sampling);
         let full_scale = sampling.full_scale_lsb();
-        let adc = Quantiser::new(sampling.adc_bits);
+        let effects = &self.device.effects;
+        let [drive_adc, sense_adc] = [Channel::Drive, Channel::Sense]
+            .map(|channel| Converter::new(effects, channel, sampling.adc_bits));
         let step = sampling.step();
         let mut reference = step.wrapping_mul(first_sample);
 
@@ -192,37 +203,10 @@ impl ThermalPlant {
                 drive_input += run.adc_noise_lsb * g1;
                 sense_input += (rate_variance * sine * sine + adc_variance).sqrt() * g2;
             }
-            *d = adc.code(drive_input);
-            *s = adc.code(sense_input);
+            *d = drive_adc.code(drive_adc.analog(drive_input));
+            *s = sense_adc.code(sense_adc.analog(sense_input));
         }
         (drive, sense)
-    }
-}
-
-/// An ideal ADC: nearest, ties toward plus infinity, saturating.
-#[derive(Debug, Clone, Copy)]
-struct Quantiser {
-    low: f64,
-    high: f64,
-}
-
-impl Quantiser {
-    fn new(bits: u32) -> Self {
-        let full_scale = f64::powi(2.0, bits as i32 - 1);
-        Quantiser {
-            low: -full_scale,
-            high: full_scale - 1.0,
-        }
-    }
-
-    /// The code of an input in LSB. The limits are integers, so limiting first changes nothing.
-    #[inline(always)]
-    fn code(&self, lsb: f64) -> i32 {
-        let limited = lsb.max(self.low).min(self.high);
-        let toward_zero = limited as i32;
-        // Exact: at most 52 bits are left.
-        let rest = limited - f64::from(toward_zero);
-        toward_zero + i32::from(rest >= 0.5) - i32::from(rest < -0.5)
     }
 }
 
