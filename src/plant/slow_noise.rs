@@ -41,7 +41,8 @@ const OCTAVES_BEYOND: u32 = 2;
 /// one-sided PSD B^2 / (pi f) (B^2 / (2 pi f) two-sided), whose Allan deviation is flat:
 /// sqrt(2 ln 2 / pi) B = 0.664 B. Hence s = sqrt(ln 2 / pi) B.
 ///
-/// The PSD is within 1 dB of B^2 / (pi f) from 1 / horizon to half the rate of the grid. The slowest
+/// The PSD is within 1 dB of B^2 / (pi f) from 1 / horizon to half the rate of the grid (measured from
+/// 3 / horizon on: -0.7 to +0.8 dB, the extremes in the upper two octaves). The slowest
 /// octaves are an offset over the horizon: the turn-on to turn-on part of the same noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Flicker {
@@ -57,13 +58,6 @@ pub struct Flicker {
 struct Octave {
     noise: Noise,
     start: u64,
-}
-
-/// One normal number of an index: two indices share a pair.
-#[inline(always)]
-fn normal(noise: &Noise, index: u64) -> f64 {
-    let (even, odd) = noise.gaussian_pair(index >> 1);
-    if index & 1 == 0 { even } else { odd }
 }
 
 impl Flicker {
@@ -99,9 +93,9 @@ impl Flicker {
             .octaves
             .iter()
             .zip(0u32..)
-            .map(|(octave, k)| normal(&octave.noise, index.wrapping_add(octave.start) >> k));
+            .map(|(octave, k)| octave.noise.normal(index.wrapping_add(octave.start) >> k));
         let (rms, noise) = &self.below;
-        let sum = held.fold(rms * normal(noise, index), |sum, x| sum + x);
+        let sum = held.fold(rms * noise.normal(index), |sum, x| sum + x);
         self.octave_dps * sum
     }
 
@@ -111,11 +105,11 @@ impl Flicker {
         let mut held = vec![(None, 0.0); self.octaves.len()];
         let (rms, noise) = &self.below;
         let value = |index: u64| {
-            let mut sum = rms * normal(noise, index);
+            let mut sum = rms * noise.normal(index);
             for ((octave, k), (block, x)) in self.octaves.iter().zip(0u32..).zip(&mut held) {
                 let now = index.wrapping_add(octave.start) >> k;
                 if *block != Some(now) {
-                    (*block, *x) = (Some(now), normal(&octave.noise, now));
+                    (*block, *x) = (Some(now), octave.noise.normal(now));
                 }
                 sum += *x;
             }
@@ -153,7 +147,7 @@ impl RandomWalk {
         let anchors = std::array::from_fn(|j| {
             // From 2^(j-1) to 2^j; from 0 to 1.
             let steps = 1u64 << (j as u32).saturating_sub(1);
-            last += (steps as f64).sqrt() * noise.gaussian_pair(1 << j).0;
+            last += (steps as f64).sqrt() * noise.normal(1 << j);
             last
         });
         RandomWalk {
@@ -191,8 +185,7 @@ impl RandomWalk {
             let half = length / 2;
             let middle = low + half;
             let spread = (length as f64 / 4.0).sqrt();
-            let middle_value =
-                (low_value + high_value) / 2.0 + spread * self.noise.gaussian_pair(middle).0;
+            let middle_value = (low_value + high_value) / 2.0 + spread * self.noise.normal(middle);
             if middle == index {
                 return middle_value;
             }
