@@ -4,10 +4,11 @@
 //! into the circuit, sample by sample. Inside a decimation period the loops do not act, so plant and
 //! circuit take turns in blocks of R samples.
 //!
-//! In reading order: [`path`] (one circuit around one gyro), [`rest`] (where the loops come to
+//! In reading order: [`path`] (one circuit around one gyro; [`inexact`]: what is between them), [`rest`] (where the loops come to
 //! rest, and how fast: warm starts), [`surroundings`] (what acts on the gyro at a time), [`readings`] (averaged
 //! readings, each warm-started by itself), [`stream`] (the same in one unbroken stream of codes).
 
+pub mod inexact;
 pub mod path;
 pub mod readings;
 pub mod rest;

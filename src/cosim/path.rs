@@ -1,13 +1,15 @@
 //! One circuit, float or fixed, around one gyro.
 
+use super::inexact::Inexact;
 use super::rest::{self, Rest};
 use crate::circuit::engine::{self, ArithmeticKind, Engine, Rows};
 use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::numeric::format::pow2;
+use crate::plant::Gyroscope;
+use crate::plant::converter::{Channel, Converter};
 use crate::plant::gyroscope::{Conditions, Drive, Reference};
 use crate::plant::noise::Noise;
-use crate::plant::{Converter, Gyroscope};
 use std::f64::consts::TAU;
 
 /// What a decimated sample says, in physical units.
@@ -34,6 +36,7 @@ pub struct Path {
     /// The gyro.
     pub gyroscope: Gyroscope,
     converters: [Converter; 2],
+    inexact: Inexact,
     units: Units,
     /// rms of what is added to the drive and to the sense input, LSB.
     noise_lsb: [f64; 2],
@@ -120,7 +123,9 @@ impl Path {
             engine,
             kind,
             gyroscope: Gyroscope::new(&design.gyro, run, reference),
-            converters: [Converter::new(adc_bits), Converter::new(adc_bits)],
+            converters: [Channel::Drive, Channel::Sense]
+                .map(|channel| Converter::new(&design.gyro.effects, channel, adc_bits)),
+            inexact: Inexact::new(design),
             units: Units::new(design, kind),
             noise_lsb: [run.adc_noise_lsb, rate_lsb.hypot(run.adc_noise_lsb)],
             nominal_gain: rest::nominal_gain(design),
@@ -189,6 +194,12 @@ impl Path {
         let drive = self.drive();
         self.gyroscope
             .block(drive, &mut self.drive_lsb, &mut self.sense_lsb);
+        self.inexact.apply(
+            &self.gyroscope,
+            drive.step,
+            self.sample,
+            [&mut self.drive_lsb, &mut self.sense_lsb],
+        );
         self.add_noise(noise);
         self.sample += self.drive_lsb.len() as u64;
         self.clear_rows();

@@ -46,11 +46,24 @@ pub fn oscillator_hz(design: &Design) -> f64 {
 pub fn rest(design: &Design, gyroscope: &Gyroscope) -> Result<Rest> {
     let circuit = &design.circuit;
     let given_hz = oscillator_hz(design);
+    let gain_at = |hz: f64| match &circuit.amplitude_loop {
+        None => nominal_gain(design),
+        Some(l) => {
+            let magnitude = l.setpoint_raw as f64 * circuit.decimator.output.format.lsb();
+            let amplitude_lsb = magnitude * amplitude_lsb_per_magnitude(design);
+            let largest = l.gain_limit() as f64 * pow2(1 - l.gain_bits as i32);
+            gyroscope.gain_for(amplitude_lsb, hz).clamp(0.0, largest)
+        }
+    };
     let hz = match &circuit.phase_loop {
         None => given_hz,
         Some(l) => {
             let turns = l.setpoint_raw as f64 * pow2(-(circuit.cordic.angle_bits as i32));
-            gyroscope.locked_hz(turns * TAU).ok_or_else(|| {
+            // The amplitude may pull the phase, and the frequency moves the gain: a weak coupling.
+            let locked = |gain: f64| gyroscope.locked_hz(turns * TAU, gain);
+            let first = locked(nominal_gain(design));
+            let second = first.and_then(|hz| locked(gain_at(hz)));
+            second.and_then(|hz| locked(gain_at(hz))).ok_or_else(|| {
                 InputError::new(format!(
                     "the phase loop's setpoint is {:.2} deg, which the drive's resonance cannot have: its phase runs from 0 to -180 deg",
                     turns * 360.0
@@ -62,15 +75,7 @@ pub fn rest(design: &Design, gyroscope: &Gyroscope) -> Result<Rest> {
             })?
         }
     };
-    let gain = match &circuit.amplitude_loop {
-        None => nominal_gain(design),
-        Some(l) => {
-            let magnitude = l.setpoint_raw as f64 * circuit.decimator.output.format.lsb();
-            let amplitude_lsb = magnitude * amplitude_lsb_per_magnitude(design);
-            let largest = l.gain_limit() as f64 * pow2(1 - l.gain_bits as i32);
-            gyroscope.gain_for(amplitude_lsb, hz).clamp(0.0, largest)
-        }
-    };
+    let gain = gain_at(hz);
     let step_hz = circuit.sample_rate_hz * pow2(-(circuit.nco.phase_bits as i32));
     Ok(Rest {
         hz,

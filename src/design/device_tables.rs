@@ -1,6 +1,7 @@
 //! `name`, `[gyro]`, `[thermal_run]`, `[record]` and `[fit]`: each key that a file leaves out has
 //! the default design's value.
 
+use super::effects;
 use super::keys::THERMOMETERS;
 use super::schema::*;
 use super::table::{Real, Table, Value};
@@ -107,7 +108,7 @@ pub(super) fn gyro(t: &Table, base: Option<&Gyro>) -> Result<Gyro> {
         bias_dps: bias(&t.section("bias")?, base)?,
         electronics: electronics(&t.section("electronics")?, base)?,
         thermal: thermal(&t.section("thermal")?, base)?,
-        effects: effects(t, base)?,
+        effects: effects::read(t, base.map(|g| &g.effects))?,
     })
 }
 
@@ -195,35 +196,6 @@ fn thermal(t: &Table, base: Option<&Gyro>) -> Result<ThermalNetwork> {
             Real::NotNegative,
             "the electronics' heat in W",
         )?,
-    })
-}
-
-/// A file with a `[gyro]` has the effects that it names and no others.
-fn effects(gyro: &Table, base: Option<&Gyro>) -> Result<Effects> {
-    if let (false, Some(base)) = (gyro.is_given(), base) {
-        return Ok(base.effects.clone());
-    }
-    let base = base.and_then(|g| g.effects.mode_crossing.as_ref());
-    let t = gyro.section("effects")?.section("mode_crossing")?;
-    if !t.is_given() {
-        return Ok(Effects::default());
-    }
-    let mode_crossing = ModeCrossing {
-        amplitude_dps: t.take("amplitude_dps", base.map(|m| m.amplitude_dps), |v| {
-            v.real(Real::Any, "the bump's height in deg/s")
-        })?,
-        center_degc: t.take("center_degc", base.map(|m| m.center_degc), |v| {
-            v.real(Real::Celsius, "the crossing's temperature in degC")
-        })?,
-        half_width_k: t.take("half_width_k", base.map(|m| m.half_width_k), |v| {
-            v.real(
-                Real::Positive,
-                "the distance from the centre to each extreme in K",
-            )
-        })?,
-    };
-    Ok(Effects {
-        mode_crossing: Some(mode_crossing),
     })
 }
 

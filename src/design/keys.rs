@@ -1,6 +1,9 @@
 //! Every key of a design file, with an example of its value.
 
-/// Each table with its keys and, for each key, an example of a value; `[` marks a table.
+use super::effects::{CATALOGUE, EffectKind};
+
+/// Each table but the effects with its keys and, for each key, an example of a value; `[` marks a
+/// table.
 pub(super) const KEYS: &[(&str, &[(&str, &str)])] = &[
     (
         "",
@@ -155,15 +158,6 @@ pub(super) const KEYS: &[(&str, &[(&str, &str)])] = &[
             ("power_w", "0.0"),
         ],
     ),
-    ("gyro.effects", &[("mode_crossing", "[")]),
-    (
-        "gyro.effects.mode_crossing",
-        &[
-            ("amplitude_dps", "4.5"),
-            ("center_degc", "37.5"),
-            ("half_width_k", "3.7"),
-        ],
-    ),
     (
         "thermal_run",
         &[
@@ -218,8 +212,22 @@ const LOOP_GAIN: &[(&str, &str)] = &[("raw", "9"), ("shift", "6")];
 /// The thermometers that a polynomial or a bias model can be in, besides the circuit's phase.
 pub(super) const THERMOMETERS: &[&str] = &["phase_rad", "freq_hz", "die_degc", "chamber_degc"];
 
-fn keys_of(table: &str) -> &'static [(&'static str, &'static str)] {
-    KEYS.iter().find(|(t, _)| *t == table).map_or(&[], |t| t.1)
+/// The table that holds the effects' tables.
+pub(super) const EFFECTS: &str = "gyro.effects";
+
+fn keys_of(table: &str) -> Vec<(&'static str, &'static str)> {
+    let effect = table.strip_prefix(EFFECTS);
+    match effect.map(|rest| rest.strip_prefix('.').unwrap_or(rest)) {
+        Some("") => CATALOGUE.iter().map(|kind| (kind.id, "[")).collect(),
+        Some(id) => EffectKind::named(id).map_or(Vec::new(), |kind| {
+            let parameters = kind.parameters.iter();
+            parameters.map(|p| (p.key, p.example)).collect()
+        }),
+        None => {
+            let known = KEYS.iter().find(|(t, _)| *t == table);
+            known.map_or(Vec::new(), |t| t.1.to_vec())
+        }
+    }
 }
 
 /// The keys of a table.
@@ -229,7 +237,7 @@ pub(super) fn names(table: &str) -> Vec<&'static str> {
 
 /// An example of a value of a key.
 pub(super) fn example(table: &str, key: &str) -> &'static str {
-    let found = keys_of(table).iter().find(|(k, _)| *k == key);
+    let found = keys_of(table).into_iter().find(|(k, _)| *k == key);
     found.map_or("...", |(_, example)| example)
 }
 

@@ -2,11 +2,13 @@
 //!
 //! [`schema`] is what the rest of the program sees; [`reader`] turns a file into it, with the
 //! place of every mistake (`table` keeps the places, `keys` knows every key, `suggest` what was
-//! meant, `circuit_tables` and `device_tables` read the tables); [`limits`] refuses formats whose exact intermediates the
-//! engine cannot hold; [`template`] holds the embedded default and what `gyrogen init` writes.
+//! meant, `circuit_tables` and `device_tables` read the tables); [`effects`] are those of the simulated
+//! gyro, by name; [`limits`] refuses formats whose exact intermediates the engine cannot hold; [`template`] holds the embedded default and what `gyrogen init` writes.
 
 mod circuit_tables;
 mod device_tables;
+mod effect_catalogue;
+pub mod effects;
 mod keys;
 pub mod limits;
 pub mod reader;
@@ -15,4 +17,5 @@ mod suggest;
 mod table;
 pub mod template;
 
+pub use effects::Effects;
 pub use schema::*;

@@ -160,10 +160,10 @@ fn what_a_file_leaves_out_is_the_defaults() {
     .unwrap();
     assert_eq!((d.gyro.sense_q, d.gyro.drive_q), (4.0, 50.0));
     assert_eq!(d.gyro.bias_dps, [109.60, 1.0, 136.82]);
-    assert_eq!(d.gyro.effects, Effects::default());
+    assert!(d.gyro.effects.is_empty());
     let d = parse("[gyro.effects.mode_crossing]\ncenter_degc = 20\n", None).unwrap();
-    let crossing = d.gyro.effects.mode_crossing.unwrap();
-    assert_eq!((crossing.center_degc, crossing.half_width_k), (20.0, 3.7));
+    let crossing = d.gyro.effects.get("mode_crossing");
+    assert_eq!(crossing, Some([4.5, 20.0, 3.7]));
 
     // A whole circuit without compensation has none; an own compensation is marked so.
     let at = DEFAULT.find("\n[compensation]").unwrap();

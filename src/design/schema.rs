@@ -1,6 +1,7 @@
 //! The design as the program sees it. The keys of `[circuit]` and `[compensation]` are those of
 //! `docs/manual.md`; their meaning is stated there and only summarised here.
 
+use super::effects::Effects;
 use crate::numeric::format::{Format, Quantizer, Rounding};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -315,24 +316,6 @@ pub struct ThermalNetwork {
     pub exchange_w_per_k: f64,
     /// Heat of the electronics, W.
     pub power_w: f64,
-}
-
-/// `[gyro.effects]`: departures of the simulated device from the declared model, by effect id.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Effects {
-    /// `[gyro.effects.mode_crossing]`.
-    pub mode_crossing: Option<ModeCrossing>,
-}
-
-/// A parasitic mode crosses the drive in temperature: a bump of resonance shape in the bias.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ModeCrossing {
-    /// Height of the dispersive part's extremes, deg/s.
-    pub amplitude_dps: f64,
-    /// Temperature of the crossing, degC.
-    pub center_degc: f64,
-    /// From the centre to each extreme, K.
-    pub half_width_k: f64,
 }
 
 /// `[thermal_run]`: chamber from start to stop and back, with dwells.

@@ -1,13 +1,18 @@
 //! What to say of a word that is no key, no value or no format: the nearest one that is.
 
-use super::keys::{KEYS, example, is_table, one_of, title};
+use super::effects::EffectKind;
+use super::keys::{EFFECTS, KEYS, example, is_table, one_of, title};
 use crate::numeric::format::Format;
 
 /// Endings of keys that are units, and their names; the longer before the shorter.
 const UNITS: &[(&str, &str)] = &[
+    ("dps_per_rad3", "deg/s/rad^3"),
     ("dps_per_rad2", "deg/s/rad^2"),
     ("dps_per_rad", "deg/s/rad"),
     ("dps_rthz", "deg/s/sqrt(Hz)"),
+    ("dps_s_per_k", "deg/s per K/s"),
+    ("dps_per_k", "deg/s/K"),
+    ("dps_per_v", "deg/s/V"),
     ("rad_per_k", "rad/K"),
     ("per_k", "1/K"),
     ("hz", "Hz"),
@@ -17,6 +22,7 @@ const UNITS: &[(&str, &str)] = &[
     ("raw", "raw integers"),
     ("bits", "bits"),
     ("lsb", "LSB"),
+    ("v", "V"),
     ("s", "s"),
     ("k", "K"),
 ];
@@ -147,11 +153,13 @@ pub(super) fn remedy(path: &str, known: &[&str], unknown: &str) -> String {
     if let [key] = known.iter().filter(begins).collect::<Vec<_>>()[..] {
         return format!("did you mean {}?", spelled(key));
     }
-    let elsewhere = KEYS.iter().find_map(|(table, keys)| {
+    let known_table = KEYS.iter().find_map(|(table, keys)| {
         let found = keys.iter().find(|(key, _)| *key == plain)?;
         (*table != path && known.iter().all(|k| *k != plain)).then_some((*table, found.0))
     });
-    match elsewhere {
+    // Not the effects' parameters: many effects have an amplitude.
+    let effect = EffectKind::named(&plain).map(|kind| (EFFECTS, kind.id));
+    match known_table.or(effect) {
         Some((table, key)) if example(table, key) == "[" => {
             let full = if table.is_empty() {
                 key.to_owned()
@@ -161,7 +169,7 @@ pub(super) fn remedy(path: &str, known: &[&str], unknown: &str) -> String {
             format!("did you mean `[{full}]`?")
         }
         Some((table, key)) => format!("`{key}` is a key of {}: move it there", title(table)),
-        None if path == "gyro.effects" => format!(
+        None if path == EFFECTS => format!(
             "delete it: the effects that a device can be given here are {}",
             one_of(known.iter().copied())
         ),
@@ -177,9 +185,11 @@ pub(super) fn remedy(path: &str, known: &[&str], unknown: &str) -> String {
 fn unit_confusion(known: &[&str], unknown: &str) -> Option<String> {
     known.iter().find_map(|key| {
         let (stem, unit, name) = UNITS.iter().find_map(|(unit, name)| {
-            let stem = key.strip_suffix(unit)?.strip_suffix('_')?;
-            Some((stem, *unit, *name))
+            let stem = key.strip_suffix(unit)?;
+            (stem.is_empty() || stem.ends_with('_')).then_some((stem, *unit, *name))
         })?;
+        // A key that is nothing but its unit.
+        let stem = stem.strip_suffix('_')?;
         let given = unknown.strip_prefix(stem)?;
         if given.is_empty() {
             return Some(format!("did you mean `{key}`? Its value is in {name}"));

@@ -25,7 +25,8 @@ fn the_default_is_what_it_says() {
         assert_eq!(*raw, exact.round() as i128);
     }
     assert_eq!(d.fit.order, FitOrder::ByRecord);
-    assert!(d.gyro.effects.mode_crossing.is_some());
+    let on: Vec<&str> = d.gyro.effects.iter().map(|(kind, _)| kind.id).collect();
+    assert_eq!(on, ["mode_crossing"]);
 }
 
 #[test]

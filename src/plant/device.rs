@@ -1,7 +1,8 @@
 //! The device: what its measured drive phase and its bias are at a temperature.
 
+use super::effects::{self, Instant};
 use super::resonator::Resonator;
-use crate::design::{Effects, ElectronicsPhase, Gyro, ModeCrossing};
+use crate::design::{Effects, ElectronicsPhase, Gyro};
 
 /// A gyro in thermal equilibrium.
 #[derive(Debug, Clone, PartialEq)]
@@ -68,32 +69,25 @@ impl Device {
         self.bias_at_phase_dps(self.measured_phase_rad(degc))
     }
 
-    /// What the effects that are switched on add to the bias, deg/s.
-    pub fn effects_dps(&self, degc: f64) -> f64 {
-        let crossing = self.effects.mode_crossing.as_ref();
-        crossing.map_or(0.0, |m| mode_crossing_dps(m, degc))
+    /// What the effects see in equilibrium at a temperature: see [`Instant::equilibrium`].
+    pub fn equilibrium(&self, degc: f64) -> Instant {
+        let (q0, reference_k) = (self.drive.q, self.drive.reference_k);
+        Instant {
+            phase_rad: self.measured_phase_rad(degc),
+            inverse_q: q0 / effects::quality_factor(&self.effects, q0, degc, reference_k) - 1.0,
+            ..Instant::equilibrium(&self.effects, degc)
+        }
     }
 
-    /// The bias that the device has: eq. 9 and the effects, deg/s.
+    /// What the effects that are switched on add to the bias in equilibrium, deg/s.
+    pub fn effects_dps(&self, degc: f64) -> f64 {
+        effects::bias_dps(&self.effects, &self.equilibrium(degc))
+    }
+
+    /// The bias that the device has in equilibrium: eq. 9 and the effects, deg/s.
     pub fn bias_dps(&self, degc: f64) -> f64 {
         self.declared_bias_dps(degc) + self.effects_dps(degc)
     }
-}
-
-/// The bias, deg/s, of a parasitic mode that crosses the drive in temperature.
-///
-/// Another mode of the structure has its own stiffness coefficient, so at one temperature (the
-/// centre) its resonance passes the fixed excitation; near it, it is driven too. Its motion has a part in
-/// phase with the excitation, the dispersive part of a Lorentzian (through zero at the crossing,
-/// one sign on either side), and one in quadrature, the absorptive part. The demodulator rejects
-/// the latter; the former leaks into the rate channel. The detuning in half widths,
-/// u = (T - centre) / half width, is linear in temperature, and the bump is
-/// amplitude * 2u / (1 + u^2): exactly +-amplitude at u = +-1, its extremes, and falling as 2/u.
-/// A mode of quality factor Qp whose frequency moves by a (1/K, relative) against the
-/// excitation has the half width 1 / (2 Qp |a|) K.
-pub fn mode_crossing_dps(crossing: &ModeCrossing, degc: f64) -> f64 {
-    let u = (degc - crossing.center_degc) / crossing.half_width_k;
-    crossing.amplitude_dps * (2.0 * u / (1.0 + u * u))
 }
 
 #[cfg(test)]
@@ -113,19 +107,6 @@ mod tests {
         assert!((device.declared_bias_dps(70.0) - 86.9).abs() < 0.05);
         assert!((device.measured_phase_rad(0.0) + 1.5046).abs() < 5e-5);
         assert!((device.measured_phase_rad(70.0) + 1.6770).abs() < 5e-5);
-    }
-
-    #[test]
-    fn the_bump_has_its_extremes_at_one_half_width() {
-        let m = ModeCrossing {
-            amplitude_dps: 4.7,
-            center_degc: 31.25,
-            half_width_k: 6.5,
-        };
-        let at = |u: f64| mode_crossing_dps(&m, m.center_degc + u * m.half_width_k);
-        assert_eq!((at(1.0), at(-1.0), at(0.0)), (4.7, -4.7, 0.0));
-        assert!((-1000..=1000).all(|i| at(f64::from(i) / 50.0).abs() <= 4.7));
-        assert!((at(100.0) - 4.7 * 0.02).abs() < 1e-4);
     }
 
     #[test]

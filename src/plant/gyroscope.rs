@@ -8,8 +8,9 @@
 //! - sense: y'' + (w2/Q2) y' + w2^2 y = K (Om x'/w0 - q x): Coriolis force and quadrature. The rate Om
 //!   that acts is the applied one and the in-phase coupling, an error force in phase with the
 //!   Coriolis force that is stated as a rate;
-//! - drive ADC: x turned by the electronics' phase; sense ADC: y turned by a fixed angle, so that at T0
-//!   a rate comes out in phase with the oscillator's sine, but for the demodulation error.
+//! - drive ADC: x turned by the electronics' phase (and pulled by the amplitude, where that effect is on);
+//!   sense ADC: y turned by a fixed angle, so that at T0 a rate comes out in phase with the oscillator's
+//!   sine, but for the demodulation error, and by what a later sample turns it; the drive's feedthrough.
 //!
 //! The discretisation is exact. The excitation is the band-limited sinusoid through the oscillator's
 //! phases, so that the steady state is eq. 5 to 7 without any hold's or DAC's phase. The motion is
@@ -22,7 +23,9 @@
 //! has to be added to the device's quadrature so that a fixed-frequency circuit with held amplitude
 //! reads eq. 9 at every temperature; a circuit that tracks the resonance sees the same device.
 
+use super::converter::{Channel, Converter};
 use super::device::Device;
+use super::effects;
 use super::thermal::Temperatures;
 use super::turn;
 use crate::design::{Gyro, ThermalRun};
@@ -71,8 +74,6 @@ pub struct Conditions {
     pub rate_dps: f64,
     /// What adds to the bias at the output beside eq. 9, deg/s.
     pub extra_bias_dps: f64,
-    /// What pulls the measured drive phase beside structure and electronics, rad.
-    pub phase_pull_rad: f64,
     /// Quality factor of the drive mode.
     pub drive_q: f64,
     /// Relative fall of the stiffness beside kappa (T - T0).
@@ -94,6 +95,8 @@ pub struct Gyroscope {
     lsb_per_dps: f64,
     /// By which the sense channel is turned, rad.
     sense_turn_rad: f64,
+    /// For its latency and the drive's feedthrough.
+    sense_adc: Converter,
     conditions: Conditions,
     modes: Modes,
     /// Steady state at the drive at hand.
@@ -155,7 +158,6 @@ impl Gyroscope {
             temperatures,
             rate_dps: 0.0,
             extra_bias_dps: 0.0,
-            phase_pull_rad: 0.0,
             drive_q: gyro.drive_q,
             softening: 0.0,
         };
@@ -165,6 +167,7 @@ impl Gyroscope {
             quadrature_dps: run.quadrature_dps * error.cos(),
             lsb_per_dps,
             sense_turn_rad: error - sense.arg(),
+            sense_adc: Converter::new(&gyro.effects, Channel::Sense, 2),
             conditions,
             modes: Modes {
                 w: [w0, w2],
@@ -195,12 +198,12 @@ impl Gyroscope {
         &self.device
     }
 
-    /// Where a phase loop with this setpoint comes to rest, Hz, if the resonance has such a phase.
+    /// Where a phase loop with this setpoint comes to rest at a drive gain, Hz, if the resonance has such a phase.
     ///
     /// Eq. 7 solved for the excitation: with a = -phase of the motion in (0, pi), w^2 + w (w1/Q1) cot a -
     /// w1^2 = 0.
-    pub fn locked_hz(&self, setpoint_rad: f64) -> Option<f64> {
-        let pull = self.modes.electronics_rad + self.conditions.phase_pull_rad;
+    pub fn locked_hz(&self, setpoint_rad: f64, gain: f64) -> Option<f64> {
+        let pull = self.modes.electronics_rad + self.phase_pull_rad(gain);
         let lag = (pull - setpoint_rad).rem_euclid(TAU);
         let inside = lag > 1e-3 && lag < TAU / 2.0 - 1e-3;
         let (w1, width) = (self.modes.w[0], self.modes.width[0]);
@@ -328,18 +331,46 @@ impl Gyroscope {
         // A phase is a time; of what stands still it shows nothing.
         let per_velocity = if w == 0.0 { 0.0 } else { w0 / w };
         let turned = |angle: f64| [angle.cos(), per_velocity * angle.sin()];
-        let drive_turn = self.modes.electronics_rad + c.phase_pull_rad;
-        let (drive_row, sense_row) = (turned(drive_turn), turned(self.sense_turn_rad));
+        let drive_turn = self.modes.electronics_rad + self.phase_pull_rad(drive.gain);
+        let later = w / self.reference.sample_rate_hz * self.sense_adc.latency_samples();
+        let (drive_row, sense_row) = (turned(drive_turn), turned(self.sense_turn_rad + later));
         Steady {
             state: [x, u, y, v],
             outputs: [
                 x * drive_row[0] + u * drive_row[1],
-                y * sense_row[0] + v * sense_row[1],
+                y * sense_row[0] + v * sense_row[1] + self.feedthrough(drive.gain),
             ],
             drive_row,
             sense_row,
             rate_dps,
         }
+    }
+
+    /// What the amplitude adds to the measured phase, rad.
+    fn phase_pull_rad(&self, gain: f64) -> f64 {
+        let relative = gain / self.reference.nominal_gain;
+        effects::phase_pull_rad(&self.device.effects, relative - 1.0)
+    }
+
+    /// What the drive voltage puts into the sense ADC, LSB.
+    fn feedthrough(&self, gain: f64) -> C {
+        let Some([dps, phase_rad]) = self.sense_adc.drive_feedthrough() else {
+            return C::default();
+        };
+        let relative = gain / self.reference.nominal_gain;
+        C::from_polar(dps * self.lsb_per_dps * relative, phase_rad)
+    }
+
+    /// What both ADCs see of a spur of the excitation (`nco_spur`): its frequency, Hz, and its phasors, LSB.
+    pub fn spur(&self) -> Option<(f64, [C; 2])> {
+        let [relative, hz] = self.device.effects.get("nco_spur")?;
+        let w = TAU * hz;
+        let m = &self.modes;
+        let x = response(m.w[0], m.width[0], w) * self.force * self.drive.gain * relative;
+        let u = C::new(0.0, hz / self.device.drive.frequency_hz) * x;
+        let sense = self.rate_phasor(m, u, w) * self.steady.rate_dps;
+        let drive = x * C::cis(m.electronics_rad);
+        Some((hz, [drive, sense + self.quadrature_phasor(m, x, w)]))
     }
 
     fn modes_at(&self, c: &Conditions) -> Modes {

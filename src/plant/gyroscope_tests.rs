@@ -32,7 +32,6 @@ fn at(degc: f64) -> Conditions {
         },
         rate_dps: 0.0,
         extra_bias_dps: 0.0,
-        phase_pull_rad: 0.0,
         drive_q: 50.0,
         softening: 0.0,
     }
@@ -245,13 +244,13 @@ fn a_phase_loop_comes_to_rest_where_the_motion_has_its_setpoint() {
     for degc in [0.0, 26.85, 70.0] {
         g.set(at(degc));
         let resonance = g.device.drive.natural_frequency_hz(degc);
-        let hz = g.locked_hz(-TAU / 4.0).expect("a resonance");
+        let hz = g.locked_hz(-TAU / 4.0, 0.5).expect("a resonance");
         assert!((hz / resonance - 1.0).abs() < 1e-12, "{hz} {resonance}");
         for setpoint in [-0.3, -2.5] {
-            let hz = g.locked_hz(setpoint).expect("a frequency");
+            let hz = g.locked_hz(setpoint, 0.5).expect("a frequency");
             let phase = g.device.drive.response(degc, hz).phase_rad;
             assert!((phase - setpoint).abs() < 1e-12, "{phase}");
         }
-        assert_eq!(g.locked_hz(0.5), None);
+        assert_eq!(g.locked_hz(0.5, 0.5), None);
     }
 }

@@ -1,17 +1,19 @@
 //! The simulated gyro: physics and the ADCs' inputs, nothing of the detection circuit.
 //!
 //! In reading order: [`resonator`] (eq. 1 to 8 of the seed paper), [`device`] (measured phase and
-//! bias, eq. 9 and the effects beyond it), [`profile`] and [`thermal`] (chamber and heat), [`gyroscope`]
-//! (the motion at the ADC rate), [`converter`] (the ADCs), [`noise`] (noise that depends on its place
-//! alone); [`turn`] holds the elementary functions. All that a plant knows of the circuit is
-//! [`gyroscope::Reference`] and [`gyroscope::Drive`].
+//! bias by eq. 9), [`effects`] (what the device does beyond it), [`profile`] and [`thermal`] (chamber and
+//! heat), [`gyroscope`] (the motion at the ADC rate), [`converter`] (the ADCs), [`noise`] and [`slow_noise`]
+//! (noise that depends on its place alone); [`turn`] holds the elementary functions. All that a plant
+//! knows of the circuit is [`gyroscope::Reference`] and [`gyroscope::Drive`].
 
 pub mod converter;
 pub mod device;
+pub mod effects;
 pub mod gyroscope;
 pub mod noise;
 pub mod profile;
 pub mod resonator;
+pub mod slow_noise;
 pub mod thermal;
 pub mod turn;
 

@@ -61,6 +61,38 @@ impl Noise {
         let (sine, cosine) = turn::sin_cos(bits << 40);
         (radius * cosine, radius * sine)
     }
+
+    /// One standard normal number: the quantile of [`uniform`](Self::uniform), correct to 1e-6 and mostly to
+    /// 1e-7, so that no value is beyond 8.21. A third of the cost of a pair.
+    #[inline(always)]
+    pub fn normal(&self, index: u64) -> f64 {
+        quantile(self.uniform(index))
+    }
+}
+
+/// The quantile of the standard normal distribution at `p` in (0, 1): Wichura's PPND7, algorithm
+/// AS 241, Applied Statistics 37 (1988) 477. Rational functions for the middle 85 % and for two parts of the tails.
+#[inline(always)]
+fn quantile(p: f64) -> f64 {
+    let q = p - 0.5;
+    if q.abs() <= 0.425 {
+        let r = 0.180_625 - q * q;
+        let numerator =
+            ((59.109_374_720 * r + 159.291_132_02) * r + 50.434_271_938) * r + 3.387_132_717_9;
+        let denominator = ((67.187_563_600 * r + 78.757_757_664) * r + 17.895_169_469) * r + 1.0;
+        return q * numerator / denominator;
+    }
+    let r = (-turn::ln(p.min(1.0 - p))).sqrt();
+    let x = if r <= 5.0 {
+        let r = r - 1.6;
+        (((0.170_238_211_03 * r + 1.306_728_481_6) * r + 2.756_815_390_0) * r + 1.423_437_277_7)
+            / ((0.120_211_329_75 * r + 0.737_001_642_50) * r + 1.0)
+    } else {
+        let r = r - 5.0;
+        (((0.017_337_203_997 * r + 0.428_682_943_37) * r + 3.081_226_386_0) * r + 6.657_905_115_0)
+            / ((0.012_258_202_635 * r + 0.241_978_942_25) * r + 1.0)
+    };
+    if q < 0.0 { -x } else { x }
 }
 
 #[cfg(test)]
@@ -104,11 +136,46 @@ mod tests {
             within(m4, 3.0, 96.0);
             within(beyond as f64 / n, 0.002_699_8, 0.002_7);
         }
+        let ([m1, m2, m3, m4], n, beyond) = moments((0..COUNT).map(|i| noise.normal(i)));
+        let root = n.sqrt();
+        assert!(m1.abs() < 5.0 / root && (m2 - 1.0).abs() < 7.1 / root);
+        assert!(m3.abs() < 19.4 / root && (m4 - 3.0).abs() < 49.0 / root);
+        assert!((beyond as f64 / n - 0.002_699_8).abs() < 0.26 / root);
         let cross: f64 = pairs().map(|(a, b)| a * b).sum::<f64>() / COUNT as f64;
         let square: f64 = pairs()
             .map(|(a, b)| (a * a - 1.0) * (b * b - 1.0))
             .sum::<f64>();
         assert!(cross.abs() < 5e-3 && (square / COUNT as f64).abs() < 1e-2);
+    }
+
+    /// The distribution function less 1/2, by the series of odd powers.
+    fn above_half(x: f64) -> f64 {
+        let (mut term, mut sum) = (x, x);
+        for k in 1..400 {
+            term *= x * x / f64::from(2 * k + 1);
+            sum += term;
+        }
+        sum * (-x * x / 2.0).exp() / std::f64::consts::TAU.sqrt()
+    }
+
+    #[test]
+    fn the_quantile_inverts_the_distribution() {
+        for i in 1..8000 {
+            let p = f64::from(i) / 8000.0;
+            let x = quantile(p);
+            let density = (-x * x / 2.0).exp() / std::f64::consts::TAU.sqrt();
+            let error = (above_half(x) + 0.5 - p) / density;
+            assert!(error.abs() < 1e-6, "{p}: {x} {error:e}");
+        }
+        // Tabulated: 1e-6, 1e-12 (the last part of the tail).
+        for (p, x) in [(1e-6, -4.753_424_309), (1e-12, -7.034_483_825)] {
+            assert!((quantile(p) - x).abs() < 1e-6, "{p}");
+        }
+        for k in 2..52 {
+            let p = 0.5f64.powi(k);
+            assert_eq!(quantile(p), -quantile(1.0 - p));
+        }
+        assert!((quantile(0.5f64.powi(53)) + 8.21).abs() < 0.01);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! What a quadratic in the measured phase leaves of the default device's bias: the published 5 %.
 
-use super::device::{Device, mode_crossing_dps};
-use crate::design::ModeCrossing;
+use super::device::Device;
+use super::effects::mode_crossing_dps;
 use crate::design::template::default_design;
 use crate::plant::profile;
 
@@ -61,20 +61,20 @@ fn a_quadratic_leaves_the_published_8_of_160() {
     assert!((left - 8.0).abs() <= 0.1, "{left}");
 
     // Well inside the run, and every slope of the bump is seen by a dwell.
-    let m = device.effects.mode_crossing.clone().unwrap();
+    let [_, center_degc, half_width_k] = device.effects.get("mode_crossing").unwrap();
     let (low, high) = (
-        m.center_degc - 4.0 * m.half_width_k,
-        m.center_degc + 4.0 * m.half_width_k,
+        center_degc - 4.0 * half_width_k,
+        center_degc + 4.0 * half_width_k,
     );
     assert!(low > 0.0 && high < 70.0);
-    let u = |t: &f64| (t - m.center_degc) / m.half_width_k;
+    let u = |t: &f64| (t - center_degc) / half_width_k;
     assert_eq!(
         temperatures.iter().filter(|t| u(t).abs() < 1.0).count(),
         2 * 2 * 3
     );
 
     // Without the effect the declared model is the truth.
-    device.effects.mode_crossing = None;
+    assert!(device.effects.remove("mode_crossing"));
     let left = peak_to_peak(&quadratic_residual(&phases, &biases(&device)));
     assert!(left < 1e-9, "{left}");
 }
@@ -93,14 +93,9 @@ fn a_wider_bump_cannot_leave_8_and_keep_160() {
     let departure = |half_width_k: f64| {
         let centers = (20..=120).map(|i| f64::from(i) / 2.0);
         let departures = centers.flat_map(|center_degc| {
-            let unit = ModeCrossing {
-                amplitude_dps: 1.0,
-                center_degc,
-                half_width_k,
-            };
             let bump: Vec<f64> = temperatures
                 .iter()
-                .map(|&t| mode_crossing_dps(&unit, t))
+                .map(|&t| mode_crossing_dps(1.0, center_degc, half_width_k, t))
                 .collect();
             let amplitude = 8.0 / peak_to_peak(&quadratic_residual(&phases, &bump));
             [amplitude, -amplitude].map(|a| {
