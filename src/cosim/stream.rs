@@ -4,14 +4,59 @@
 
 use super::path::Path;
 use super::rest;
-use super::surroundings::Moment;
+use super::surroundings::{Moment, World};
 use crate::circuit::engine::ArithmeticKind;
 use crate::design::Design;
 use crate::error::{InputError, Result};
 use crate::plant::noise::Noise;
+use crate::plant::profile::{self, Profile};
 
 /// The most ADC samples that a stream may have.
 const LIMIT: usize = 1 << 28;
+
+/// Codes of the closed loop for comparisons, `samples` of them: the run's temperatures from its start to its
+/// top and back in steps, at rest and at the table's rate both ways in turn. The loops follow by
+/// themselves.
+///
+/// # Errors
+/// A circuit that stops on an overflow.
+pub fn stimulus(design: &Design, samples: usize) -> Result<(Vec<i32>, Vec<i32>)> {
+    /// Temperatures, and rates at each of them.
+    const STEPS: usize = 24;
+    let dwells = profile::dwells(&design.thermal_run);
+    let ratio = design.circuit.decimator.ratio as usize;
+    let rows = samples.div_ceil(ratio * STEPS).max(1);
+    let uncompensated = Design {
+        compensation: None,
+        ..design.clone()
+    };
+    let mut path = Path::new(&uncompensated, ArithmeticKind::Fixed);
+    let (mut drive, mut sense) = (Vec::new(), Vec::new());
+    for step in 0..STEPS {
+        let (degc, _) = dwells
+            .get(step * dwells.len() / STEPS)
+            .copied()
+            .unwrap_or((design.thermal_run.start_degc, true));
+        let mut moment = World::new(design, Profile::constant(degc)).advance_to(0.0);
+        let rates = [0.0, 1.0, -1.0, 0.5];
+        moment.conditions.rate_dps = rates[step % rates.len()] * design.thermal_run.scale_rate_dps;
+        if step == 0 {
+            path.start(moment.conditions);
+        } else {
+            path.gyroscope.set(moment.conditions);
+        }
+        let noise = Noise::new(design.thermal_run.seed, step as u64);
+        for _ in 0..rows {
+            path.period(&noise)?;
+            let [d, s] = path.codes();
+            drive.extend_from_slice(d);
+            sense.extend_from_slice(s);
+        }
+    }
+    drive.truncate(samples);
+    sense.truncate(samples);
+    Ok((drive, sense))
+}
 
 /// Codes, and where the readings are in them.
 #[derive(Debug, Clone, PartialEq)]

@@ -438,6 +438,10 @@ impl Gyroscope {
         let u = C::new(0.0, w / w0) * x;
         let wanted_lsb = self.device.bias_at_phase_dps(measured_rad) * self.lsb_per_dps;
         let gain = self.rate_phasor(modes, u, w).re;
+        if gain.abs() < 1e-9 * self.lsb_per_dps {
+            // No motion to speak of: no rate, and nothing that could stand for one.
+            return 0.0;
+        }
         (wanted_lsb - self.quadrature_phasor(modes, x, w).re) / gain
     }
 }
