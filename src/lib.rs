@@ -8,6 +8,7 @@ pub mod cli;
 pub mod closure;
 pub mod design;
 pub mod emit;
+pub mod equivalence;
 pub mod error;
 pub mod job;
 pub mod numeric;
