@@ -59,6 +59,8 @@ pub struct PhaseLoopBound {
     /// N M + 1.
     window_rows: usize,
     setpoint_turns: f64,
+    /// The integral acts on the tuning word.
+    integrates: bool,
     /// A turn in counts of the phase error.
     counts: f64,
     /// F, turns a sample.
@@ -104,6 +106,7 @@ impl PhaseLoopBound {
             ratio: f64::from(d.ratio),
             window_rows: (d.stages * d.differential_delay) as usize + 1,
             setpoint_turns: l.setpoint_raw as f64 * exp2i(-(circuit.cordic.angle_bits as i32)),
+            integrates: l.integral.raw != 0,
             counts: exp2i(circuit.cordic.angle_bits as i32),
             floors: floors as f64 * exp2i(-(circuit.nco.phase_bits as i32)),
             gross: fir
@@ -161,7 +164,8 @@ impl PhaseLoopBound {
 
     /// Bound on the integrals' difference, counts.
     pub fn integral_counts(&self) -> f64 {
-        if self.is_lost() {
+        // Without gain the integral drives nothing, and nothing holds it.
+        if self.is_lost() || !self.integrates {
             f64::INFINITY
         } else {
             self.bounds[1] * self.counts

@@ -19,8 +19,8 @@
 //! **Length.** x_n = length * cos(angle left): off K r0 by at most 1.05 sqrt 2 (n - 1) + K r0 (a_(n-1) + P)^2 / 2.
 //! The constant's relative error and half an LSB of the result's rounding are added.
 //!
-//! **Width.** Where x or y may leave `width`, the same block with a wide register runs beside it,
-//! and the distance between their results is added: the wrap's actual effect.
+//! **Width.** Where x or y may leave `width`, the same block with a wide register runs beside it, and the
+//! distance between their phases, and of the magnitude from r, are added: the wrap's actual effect.
 
 use crate::circuit::cordic::Vectoring;
 use crate::design::{Circuit, Design};
@@ -111,15 +111,22 @@ impl Polar {
         let [phase, magnitude] = self.block_result(codes);
         let length = i.value().hypot(q.value());
         let steps = length * exp2i(self.vector_fraction_bits);
-        let (mut phase_off, mut magnitude_off, mut needed_width) = (0.0, 0.0, None);
+        let turned_rad = self.floors_rad(steps);
+        // A vector of a few LSB may point anywhere.
+        let left_rad = (self.last_angle_rad + turned_rad).min(2.0);
+        let scale = exp2i(-self.vector_fraction_bits) / self.gain * (1.0 + self.gain_error);
+        let mut block_length = scale
+            * (1.05 * SQRT_2 * self.iterations + self.gain * steps * left_rad * left_rad / 2.0)
+            + length * (self.gain_error + 4.0 * f64::EPSILON)
+            + 0.5 * exp2i(-self.fraction_bits);
+        let (mut phase_off, mut needed_width) = (0.0, None);
         let reach = self.gain * steps + 1.5 * self.iterations + 4.0;
         if reach >= exp2i(self.width as i32 - 1) {
-            let [wide_phase, wide_magnitude] = self.wide_result(codes);
-            if (wide_phase, wide_magnitude) != (phase, magnitude) {
-                let turns = (phase - wide_phase) as f64 * exp2i(-self.angle_bits);
-                phase_off = (turns - turns.round()).abs();
-                magnitude_off =
-                    (magnitude - wide_magnitude).abs() as f64 * exp2i(-self.fraction_bits);
+            let turns = (phase - self.wide_phase(codes)) as f64 * exp2i(-self.angle_bits);
+            phase_off = (turns - turns.round()).abs();
+            let off = (magnitude as f64 * exp2i(-self.fraction_bits) - length).abs();
+            if phase_off > 0.0 || off > block_length {
+                block_length += off;
                 needed_width = Some(reach.log2().floor() as u32 + 2);
             }
         }
@@ -128,21 +135,12 @@ impl Polar {
         let [real_phase, real_magnitude] = real.unwrap_or_default();
         let own = i.bound.hypot(q.bound);
         let total = (i.bound + i.phase_bound).hypot(q.bound + q.phase_bound);
-        let turned_rad = self.floors_rad(steps);
         let block_turns = (self.last_angle_rad + 2.0 * turned_rad) / TAU
             + self.table_turns
             + phase_off
             + 4.0 * f64::EPSILON;
         let own_turns = (angle_turns(own, length) + block_turns).min(0.5);
         let total_turns = (angle_turns(total, length) + block_turns).min(0.5);
-        // A vector of a few LSB may point anywhere.
-        let left_rad = (self.last_angle_rad + turned_rad).min(2.0);
-        let scale = exp2i(-self.vector_fraction_bits) / self.gain * (1.0 + self.gain_error);
-        let block_length = scale
-            * (1.05 * SQRT_2 * self.iterations + self.gain * steps * left_rad * left_rad / 2.0)
-            + length * self.gain_error
-            + 0.5 * exp2i(-self.fraction_bits)
-            + magnitude_off;
         Outcome {
             phase: Pair {
                 raw: W::low(phase),
@@ -183,8 +181,10 @@ impl Polar {
         self.block.step(&Fixed::<i128, i128>::new(), &mut (), codes)
     }
 
-    fn wide_result(&self, codes: [i128; 2]) -> [i128; 2] {
-        self.wide.step(&Fixed::<i128, i128>::new(), &mut (), codes)
+    fn wide_phase(&self, codes: [i128; 2]) -> i128 {
+        let arithmetic = Fixed::<i128, i128>::new();
+        let [phase, _] = self.wide.step(&arithmetic, &mut (), codes);
+        phase
     }
 }
 
@@ -198,12 +198,12 @@ fn angle_turns(distance: f64, length: f64) -> f64 {
     }
 }
 
-/// The circuit with x and y as wide as they can need, or as the 127 bits of its product leave.
+/// The circuit with x and y as wide as they can need. (Its magnitude may then leave 127 bits, and is
+/// not looked at.)
 fn widened(circuit: &Circuit) -> Circuit {
     let mut circuit = circuit.clone();
     let output = circuit.decimator.output.format;
     let needed = output.signed_bits() + circuit.cordic.guard_bits + 2;
-    let most = 126 - circuit.cordic.gain_bits;
-    circuit.cordic.width = needed.clamp(circuit.cordic.width.min(most), most);
+    circuit.cordic.width = needed.max(circuit.cordic.width);
     circuit
 }

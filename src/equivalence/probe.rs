@@ -235,7 +235,10 @@ impl Watch for Probe {
             if rounded != output.raw {
                 bound.lose(self.sample.get());
             }
-            output.bound = output.bound.min(bound.integral_counts());
+            let known = bound.integral_counts();
+            if output.bound + output.phase_bound > known {
+                (output.bound, output.phase_bound) = (known, 0.0);
+            }
         }
         let mut nodes = self.nodes.borrow_mut();
         let Some(node) = nodes.get_mut(place) else {
