@@ -11,6 +11,7 @@ pub mod closure;
 pub mod cosim;
 pub mod design;
 pub mod emit;
+pub mod equivalence;
 pub mod error;
 pub mod job;
 pub mod numeric;

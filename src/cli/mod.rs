@@ -4,6 +4,7 @@
 //! 1 = a check does not hold, 2 = the input cannot be used (`docs/manual.md`).
 
 mod emit;
+mod equiv;
 mod init;
 mod replay;
 mod run;
@@ -26,6 +27,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Emit(emit::Arguments),
+    Equiv(equiv::Arguments),
     Init(init::Arguments),
     Replay(replay::Arguments),
     Run(run::Arguments),
@@ -48,6 +50,7 @@ pub fn main() -> ExitCode {
     let cli = Cli::parse();
     let result = match &cli.command {
         Command::Emit(arguments) => emit::run(arguments),
+        Command::Equiv(arguments) => equiv::run(arguments),
         Command::Init(arguments) => init::run(arguments),
         Command::Replay(arguments) => replay::run(arguments),
         Command::Run(arguments) => run::run(arguments),

@@ -121,7 +121,7 @@ fn write(rows: &mut Rows, columns: usize, mut index: u64, writer: &mut RowWriter
     Ok(index)
 }
 
-fn warn_of_mismatches(design: &Design, capture: &CaptureReader) {
+pub(super) fn warn_of_mismatches(design: &Design, capture: &CaptureReader) {
     let nco = &design.circuit.nco;
     let circle = 1i128 << nco.phase_bits;
     let word = i128::from(nco.tuning_word).rem_euclid(circle) as u128;

@@ -329,8 +329,9 @@ impl<L: Lane> Kernel<L> {
         }
     }
 
+    /// The word before the overflow step: rounded, not limited.
     #[inline(always)]
-    fn round(&self, v: L) -> L {
+    pub fn round(&self, v: L) -> L {
         if self.left > 0 {
             return if self.left >= L::BITS {
                 // Only a wrap can follow (or the word is 0): no bit of v is left.

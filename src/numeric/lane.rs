@@ -11,6 +11,8 @@ pub trait Lane: Copy + Ord + Default + std::fmt::Debug + Send + Sync + 'static {
     fn saturated(value: i128) -> Self;
     /// Sign-extended.
     fn wide(self) -> i128;
+    /// The nearest `f64`.
+    fn real(self) -> f64;
     /// From a captured code.
     fn from_i32(value: i32) -> Self;
     /// Sum modulo 2^BITS.
@@ -50,6 +52,10 @@ macro_rules! lane {
             #[inline(always)]
             fn wide(self) -> i128 {
                 self as i128
+            }
+            #[inline(always)]
+            fn real(self) -> f64 {
+                self as f64
             }
             #[inline(always)]
             fn from_i32(value: i32) -> Self {

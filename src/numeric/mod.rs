@@ -1,7 +1,7 @@
 //! Formats, rounding, overflow, and the arithmetics that the circuit is written over.
 //!
 //! [`mod@format`] and [`cast`] say what a quantiser does; [`arithmetic`] is the interface of the
-//! blocks; [`float`], [`fixed`] and [`trace`] implement it; [`constants`] decides the integers
+//! blocks; [`float`], [`fixed`], [`trace`] and [`paired`] implement it; [`constants`] decides the integers
 //! nearest to sines, arc tangents and the CORDIC gain.
 
 pub mod arithmetic;
@@ -11,4 +11,5 @@ pub mod fixed;
 pub mod float;
 pub mod format;
 pub mod lane;
+pub mod paired;
 pub mod trace;

@@ -1,0 +1,190 @@
+//! `gyrogen equiv`: float against fixed node by node, model against emitted C and Rust.
+
+use super::OutputFormat;
+use crate::design::Design;
+use crate::equivalence::job::{self, Stimulus};
+use crate::equivalence::outcome::{Equivalence, NodeReport};
+use crate::equivalence::stimulus;
+use crate::error::{Error, Result};
+use crate::record::capture::CaptureReader;
+use std::path::{Path, PathBuf};
+
+/// Compare fixed with float node by node, with bounds, and emitted code with the model.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Design file; the embedded default if left out.
+    design: Option<PathBuf>,
+    /// Captured codes, CSV or NPY; the design's own gyro if left out.
+    #[arg(long)]
+    capture: Option<PathBuf>,
+    /// ADC samples of the design's own stimulus; of a capture, at most so many.
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
+    samples: Option<u64>,
+    /// What is made where no capture is given.
+    #[arg(long, value_enum, default_value = "operating")]
+    stimulus: Kind,
+    /// Folder for the results; made if it does not exist.
+    #[arg(long, default_value = "gyrogen-out")]
+    out: PathBuf,
+    /// How the result is printed.
+    #[arg(long, value_enum, default_value = "text")]
+    format: OutputFormat,
+}
+
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum Kind {
+    /// The design's gyro, through its thermal run.
+    Operating,
+    /// Tones beside the oscillator, full-scale squares, constants, steps, noise.
+    Adversarial,
+}
+
+/// ADC samples if nobody says how many.
+const SAMPLES: usize = 10_000_000;
+
+/// Runs the command.
+///
+/// # Errors
+/// An unusable design or capture, no compiler (exit 2); a node outside its bound, an overflow, emitted
+/// code that differs (exit 1).
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let design = super::design(arguments.design.as_deref())?;
+    let (drive, sense, origin) = codes(&design, arguments)?;
+    let stimulus = Stimulus {
+        drive: &drive,
+        sense: &sense,
+        origin: &origin,
+    };
+    let result = job::equivalence(&design, stimulus, &command(arguments))?;
+    let json = super::json(&result);
+    super::make_folder(&arguments.out)?;
+    crate::output::write_whole(&arguments.out.join("equiv.json"), json.as_bytes())?;
+    match arguments.format {
+        OutputFormat::Json => print!("{json}"),
+        OutputFormat::Text => print(&result),
+    }
+    if result.holds {
+        return Ok(());
+    }
+    Err(Error::Check(result.reasons.join("; ")))
+}
+
+/// The command that makes the same result again; where it is written does not matter.
+fn command(arguments: &Arguments) -> String {
+    let mut command = String::from("gyrogen equiv");
+    let mut push = |text: String| {
+        command.push(' ');
+        command += &text;
+    };
+    if let Some(path) = &arguments.design {
+        push(path.display().to_string());
+    }
+    if let Some(path) = &arguments.capture {
+        push(format!("--capture {}", path.display()));
+    }
+    if let Some(samples) = arguments.samples {
+        push(format!("--samples {samples}"));
+    }
+    if let Kind::Adversarial = arguments.stimulus {
+        push("--stimulus adversarial".into());
+    }
+    command
+}
+
+/// Drive and sense codes, and their origin.
+fn codes(design: &Design, arguments: &Arguments) -> Result<(Vec<i32>, Vec<i32>, String)> {
+    let most = arguments.samples.map(|n| n as usize);
+    if let Some(path) = &arguments.capture {
+        let (drive, sense) = read(design, path, most.unwrap_or(usize::MAX))?;
+        return Ok((drive, sense, format!("capture {}", path.display())));
+    }
+    let samples = most.unwrap_or(SAMPLES);
+    let (codes, origin) = match arguments.stimulus {
+        Kind::Operating => (
+            stimulus::operating(design, samples),
+            "the design's gyro through its thermal run",
+        ),
+        Kind::Adversarial => (
+            crate::verify::stimulus::capture(design, samples, 1),
+            "tones, squares, constants, steps and noise",
+        ),
+    };
+    Ok((codes.0, codes.1, origin.to_owned()))
+}
+
+/// The first codes of a capture.
+fn read(design: &Design, path: &Path, most: usize) -> Result<(Vec<i32>, Vec<i32>)> {
+    const BLOCK: usize = 1 << 16;
+    let mut capture = CaptureReader::open(path, design.circuit.adc.format)?;
+    super::replay::warn_of_mismatches(design, &capture);
+    let (mut drive, mut sense) = (Vec::new(), Vec::new());
+    let (mut d, mut s) = (Vec::new(), Vec::new());
+    while drive.len() < most
+        && capture.read_block(&mut d, &mut s, BLOCK.min(most - drive.len()))? > 0
+    {
+        drive.extend_from_slice(&d);
+        sense.extend_from_slice(&s);
+    }
+    Ok((drive, sense))
+}
+
+fn print(e: &Equivalence) {
+    let mut table = super::table(&[
+        "node",
+        "max error",
+        "bound",
+        "rms",
+        "predicted",
+        "LSB",
+        "headroom, bits",
+        "overflows",
+        "flags",
+    ]);
+    for n in &e.nodes {
+        table.add_row(row(n));
+    }
+    for column in table.column_iter_mut().skip(1).take(7) {
+        column.set_cell_alignment(comfy_table::CellAlignment::Right);
+    }
+    println!("{table}");
+    println!("{} ADC samples, {} rows: {}", e.samples, e.rows, e.stimulus);
+    for (emitted, language) in [(&e.model_vs_c, "C"), (&e.model_vs_rust, "Rust")] {
+        println!(
+            "emitted {language}: {} words compared with the model, {} mismatches",
+            emitted.compared, emitted.mismatches
+        );
+    }
+    if let Some(first) = &e.first_overflow {
+        println!("{}", first.sentence());
+        println!("  path: {}", first.path.join(" > "));
+        for repair in &e.repairs {
+            println!(
+                "  repair: {} = {} (was {})",
+                repair.key, repair.to, repair.from
+            );
+        }
+        if e.repair_verified == Some(true) {
+            println!("  with that, run again: nothing overflows");
+        }
+    }
+    for note in &e.notes {
+        println!("note: {note}");
+    }
+    println!("{}", if e.holds { "holds" } else { "does not hold" });
+}
+
+fn row(n: &NodeReport) -> Vec<String> {
+    let lsb = |v: f64| format!("{:.3}", v / n.lsb);
+    let some = |v: Option<f64>| v.map_or("-".to_owned(), lsb);
+    vec![
+        n.name.clone(),
+        lsb(n.max_abs_error),
+        lsb(n.bound),
+        lsb(n.rms_error),
+        some(n.predicted_rms),
+        format!("{:.3e} {}", n.lsb, n.unit),
+        n.headroom_bits.map_or("-".into(), |b| format!("{b:.2}")),
+        n.overflows.to_string(),
+        n.flags.join(" "),
+    ]
+}

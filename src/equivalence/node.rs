@@ -1,0 +1,177 @@
+//! What is known of one node after a run: its range, its errors, its bound.
+
+use crate::numeric::lane::Lane;
+use crate::numeric::paired::Pair;
+
+/// What a node is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Identity {
+    /// The dotted key of the design and, where there are several, the channel or the part.
+    pub name: String,
+    /// Of its values.
+    pub unit: &'static str,
+    /// One LSB is 2^-fraction_bits of the unit.
+    pub fraction_bits: i32,
+    /// The raw words that it can hold.
+    pub limits: (i128, i128),
+}
+
+/// Sums over all samples of a node.
+#[derive(Debug, Clone)]
+pub struct Node {
+    /// Name, unit, format.
+    pub identity: Identity,
+    /// Samples.
+    pub count: u64,
+    /// Least raw word.
+    pub min_raw: i128,
+    /// Greatest raw word.
+    pub max_raw: i128,
+    /// Greatest |fixed - float|.
+    pub max_abs_error: f64,
+    /// Sum of fixed - float.
+    pub sum_error: f64,
+    /// Sum of its square.
+    pub sum_square: f64,
+    /// Greatest bound.
+    pub max_bound: f64,
+    /// Greatest error / bound of a sample, and the ADC sample.
+    pub worst: (f64, u64),
+    /// Samples whose error is outside their own bound.
+    pub outside: u64,
+    /// The first of them.
+    pub first_outside: Option<u64>,
+    /// Rounding of the node's own cast, LSB: sum, sum of squares.
+    pub local: (f64, f64),
+    /// Samples of `local`.
+    pub local_count: u64,
+    /// Words outside the format.
+    pub overflows: u64,
+    /// Greatest and least raw word before the overflow step.
+    pub before: (i128, i128),
+    /// Sum of squares of the float value.
+    pub sum_value_square: f64,
+    /// Sum of squares of the change from sample to sample, and the last value.
+    pub change: (f64, f64),
+}
+
+impl Node {
+    /// A node that has seen nothing.
+    pub fn new(identity: Identity) -> Self {
+        Node {
+            identity,
+            count: 0,
+            min_raw: i128::MAX,
+            max_raw: i128::MIN,
+            max_abs_error: 0.0,
+            sum_error: 0.0,
+            sum_square: 0.0,
+            max_bound: 0.0,
+            worst: (0.0, 0),
+            outside: 0,
+            first_outside: None,
+            local: (0.0, 0.0),
+            local_count: 0,
+            overflows: 0,
+            before: (0, 0),
+            sum_value_square: 0.0,
+            change: (0.0, 0.0),
+        }
+    }
+
+    /// Notes a word at an ADC sample.
+    #[inline(always)]
+    pub fn note<W: Lane>(&mut self, word: &Pair<W>, sample: u64) {
+        let raw = word.raw.wide();
+        self.min_raw = self.min_raw.min(raw);
+        self.max_raw = self.max_raw.max(raw);
+        self.note_error(word.error(), word.total_bound(), word.real, sample);
+    }
+
+    /// Notes an error with its bound.
+    #[inline(always)]
+    pub fn note_error(&mut self, error: f64, bound: f64, real: f64, sample: u64) {
+        let size = error.abs();
+        self.count += 1;
+        self.sum_error += error;
+        self.sum_square += error * error;
+        self.max_abs_error = self.max_abs_error.max(size);
+        self.max_bound = self.max_bound.max(bound);
+        if size > self.worst.0 * bound {
+            self.worst = (size / bound, sample);
+        }
+        // Written so that a NaN is outside.
+        if !(size <= bound) {
+            self.outside += 1;
+            self.first_outside.get_or_insert(sample);
+        }
+        self.sum_value_square += real * real;
+        let change = real - self.change.1;
+        self.change = (self.change.0 + change * change, real);
+    }
+
+    /// Notes the rounding error of the node's own cast, LSB.
+    #[inline(always)]
+    pub fn note_local(&mut self, lsb: f64) {
+        self.local.0 += lsb;
+        self.local.1 += lsb * lsb;
+        self.local_count += 1;
+    }
+
+    /// Notes a word before the overflow step.
+    #[inline(always)]
+    pub fn note_before(&mut self, word: i128) {
+        self.before.0 = self.before.0.max(word);
+        self.before.1 = self.before.1.min(word);
+    }
+
+    /// Root mean square of fixed - float.
+    pub fn rms_error(&self) -> f64 {
+        (self.sum_square / self.count.max(1) as f64).sqrt()
+    }
+
+    /// Mean of fixed - float.
+    pub fn mean_error(&self) -> f64 {
+        self.sum_error / self.count.max(1) as f64
+    }
+
+    /// Root mean square of the cast's own rounding, LSB; `None` where it never rounds.
+    pub fn local_rms_lsb(&self) -> Option<f64> {
+        (self.local_count > 0).then(|| (self.local.1 / self.local_count as f64).sqrt())
+    }
+
+    /// Mean square of the float value.
+    pub fn mean_square_value(&self) -> f64 {
+        self.sum_value_square / self.count.max(1) as f64
+    }
+
+    /// Root mean square of the float value's change from sample to sample.
+    pub fn rms_change(&self) -> f64 {
+        (self.change.0 / self.count.max(1) as f64).sqrt()
+    }
+
+    /// log2 of how many times larger the words could become before the format is left: of the
+    /// tighter end. `None` for a node that never left 0 or saw nothing.
+    pub fn headroom_bits(&self) -> Option<f64> {
+        if self.count == 0 {
+            return None;
+        }
+        let (low, high) = self.identity.limits;
+        let room = |seen: i128, limit: i128| match (seen.signum(), limit.signum()) {
+            (0, _) => f64::INFINITY,
+            _ => (limit as f64 / seen as f64).log2(),
+        };
+        let up = if self.max_raw > 0 {
+            room(self.max_raw, high)
+        } else {
+            f64::INFINITY
+        };
+        let down = if self.min_raw < 0 {
+            room(self.min_raw, low)
+        } else {
+            f64::INFINITY
+        };
+        let bits = up.min(down);
+        bits.is_finite().then_some(bits)
+    }
+}

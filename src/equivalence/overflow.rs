@@ -1,0 +1,195 @@
+//! The first overflow: where it came from, where it goes, and the smallest format that removes it.
+
+use super::probe::Seen;
+use crate::design::{Design, limits};
+use crate::numeric::cast::Label;
+use crate::numeric::format::{Format, Overflow};
+use serde::Serialize;
+
+/// A word that did not fit.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Event {
+    /// 0-based ADC sample; at the slow rate the period's last.
+    pub sample: u64,
+    /// The key, with its channel.
+    pub label: Label,
+    /// The node's own name.
+    pub part: String,
+    /// The node's number.
+    pub node: usize,
+    /// What went into it, raw.
+    pub operands: Vec<i128>,
+    /// The raw word before the overflow step.
+    pub value: i128,
+}
+
+/// A change of one format.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Repair {
+    /// The dotted key.
+    pub key: String,
+    /// As it is.
+    pub from: String,
+    /// As it would have to be.
+    pub to: String,
+}
+
+/// The smallest change of the first overflowing node's format that holds every word which this run
+/// brought to it: integer bits are added, fraction bits kept; an unsigned format becomes signed if a
+/// word is negative. `None` if no format of 64 bits does, or the design would then need more than 127 bits.
+pub fn smallest_repair(design: &Design, seen: &Seen) -> Option<(Repair, Design)> {
+    let event = seen.first_overflow.as_ref()?;
+    let key = event.label.key;
+    let mut repaired = design.clone();
+    let (from, to) = match key {
+        "circuit.cordic.width" => {
+            let width = &mut repaired.circuit.cordic.width;
+            let from = *width;
+            *width = seen.needed_width;
+            (from <= 64 && *width <= 64).then(|| (from.to_string(), width.to_string()))?
+        }
+        "circuit.phase_loop.integrator_bits" => {
+            let bits = &mut repaired.circuit.phase_loop.as_mut()?.integrator_bits;
+            let from = *bits;
+            *bits = signed_bits(words_before(seen, key));
+            (*bits <= 64).then(|| (from.to_string(), bits.to_string()))?
+        }
+        _ => {
+            let quantizer = match key {
+                "circuit.demodulator.product" => &mut repaired.circuit.demodulator.product,
+                "circuit.decimator.output" => &mut repaired.circuit.decimator.output,
+                "compensation.accumulator" => &mut repaired.compensation.as_mut()?.accumulator,
+                "compensation.output" => &mut repaired.compensation.as_mut()?.output,
+                _ => return None,
+            };
+            let from = quantizer.format;
+            let symmetric = quantizer.overflow == Overflow::SaturateSymmetric;
+            quantizer.format = holding(from, words_before(seen, key), symmetric)?;
+            (from.to_string(), quantizer.format.to_string())
+        }
+    };
+    limits::check(&repaired).ok()?;
+    let key = key.to_owned();
+    Some((Repair { key, from, to }, repaired))
+}
+
+/// Greatest and least word before the overflow step, over all nodes of a key.
+fn words_before(seen: &Seen, key: &str) -> (i128, i128) {
+    let of_key =
+        |name: &str| name == key || name.strip_prefix(key).is_some_and(|r| r.starts_with(' '));
+    let nodes = seen.nodes.iter().filter(|n| of_key(&n.identity.name));
+    nodes.fold((0, 0), |(high, low), n| {
+        (high.max(n.before.0), low.min(n.before.1))
+    })
+}
+
+/// Bits of a two's-complement word that holds both.
+fn signed_bits((high, low): (i128, i128)) -> u32 {
+    let bits = |v: i128| {
+        129 - if v < 0 {
+            v.leading_ones()
+        } else {
+            v.leading_zeros()
+        }
+    };
+    bits(high).max(bits(low))
+}
+
+/// The format with as few more integer bits as hold both raw words.
+fn holding(from: Format, (high, low): (i128, i128), symmetric: bool) -> Option<Format> {
+    let low = if symmetric && from.signed {
+        low.min(-high) - 1
+    } else {
+        low
+    };
+    let signed = from.signed || low < 0;
+    let needed = signed_bits((high, low)) - u32::from(!signed);
+    let before = from.bits();
+    let bits = if from.signed == signed {
+        needed.max(before)
+    } else {
+        needed
+    };
+    (bits <= 64).then_some(())?;
+    Some(Format {
+        signed,
+        integer_bits: bits
+            .checked_sub(from.fraction_bits)
+            .unwrap_or(0)
+            .max(u32::from(signed)),
+        fraction_bits: from.fraction_bits,
+    })
+}
+
+/// The format behind a key, as text.
+pub fn format_of(design: &Design, key: &str) -> String {
+    let circuit = &design.circuit;
+    let quantizer = match key {
+        "circuit.demodulator.product" => Some(circuit.demodulator.product),
+        "circuit.decimator.output" => Some(circuit.decimator.output),
+        "compensation.accumulator" => design.compensation.as_ref().map(|c| c.accumulator),
+        "compensation.output" => design.compensation.as_ref().map(|c| c.output),
+        _ => None,
+    };
+    match (key, quantizer, &circuit.phase_loop) {
+        (_, Some(quantizer), _) => quantizer.to_string(),
+        ("circuit.cordic.width", ..) => format!("{} bits", circuit.cordic.width),
+        (_, _, Some(l)) => format!("{} bits", l.integrator_bits),
+        _ => String::new(),
+    }
+}
+
+/// Every node that a node's word reaches, to the columns of the output.
+pub fn path(design: &Design, node: &str) -> Vec<String> {
+    let circuit = &design.circuit;
+    let mut path = vec![node.to_owned()];
+    let on_phase = design
+        .compensation
+        .as_ref()
+        .is_some_and(|c| c.input == crate::design::CompensationInput::Phase);
+    let (key, channel) = node.split_once(' ').unwrap_or((node, ""));
+    let drive = channel.starts_with("drive");
+    let mut push = |name: String| path.push(name);
+    let mut reached = key;
+    if reached == "circuit.demodulator.product" {
+        push(format!("circuit.decimator.output {channel}"));
+        reached = "circuit.decimator.output";
+    }
+    if reached == "circuit.decimator.output" {
+        push(format!("column {channel}"));
+        if drive {
+            push("circuit.cordic phase".into());
+            push("circuit.cordic magnitude".into());
+            reached = "circuit.cordic.width";
+        } else if on_phase && channel == "sense_i" {
+            reached = "compensation.output rate";
+        }
+    }
+    if reached == "circuit.cordic.width" {
+        push("column phase".into());
+        push("column magnitude".into());
+        if circuit.phase_loop.is_some() {
+            push("circuit.phase_loop.integrator_bits".into());
+            push("column tuning_word".into());
+        }
+        if circuit.amplitude_loop.is_some() {
+            push("circuit.amplitude_loop integrator".into());
+            push("column gain".into());
+        }
+        if on_phase {
+            reached = "compensation.accumulator";
+            push(reached.into());
+        }
+    } else if reached == "circuit.phase_loop.integrator_bits" {
+        push("column tuning_word".into());
+    }
+    if reached == "compensation.accumulator" {
+        push("compensation.output bias".into());
+    }
+    if reached.starts_with("compensation.") {
+        push("compensation.output rate".into());
+        push("column rate".into());
+    }
+    path.dedup();
+    path
+}
