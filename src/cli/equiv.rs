@@ -1,10 +1,10 @@
 //! `gyrogen equiv`: float against fixed node by node, model against emitted C and Rust.
 
 use super::OutputFormat;
+use crate::cosim::stream::stimulus;
 use crate::design::Design;
 use crate::equivalence::job::{self, Stimulus};
 use crate::equivalence::outcome::{Equivalence, NodeReport};
-use crate::equivalence::stimulus;
 use crate::error::{Error, Result};
 use crate::record::capture::CaptureReader;
 use std::path::{Path, PathBuf};
@@ -101,8 +101,8 @@ fn codes(design: &Design, arguments: &Arguments) -> Result<(Vec<i32>, Vec<i32>, 
     let samples = most.unwrap_or(SAMPLES);
     let (codes, origin) = match arguments.stimulus {
         Kind::Operating => (
-            stimulus::operating(design, samples),
-            "the design's gyro through its thermal run",
+            stimulus(design, samples)?,
+            "the design's gyro in closed loop through its thermal run",
         ),
         Kind::Adversarial => (
             crate::verify::stimulus::capture(design, samples, 1),

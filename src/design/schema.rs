@@ -2,7 +2,7 @@
 //! `docs/manual.md`; their meaning is stated there and only summarised here.
 
 use super::effects::Effects;
-use crate::numeric::format::{Format, Quantizer, Rounding};
+use crate::numeric::format::{Format, Overflow, Quantizer, Rounding};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -27,6 +27,25 @@ pub struct Design {
     pub fit: FitOptions,
     /// Where the design came from.
     pub source: Source,
+}
+
+impl Design {
+    /// The same with `saturate` wherever the design says `error`: a run that no overflow stops.
+    pub fn without_stops(&self) -> Self {
+        let mut design = self.clone();
+        let goes_on = |q: &mut Quantizer| {
+            if q.overflow == Overflow::Error {
+                q.overflow = Overflow::Saturate;
+            }
+        };
+        goes_on(&mut design.circuit.demodulator.product);
+        goes_on(&mut design.circuit.decimator.output);
+        if let Some(c) = &mut design.compensation {
+            goes_on(&mut c.accumulator);
+            goes_on(&mut c.output);
+        }
+        design
+    }
 }
 
 /// Where a design came from, for the headers of everything that is made from it.

@@ -8,7 +8,6 @@ use super::{c, rust};
 use crate::circuit::engine::{self, ArithmeticKind, Rows};
 use crate::design::Design;
 use crate::error::{InputError, Result, io_error};
-use crate::numeric::format::Overflow;
 use crate::numeric::trace::ir::Interval;
 use crate::verify::compare;
 use crate::verify::model::{self, Model};
@@ -354,18 +353,7 @@ fn chain_checksum(design: &Design, bundle: &Bundle) -> u64 {
 
 /// Rows of the model, where `error` saturates and goes on as the emitted code does.
 pub fn saturating_rows(design: &Design, drive: &[i32], sense: &[i32]) -> Vec<i128> {
-    let mut design = design.clone();
-    let goes_on = |q: &mut crate::numeric::format::Quantizer| {
-        if q.overflow == Overflow::Error {
-            q.overflow = Overflow::Saturate;
-        }
-    };
-    goes_on(&mut design.circuit.demodulator.product);
-    goes_on(&mut design.circuit.decimator.output);
-    if let Some(c) = &mut design.compensation {
-        goes_on(&mut c.accumulator);
-        goes_on(&mut c.output);
-    }
+    let design = design.without_stops();
     let mut engine = engine::engine(&design, ArithmeticKind::Fixed);
     let mut rows = engine.no_rows();
     // No cast stops this run.

@@ -5,7 +5,7 @@ use super::overflow::{self, Repair};
 use super::predicted::Prediction;
 use super::probe::Seen;
 use super::run;
-use crate::design::{CompensationInput, Design};
+use crate::design::Design;
 use crate::emit::bundle::Bundle;
 use crate::error::Result;
 use crate::job::firmware::{Built, Firmware};
@@ -162,7 +162,7 @@ fn notes(design: &Design, seen: &Seen) -> Vec<String> {
     let by_channel = design
         .compensation
         .as_ref()
-        .is_some_and(|c| c.input != CompensationInput::Phase);
+        .is_some_and(|c| !c.input.is_of_chain());
     if by_channel {
         notes.push(
             "the compensation's input is a word of its own, not the chain's phase: it is no node of the chain, and \

@@ -3,7 +3,7 @@
 use super::node::Identity;
 use super::probe::Places;
 use crate::circuit::CHANNELS;
-use crate::design::{CompensationInput, Design};
+use crate::design::Design;
 use crate::numeric::format::{Format, Overflow, Quantizer};
 
 /// Identities and where they are.
@@ -82,7 +82,7 @@ impl Layout {
         let magnitude = signed(width as u32);
         self.push("circuit.cordic magnitude".into(), "1", f, magnitude);
         if let Some(c) = &design.compensation
-            && c.input == CompensationInput::Phase
+            && c.input.is_of_chain()
         {
             let steps = c.coefficients_raw.len().saturating_sub(1);
             self.places.horner = Some((self.identities.len(), steps));

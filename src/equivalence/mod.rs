@@ -15,4 +15,3 @@ pub mod polar;
 pub mod predicted;
 pub mod probe;
 pub mod run;
-pub mod stimulus;
