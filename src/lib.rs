@@ -15,4 +15,5 @@ pub mod output;
 pub mod plant;
 pub mod record;
 pub mod report;
+pub mod trace_file;
 pub mod verify;
