@@ -15,5 +15,6 @@ pub mod output;
 pub mod plant;
 pub mod record;
 pub mod report;
+pub mod spectrum;
 pub mod trace_file;
 pub mod verify;
