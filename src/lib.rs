@@ -20,4 +20,6 @@ pub mod plant;
 pub mod record;
 pub mod report;
 pub mod simulation;
+pub mod spectrum;
+pub mod trace_file;
 pub mod verify;
