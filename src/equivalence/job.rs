@@ -2,7 +2,7 @@
 
 use super::outcome::{Emitted, Equivalence, FirstOverflow, LoopReport, NodeReport};
 use super::overflow::{self, Repair};
-use super::predicted::Prediction;
+use super::predicted;
 use super::probe::Seen;
 use super::run;
 use crate::design::Design;
@@ -97,7 +97,7 @@ fn assemble(
     c: Emitted,
     rust: Emitted,
 ) -> Equivalence {
-    let predictions = vec![Prediction::default(); seen.nodes.len()];
+    let predictions = predicted::predict(design, seen);
     let pairs = seen.nodes.iter().zip(&predictions);
     let nodes: Vec<NodeReport> = pairs.map(|(n, p)| NodeReport::new(n, p)).collect();
     let (repairs, verified) = repairs(design, seen, stimulus);
@@ -145,13 +145,18 @@ fn assemble(
         }),
         holds: reasons.is_empty(),
         reasons,
-        notes: notes(design, seen),
+        notes: notes(design, seen, &predictions),
         counterexample: None,
     }
 }
 
-fn notes(design: &Design, seen: &Seen) -> Vec<String> {
+fn notes(design: &Design, seen: &Seen, predictions: &[predicted::Prediction]) -> Vec<String> {
     let mut notes = Vec::new();
+    for (flag, meaning) in predicted::FLAGS {
+        if predictions.iter().any(|p| p.flags.contains(&flag)) {
+            notes.push(format!("{flag}: {meaning}"));
+        }
+    }
     if seen.cut_rows > 0 {
         notes.push(format!(
             "on {} rows the drive phase lies so near half a turn that fixed and float stand on both sides of \

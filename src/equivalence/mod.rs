@@ -5,6 +5,7 @@
 //! ([`run`], [`probe`], [`node`], [`layout`]). [`polar`] bounds the CORDIC, [`loops`] the closed phase loop.
 //! [`overflow`] finds the smallest format that removes the first overflow. [`outcome`] is `equiv.json`.
 
+pub mod activity;
 pub mod job;
 pub mod layout;
 pub mod loops;
@@ -14,4 +15,5 @@ pub mod overflow;
 pub mod polar;
 pub mod predicted;
 pub mod probe;
+pub mod quantisation;
 pub mod run;

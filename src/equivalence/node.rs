@@ -21,6 +21,7 @@ pub struct Identity {
 pub struct Node {
     /// Name, unit, format.
     pub identity: Identity,
+    quarter_lsb: f64,
     /// Samples.
     pub count: u64,
     /// Least raw word.
@@ -51,14 +52,15 @@ pub struct Node {
     pub before: (i128, i128),
     /// Sum of squares of the float value.
     pub sum_value_square: f64,
-    /// Sum of squares of the change from sample to sample, and the last value.
-    pub change: (f64, f64),
+    /// Samples whose float value moved by a quarter of an LSB or more, and the last value.
+    pub moved: (u64, f64),
 }
 
 impl Node {
     /// A node that has seen nothing.
     pub fn new(identity: Identity) -> Self {
         Node {
+            quarter_lsb: 0.25 * crate::numeric::format::pow2(-identity.fraction_bits),
             identity,
             count: 0,
             min_raw: i128::MAX,
@@ -75,7 +77,7 @@ impl Node {
             overflows: 0,
             before: (0, 0),
             sum_value_square: 0.0,
-            change: (0.0, 0.0),
+            moved: (0, 0.0),
         }
     }
 
@@ -106,8 +108,8 @@ impl Node {
             self.first_outside.get_or_insert(sample);
         }
         self.sum_value_square += real * real;
-        let change = real - self.change.1;
-        self.change = (self.change.0 + change * change, real);
+        let moved = (real - self.moved.1).abs() >= self.quarter_lsb;
+        self.moved = (self.moved.0 + u64::from(moved), real);
     }
 
     /// Notes the rounding error of the node's own cast, LSB.
@@ -145,9 +147,9 @@ impl Node {
         self.sum_value_square / self.count.max(1) as f64
     }
 
-    /// Root mean square of the float value's change from sample to sample.
-    pub fn rms_change(&self) -> f64 {
-        (self.change.0 / self.count.max(1) as f64).sqrt()
+    /// Share of samples at which the float value moved by a quarter of an LSB or more.
+    pub fn moving(&self) -> f64 {
+        self.moved.0 as f64 / self.count.max(1) as f64
     }
 
     /// log2 of how many times larger the words could become before the format is left: of the

@@ -1,6 +1,7 @@
 //! Looks on while a chain runs in [`Paired`](crate::numeric::paired::Paired): gives every node its
 //! name, adds up what it does, remembers the first overflow.
 
+use super::activity::Activity;
 use super::loops::PhaseLoopBound;
 use super::node::Node;
 use super::overflow::Event;
@@ -62,6 +63,7 @@ pub struct Probe {
     table_errors: Vec<f64>,
     polar: Polar,
     phase_loop: RefCell<Option<PhaseLoopBound>>,
+    activity: RefCell<Activity>,
     first_overflow: RefCell<Option<Event>>,
     /// Bits that x and y of the CORDIC needed at most.
     needed_width: Cell<u32>,
@@ -120,6 +122,7 @@ impl Probe {
             table_errors: table_errors(chain),
             polar: Polar::new(design),
             phase_loop: RefCell::new(PhaseLoopBound::new(design)),
+            activity: RefCell::new(Activity::default()),
             first_overflow: RefCell::new(None),
             needed_width: Cell::new(0),
             cut_rows: Cell::new(0),
@@ -165,6 +168,7 @@ impl Probe {
         Seen {
             places: self.places,
             nodes: self.nodes.into_inner(),
+            activity: self.activity.into_inner(),
             first_overflow: self.first_overflow.into_inner(),
             needed_width: self.needed_width.get(),
             cut_rows: self.cut_rows.get(),
@@ -206,6 +210,8 @@ pub struct Seen {
     pub places: Places,
     /// In the order of the circuit's steps.
     pub nodes: Vec<Node>,
+    /// What the signals were like.
+    pub activity: Activity,
     /// The first overflow in the order of the steps.
     pub first_overflow: Option<Event>,
     /// Bits that x and y of the CORDIC needed where they overflowed; 0 = they did not.
@@ -239,6 +245,13 @@ impl Watch for Probe {
             if output.bound + output.phase_bound > known {
                 (output.bound, output.phase_bound) = (known, 0.0);
             }
+        }
+        let channel = place.wrapping_sub(self.places.product);
+        if let (0..4, [code, entry, ..]) = (channel, operands) {
+            let mut activity = self.activity.borrow_mut();
+            activity.product(channel, output.real, code.raw.wide(), entry.raw.wide());
+        } else if channel < 8 {
+            self.activity.borrow_mut().output(channel - 4, output.real);
         }
         let mut nodes = self.nodes.borrow_mut();
         let Some(node) = nodes.get_mut(place) else {
@@ -306,6 +319,8 @@ impl Watch for Probe {
             let measured = bound.row(&phase, outcome.length - own, self.sample.get());
             phase.phase_bound = phase.phase_bound.min((measured - phase.bound).max(0.0));
         }
+        let length = outcome.magnitude.real;
+        self.activity.borrow_mut().vector(phase.real, length);
         if (phase.value() - phase.real).abs() > 0.5 {
             self.cut_rows.set(self.cut_rows.get() + 1);
         }
