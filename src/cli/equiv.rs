@@ -60,7 +60,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     super::make_folder(&arguments.out)?;
     crate::output::write_whole(&arguments.out.join("equiv.json"), json.as_bytes())?;
     match arguments.format {
-        OutputFormat::Json => print!("{json}"),
+        OutputFormat::Json => say!("{}", json.trim_end()),
         OutputFormat::Text => print(&result),
     }
     if result.holds {
@@ -146,31 +146,34 @@ fn print(e: &Equivalence) {
     for column in table.column_iter_mut().skip(1).take(7) {
         column.set_cell_alignment(comfy_table::CellAlignment::Right);
     }
-    println!("{table}");
-    println!("{} ADC samples, {} rows: {}", e.samples, e.rows, e.stimulus);
+    say!("{table}");
+    say!("{} ADC samples, {} rows: {}", e.samples, e.rows, e.stimulus);
     for (emitted, language) in [(&e.model_vs_c, "C"), (&e.model_vs_rust, "Rust")] {
-        println!(
+        say!(
             "emitted {language}: {} words compared with the model, {} mismatches",
-            emitted.compared, emitted.mismatches
+            emitted.compared,
+            emitted.mismatches
         );
     }
     if let Some(first) = &e.first_overflow {
-        println!("{}", first.sentence());
-        println!("  path: {}", first.path.join(" > "));
+        say!("{}", first.sentence());
+        say!("  path: {}", first.path.join(" > "));
         for repair in &e.repairs {
-            println!(
+            say!(
                 "  repair: {} = {} (was {})",
-                repair.key, repair.to, repair.from
+                repair.key,
+                repair.to,
+                repair.from
             );
         }
         if e.repair_verified == Some(true) {
-            println!("  with that, run again: nothing overflows");
+            say!("  with that, run again: nothing overflows");
         }
     }
     for note in &e.notes {
-        println!("note: {note}");
+        say!("note: {note}");
     }
-    println!("{}", if e.holds { "holds" } else { "does not hold" });
+    say!("{}", if e.holds { "holds" } else { "does not hold" });
 }
 
 fn row(n: &NodeReport) -> Vec<String> {

@@ -3,6 +3,15 @@
 //! Results go to stdout or to files, talk to stderr. Exit status 0 = done and every check holds,
 //! 1 = a check does not hold, 2 = the input cannot be used (`docs/manual.md`).
 
+/// A line on stdout. A reader that has gone away (`| head`) is no reason to stop: what is written to files
+/// is.
+macro_rules! say {
+    ($($words:tt)*) => {{
+        use std::io::Write as _;
+        _ = writeln!(std::io::stdout(), $($words)*);
+    }};
+}
+
 mod emit;
 mod equiv;
 mod init;

@@ -56,7 +56,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     crate::output::write_whole(&out.join("report.html"), html.as_bytes())?;
     crate::output::write_whole(&out.join("summary.json"), json.as_bytes())?;
     match arguments.format {
-        OutputFormat::Json => print!("{json}"),
+        OutputFormat::Json => say!("{}", json.trim_end()),
         OutputFormat::Text => print(&outcome, out),
     }
     for warning in &outcome.summary.warnings {
@@ -73,7 +73,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 
 fn print(outcome: &Outcome, out: &std::path::Path) {
     let s = &outcome.summary;
-    println!("{}", super::comparison_table(&s.equivalence.functions));
+    say!("{}", super::comparison_table(&s.equivalence.functions));
     let mut table = super::table(&[
         "rate output at rest",
         "drift pp, deg/s",
@@ -100,8 +100,8 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
     for column in table.column_iter_mut().skip(1) {
         column.set_cell_alignment(comfy_table::CellAlignment::Right);
     }
-    println!("{table}");
-    println!(
+    say!("{table}");
+    say!(
         "fit: order {} in {}, {}; held-out rms {:.4} deg/s (noise floor {:.4})",
         s.fit.order,
         s.fit.thermometer,
@@ -110,20 +110,24 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
         s.fit.noise_floor_rms_dps
     );
     for chosen in &s.chosen {
-        println!("chosen: {chosen}");
+        say!("chosen: {chosen}");
     }
-    println!(
+    say!(
         "budget: firmware within {:.5} deg/s of the fitted polynomial (bound); \
          calibration and fit {:.4} deg/s (estimate)",
-        s.budget.bound_dps, s.budget.estimate_dps
+        s.budget.bound_dps,
+        s.budget.estimate_dps
     );
-    println!(
+    say!(
         "outside {:.6} .. {:.6} {} the compensation's input is clamped",
-        s.fit.range.0, s.fit.range.1, s.fit.unit
+        s.fit.range.0,
+        s.fit.range.1,
+        s.fit.unit
     );
-    println!(
+    say!(
         "model against emitted C and Rust: {} words compared, {} mismatches",
-        s.equivalence.compared, s.equivalence.mismatches
+        s.equivalence.compared,
+        s.equivalence.mismatches
     );
-    println!("wrote {} ({:.1} s)", out.display(), s.seconds);
+    say!("wrote {} ({:.1} s)", out.display(), s.seconds);
 }

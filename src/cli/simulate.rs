@@ -57,7 +57,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let html = crate::report::simulation::html(&outcome)?;
     write(&outcome, &arguments.out, &json, &html)?;
     match arguments.format {
-        OutputFormat::Json => print!("{json}"),
+        OutputFormat::Json => say!("{}", json.trim_end()),
         OutputFormat::Text => print(&outcome, &arguments.out),
     }
     for warning in &outcome.summary.warnings {
@@ -128,7 +128,7 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
                 if f.agrees { "agrees" } else { "differs" }.to_owned(),
             ]);
         }
-        println!("{table}");
+        say!("{table}");
     }
     let mut table = super::table(&["rate output", "drift pp, deg/s", "rms, deg/s", "of before"]);
     let mut rows = |name: &str, both: &Both| {
@@ -152,18 +152,18 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
     for column in table.column_iter_mut().skip(1) {
         column.set_cell_alignment(comfy_table::CellAlignment::Right);
     }
-    println!("{table}");
+    say!("{table}");
     if !s.loops.is_empty() {
-        println!("{}", loops(outcome));
+        say!("{}", loops(outcome));
     }
     print_sentences(outcome);
-    println!("wrote {} ({:.1} s)", out.display(), s.seconds);
+    say!("wrote {} ({:.1} s)", out.display(), s.seconds);
 }
 
 fn print_sentences(outcome: &Outcome) {
     let s = &outcome.summary;
     let a = &s.float_fixed;
-    println!(
+    say!(
         "{} readings, drive at {}; float and fixed are at most {:.2e} rad, {:.2e} Hz, {:.2e} deg/s (uncompensated) apart",
         s.readings,
         s.drive.replace('_', " "),
@@ -172,7 +172,7 @@ fn print_sentences(outcome: &Outcome) {
         a.rate_out_dps
     );
     if let Some(lock) = &s.lock {
-        println!(
+        say!(
             "phase loop: {}, mean phase within {:.2e} rad of the setpoint, frequency within {:.2e} Hz of the resonance, {:.2} ppm/K",
             if lock.locked {
                 "locked everywhere"
@@ -186,7 +186,7 @@ fn print_sentences(outcome: &Outcome) {
     }
     let time = |t: Option<f64>| t.map_or("not seen".to_owned(), |t| format!("{:.0} ms", 1e3 * t));
     let up = &s.startup;
-    println!(
+    say!(
         "power-on at {} degC: amplitude within 1 % after {}, phase within 0.1 deg after {}{}",
         up.chamber_degc,
         time(up.amplitude_s),

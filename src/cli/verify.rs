@@ -39,7 +39,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     super::make_folder(folder)?;
     crate::output::write_whole(&folder.join("verify.json"), json.as_bytes())?;
     match arguments.format {
-        OutputFormat::Json => print!("{json}"),
+        OutputFormat::Json => say!("{}", json.trim_end()),
         OutputFormat::Text => print(&verification),
     }
     if verification.holds {
@@ -49,14 +49,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 }
 
 fn print(v: &Verification) {
-    println!("{}", super::comparison_table(&v.functions));
+    say!("{}", super::comparison_table(&v.functions));
     let selftest = match v.selftest {
         Some(true) => "pass",
         Some(false) => "FAIL",
         None => "none in a bundle of tables alone; its files were compared with the manifest",
     };
-    println!("self-test: {selftest}");
-    println!("toolchain: {}", v.toolchain);
+    say!("self-test: {selftest}");
+    say!("toolchain: {}", v.toolchain);
 }
 
 fn reasons(v: &Verification) -> Vec<String> {

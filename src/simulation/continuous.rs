@@ -97,7 +97,8 @@ fn one_path(
         let mut middle = moment;
         for k in 0..rows_per_record {
             if row.is_multiple_of(every) {
-                moment = world.advance_to(row as f64 / rate);
+                // What it is in the middle of the time that it stands for.
+                moment = world.advance_to((row + every / 2) as f64 / rate);
                 path.gyroscope.set(moment.conditions);
             }
             if k == rows_per_record / 2 {
