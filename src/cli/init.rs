@@ -17,7 +17,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<()> {
     let text = crate::design::template::DEFAULT;
     let Some(path) = &arguments.file else {
-        print!("{text}");
+        say!("{}", text.trim_end());
         return Ok(());
     };
     if path.symlink_metadata().is_ok() {
