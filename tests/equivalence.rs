@@ -7,8 +7,10 @@ mod oracle;
 use gyrogen::circuit::engine::{self, ArithmeticKind, Rows};
 use gyrogen::design::{Design, reader};
 use gyrogen::equivalence::job::{Stimulus, repairs};
+use gyrogen::equivalence::predicted::predict;
 use gyrogen::equivalence::run::{run, run_with_rows};
-use gyrogen::numeric::format::Overflow;
+use gyrogen::equivalence::stimulus::operating;
+use gyrogen::numeric::format::{Format, Overflow, Rounding};
 use oracle::generate::{self, Aim};
 use oracle::harness::setting;
 use oracle::rng::Rng;
@@ -146,4 +148,90 @@ fn the_smallest_repair_is_enough_and_one_bit_less_is_not() {
     }
     println!("{repaired} repaired");
     assert!(repaired > 20, "{repaired}");
+}
+
+/// The default design with other word lengths, oscillator and decimator.
+fn sensible_design(seed: u64) -> Design {
+    let mut rng = Rng::new(seed);
+    let mut design = reader::read(None).expect("the default");
+    let c = &mut design.circuit;
+    c.adc.format = Format::q(1, rng.range(9, 19) as u32);
+    c.nco.table_address_bits = rng.range(6, 14) as u32;
+    c.nco.address_rounding = rng.pick(&[Rounding::Floor, Rounding::HalfUp]);
+    c.nco.table = Format::q(1, rng.range(9, 22) as u32);
+    c.nco.tuning_word = match rng.range(0, 3) {
+        0 => 1 << rng.range(25, 29),
+        1 => (1 << 27) + rng.range(1, 1000),
+        _ => ((1i64 << 32) as f64 / (5.0 + 60.0 * rng.unit())) as i64,
+    };
+    let exact = (c.adc.format.fraction_bits + c.nco.table.fraction_bits) as i64;
+    let product = exact - rng.range(-1, 12);
+    c.demodulator.product.format = Format::q(2, product as u32);
+    c.demodulator.product.rounding = rng.pick(&Rounding::ALL);
+    c.decimator.stages = rng.range(1, 4) as u32;
+    c.decimator.ratio = rng.range(8, 90) as u32;
+    c.decimator.differential_delay = rng.range(1, 2) as u32;
+    let output = (product + rng.range(-8, 5)).clamp(8, 30);
+    c.decimator.output.format = Format::q(2, output as u32);
+    c.decimator.output.rounding = rng.pick(&Rounding::ALL);
+    c.cordic.iterations = rng.range(8, 24) as u32;
+    c.cordic.guard_bits = rng.range(0, 8) as u32;
+    c.cordic.width = 2 + output as u32 + c.cordic.guard_bits + 2;
+    c.cordic.angle_bits = rng.range(12, 32) as u32;
+    if let Some(comp) = &mut design.compensation {
+        comp.accumulator.format = Format::q(14, rng.range(20, 30) as u32);
+        comp.accumulator.rounding = rng.pick(&Rounding::ALL);
+        comp.output.format = Format::q(13, rng.range(2, 16) as u32);
+        comp.output.rounding = rng.pick(&Rounding::ALL);
+    }
+    design
+}
+
+/// Predicted and observed rms within 10 % on every node that no flag excuses.
+#[test]
+fn the_predicted_rms_is_the_observed_one_where_its_conditions_hold() {
+    let first: u64 = setting("GYROGEN_SEED", 7);
+    let designs: u64 = setting("GYROGEN_EQUIV_DESIGNS", 24);
+    let mut failures = Vec::new();
+    let (mut predicted, mut all, mut locals) = (0, 0, 0);
+    for seed in first..first + designs {
+        let design = sensible_design(seed);
+        let (drive, sense) = operating(&design, 400_000);
+        let seen = run(&design, &drive, &sense);
+        let predictions = predict(&design, &seen);
+        for (node, p) in seen.nodes.iter().zip(&predictions) {
+            all += 1;
+            let name = &node.identity.name;
+            assert_eq!(node.outside, 0, "seed {seed}: {name} {:?}", node.worst);
+            if let Some(rms) = p.rms {
+                predicted += 1;
+                let observed = node.rms_error();
+                let off = (rms / observed - 1.0).abs();
+                // Both exact, but for the float's own rounding.
+                let nothing = observed.max(rms) < 1e-13 * node.mean_square_value().sqrt();
+                if !nothing && !(off <= 0.1) {
+                    failures.push(format!(
+                        "seed {seed}: {name}: predicted {rms:.4e}, observed {observed:.4e} ({:.2}) flags {:?}",
+                        rms / observed, p.flags
+                    ));
+                }
+            }
+            if let (Some(rms), Some(observed)) = (p.local_rms_lsb, node.local_rms_lsb()) {
+                locals += 1;
+                if !((rms / observed - 1.0).abs() <= 0.1) {
+                    failures.push(format!(
+                        "seed {seed}: {name}: local predicted {rms:.4}, observed {observed:.4}"
+                    ));
+                }
+            }
+        }
+    }
+    println!("{predicted} of {all} nodes predicted, {locals} roundings");
+    assert!(
+        failures.is_empty(),
+        "{} of {predicted}\n{}",
+        failures.len(),
+        failures.join("\n")
+    );
+    assert!(predicted > all / 4);
 }

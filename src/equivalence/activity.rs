@@ -1,10 +1,46 @@
 //! What the theory of quantisation needs to know of a run: second moments of the signals, no error.
 
 /// Bins of the drive phase.
-pub const PHASE_BINS: usize = 256;
+pub const PHASE_BINS: usize = 4096;
 
-/// Bits of the sketch that counts different words.
-const SKETCH_BITS: usize = 1 << 16;
+/// 2^64 divided by the golden ratio: spreads words over a sketch (Knuth).
+const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
+
+/// Counts different words, about (linear counting: Whang et al. 1990).
+#[derive(Debug, Clone)]
+pub struct Sketch {
+    marks: Vec<u64>,
+}
+
+impl Sketch {
+    /// A sketch that counts up to some times `bits`, a power of two from 64 on.
+    pub fn new(bits: usize) -> Self {
+        Sketch {
+            marks: vec![0; bits / 64],
+        }
+    }
+
+    /// Sees a word.
+    #[inline(always)]
+    pub fn mark(&mut self, word: u64) {
+        let mixed = (word ^ (word >> 29))
+            .wrapping_mul(0xd6e8_feb8_6659_fd93)
+            .wrapping_mul(GOLDEN)
+            >> 32;
+        let bit = mixed as usize & (self.marks.len() * 64 - 1);
+        if let Some(marks) = self.marks.get_mut(bit / 64) {
+            *marks |= 1 << (bit % 64);
+        }
+    }
+
+    /// How many different words there were, about.
+    pub fn count(&self) -> f64 {
+        let all = self.marks.len() as f64 * 64.0;
+        let set: u32 = self.marks.iter().map(|w| w.count_ones()).sum();
+        let empty = (all - f64::from(set)).max(1.0);
+        -all * (empty / all).ln()
+    }
+}
 
 /// Sums over one run.
 #[derive(Debug, Clone)]
@@ -14,8 +50,8 @@ pub struct Activity {
     /// The same behind it.
     pub output_cross: [f64; 2],
     last: f64,
-    /// Marks of (code, entry) pairs, of drive and sense.
-    sketch: [Vec<u64>; 2],
+    /// (code, entry), of drive and sense.
+    pub pairs: [Sketch; 2],
     /// Rows by drive phase.
     pub phase_rows: Vec<u64>,
     /// Sum of 1 / length^2 of the drive vector over rows.
@@ -30,7 +66,7 @@ impl Default for Activity {
             product_cross: [0.0; 2],
             output_cross: [0.0; 2],
             last: 0.0,
-            sketch: [vec![0; SKETCH_BITS / 64], vec![0; SKETCH_BITS / 64]],
+            pairs: [Sketch::new(1 << 16), Sketch::new(1 << 16)],
             phase_rows: vec![0; PHASE_BINS],
             inverse_square: 0.0,
             rows: 0,
@@ -45,14 +81,11 @@ impl Activity {
         let pair = channel / 2;
         if channel.is_multiple_of(2) {
             self.last = real;
-            let mixed = (code as u64)
-                .wrapping_mul(0x9e37_79b9_7f4a_7c15)
-                .wrapping_add(entry as u64)
-                .wrapping_mul(0xd6e8_feb8_6659_fd93);
-            let bit = (mixed >> 48) as usize;
-            if let Some(word) = self.sketch[pair].get_mut(bit / 64) {
-                *word |= 1 << (bit % 64);
-            }
+            self.pairs[pair].mark(
+                (code as u64)
+                    .wrapping_mul(GOLDEN)
+                    .wrapping_add(entry as u64),
+            );
         } else {
             self.product_cross[pair] += self.last * real;
         }
@@ -80,20 +113,5 @@ impl Activity {
         {
             *rows += 1;
         }
-    }
-
-    /// How many different pairs of code and entry drive (0) or sense (1) had, about, up to some
-    /// hundred thousand (linear counting: Whang et al. 1990).
-    pub fn different_words(&self, pair: usize) -> f64 {
-        let set: u32 = self
-            .sketch
-            .get(pair)
-            .into_iter()
-            .flatten()
-            .map(|w| w.count_ones())
-            .sum();
-        let all = SKETCH_BITS as f64;
-        let empty = (all - f64::from(set)).max(1.0);
-        -all * (empty / all).ln()
     }
 }

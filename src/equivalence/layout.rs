@@ -4,7 +4,7 @@ use super::node::Identity;
 use super::probe::Places;
 use crate::circuit::CHANNELS;
 use crate::design::Design;
-use crate::numeric::format::{Format, Overflow, Quantizer};
+use crate::numeric::format::{Format, Overflow, Quantizer, pow2};
 
 /// Identities and where they are.
 #[derive(Debug, Clone)]
@@ -33,6 +33,7 @@ impl Layout {
             unit,
             fraction_bits,
             limits,
+            step: 0.25 * pow2(-fraction_bits),
         });
     }
 
@@ -76,6 +77,11 @@ impl Layout {
             angle as i32,
             signed(angle),
         );
+        if let Some(phase) = self.identities.last_mut() {
+            // The CORDIC leaves an angle of up to atan(2^-(n-1)), which is mostly more than an LSB.
+            let left = pow2(1 - circuit.cordic.iterations as i32) / std::f64::consts::TAU;
+            phase.step = phase.step.max(0.25 * left);
+        }
         let f = circuit.decimator.output.format.fraction_bits as i32;
         // What x can hold without wrapping, in the output's LSB.
         let width = (circuit.cordic.width as i32 - circuit.cordic.guard_bits as i32).max(1);

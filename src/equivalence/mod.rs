@@ -6,6 +6,8 @@
 //! [`overflow`] finds the smallest format that removes the first overflow. [`outcome`] is `equiv.json`.
 
 pub mod activity;
+mod cordic_noise;
+mod horner;
 pub mod job;
 pub mod layout;
 pub mod loops;

@@ -1,5 +1,6 @@
 //! What is known of one node after a run: its range, its errors, its bound.
 
+use super::activity::Sketch;
 use crate::numeric::lane::Lane;
 use crate::numeric::paired::Pair;
 
@@ -14,6 +15,8 @@ pub struct Identity {
     pub fraction_bits: i32,
     /// The raw words that it can hold.
     pub limits: (i128, i128),
+    /// A change of the value by less than this is no movement: a quarter of what is rounded there.
+    pub step: f64,
 }
 
 /// Sums over all samples of a node.
@@ -21,7 +24,8 @@ pub struct Identity {
 pub struct Node {
     /// Name, unit, format.
     pub identity: Identity,
-    quarter_lsb: f64,
+    /// Different words that went in.
+    pub different: Sketch,
     /// Samples.
     pub count: u64,
     /// Least raw word.
@@ -60,8 +64,8 @@ impl Node {
     /// A node that has seen nothing.
     pub fn new(identity: Identity) -> Self {
         Node {
-            quarter_lsb: 0.25 * crate::numeric::format::pow2(-identity.fraction_bits),
             identity,
+            different: Sketch::new(1 << 14),
             count: 0,
             min_raw: i128::MAX,
             max_raw: i128::MIN,
@@ -108,7 +112,7 @@ impl Node {
             self.first_outside.get_or_insert(sample);
         }
         self.sum_value_square += real * real;
-        let moved = (real - self.moved.1).abs() >= self.quarter_lsb;
+        let moved = (real - self.moved.1).abs() >= self.identity.step;
         self.moved = (self.moved.0 + u64::from(moved), real);
     }
 
@@ -145,6 +149,12 @@ impl Node {
     /// Mean square of the float value.
     pub fn mean_square_value(&self) -> f64 {
         self.sum_value_square / self.count.max(1) as f64
+    }
+
+    /// True if the float value moves by a quarter of an LSB or more at a share of all samples, and the node's input takes
+    /// at least so many different words.
+    pub fn is_active(&self, share: f64, words: f64) -> bool {
+        self.moving() >= share && self.different.count() >= words
     }
 
     /// Share of samples at which the float value moved by a quarter of an LSB or more.

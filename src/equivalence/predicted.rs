@@ -16,11 +16,12 @@
 //! A condition that does not hold is a flag, and the figure is left out:
 
 use super::activity::{Activity, PHASE_BINS};
+use super::cordic_noise::BlockNoise;
+use super::horner::Horner;
 use super::node::Node;
 use super::probe::Seen;
 use super::quantisation::{FEW_PHASES, Moments, Spread, TableErrors, cic_noise_gain, spread};
-use crate::design::{Compensation, CompensationInput, Design};
-use crate::numeric::constants;
+use crate::design::{CompensationInput, Design};
 use crate::numeric::format::pow2;
 use std::f64::consts::TAU;
 
@@ -113,14 +114,16 @@ struct Channel {
     mean: f64,
     /// Mean square of the part that follows the signal.
     following: f64,
+    /// Of the white part, what may not be white.
+    doubtful: f64,
     flags: Vec<&'static str>,
 }
 
 /// The phase error by bins of the phase.
 #[derive(Debug, Clone, Default)]
 struct PhaseError {
-    /// Mean square, turns^2, by bin.
-    square: Vec<f64>,
+    /// Turns, by bin.
+    bins: Vec<Moments>,
     /// Mean square of the part that follows the signal, turns^2.
     following: f64,
     flags: Vec<&'static str>,
@@ -213,8 +216,10 @@ impl<'a> Theory<'a> {
     }
 
     fn rounding_is_spread(&self, channel: usize) -> bool {
-        self.product_rounding(channel).square == 0.0
-            || self.activity.different_words(channel / 2) >= ENOUGH_WORDS
+        // A peak entry is 2^m - 1: its products repeat the code's bits. One entry of P / 2 is a peak.
+        let structured = matches!(self.spread, Spread::Coherent(period) if period < 32);
+        let many = self.activity.pairs[channel / 2].count() >= ENOUGH_WORDS;
+        self.product_rounding(channel).square == 0.0 || many && !structured
     }
 
     fn fast(&self, all: &mut [Prediction]) {
@@ -281,10 +286,18 @@ impl<'a> Theory<'a> {
         } else {
             (carried - following / (self.gain * self.gain)).max(0.0)
         };
-        let doubtful = beside * self.noise_gain;
-        let white = rounding.variance() * product_lsb * product_lsb * self.noise_gain
-            + own.variance() * own_lsb * own_lsb
-            + doubtful;
+        let product_noise = rounding.variance() * product_lsb * product_lsb;
+        let rounded = product_noise * self.noise_gain;
+        // A line may lie where the decimator passes it whole; noise times the table error is white.
+        let pass = self.gain * self.gain;
+        let mut doubtful = (beside - noise).max(0.0) * pass;
+        if let Spread::Coherent(period) = self.spread
+            && period <= FEW_PHASES
+        {
+            // Equal codes round equally: part of that noise is in as many lines, and one of them is passed.
+            doubtful += product_noise * self.noise_gain.max(2.0 * pass / period as f64);
+        }
+        let white = rounded + own.variance() * own_lsb * own_lsb + beside * self.noise_gain;
         let mean = rounding.mean * product_lsb * self.gain + own.mean * own_lsb;
 
         let mut flags = self.nco_flags();
@@ -294,7 +307,9 @@ impl<'a> Theory<'a> {
         if doubtful > DOUBTFUL * (white + following + mean * mean) {
             flags.push("carrier_lines");
         }
-        let moving = self.node(at).is_some_and(|n| n.moving() >= MOVING);
+        let moving = self
+            .node(at)
+            .is_some_and(|n| n.is_active(MOVING, ENOUGH_WORDS));
         if own.square > 0.0 && !moving {
             flags.push("idle_input");
         }
@@ -304,18 +319,18 @@ impl<'a> Theory<'a> {
         if let Some(p) = all.get_mut(at) {
             p.local_rms_lsb = (own.square > 0.0 && moving).then(|| own.square.sqrt());
         }
-        flags.retain(|f| *f != "coherent_nco");
+        // What is doubtful here may weigh less, or more, where the errors meet.
+        flags.retain(|f| *f != "coherent_nco" && *f != "carrier_lines");
         Channel {
             white,
             mean,
             following,
+            doubtful,
             flags,
         }
     }
 
     fn cordic(&self, all: &mut [Prediction], inputs: &[Channel; 4]) -> PhaseError {
-        let circuit = &self.design.circuit;
-        let cordic = &circuit.cordic;
         let at = self.seen.places.phase;
         let [i, q, ..] = inputs;
         let rows = self.activity.rows.max(1) as f64;
@@ -327,64 +342,52 @@ impl<'a> Theory<'a> {
         if !(inverse_square * square_length < 1.1) || i.white * inverse_square > 0.01 {
             flags.push("weak_vector");
         }
-        let n = f64::from(cordic.iterations - 1);
-        let last_rad = pow2(-(cordic.iterations as i32 - 1)).atan();
-        let lsb = circuit.decimator.output.format.lsb();
-        let fine = lsb * pow2(-(cordic.guard_bits as i32));
-        // The vector is on the average 1.6 times as long while it is turned.
-        let floors = n / 3.0 * fine * fine / (1.6 * 1.6);
-        let angles = constants::arc_tangents(cordic.iterations, cordic.angle_bits);
-        let turn = pow2(-(cordic.angle_bits as i32));
-        let table: f64 = angles
-            .iter()
-            .zip(0..)
-            .map(|(raw, k)| (*raw as f64 * turn - pow2(-k).atan() / TAU).powi(2))
-            .sum();
-        let own = (last_rad / TAU).powi(2) / 3.0 + table + floors * inverse_square / (TAU * TAU);
-        let steady = self.node(at).is_none_or(|node| {
-            let needed = (last_rad / TAU / turn).max(1.0) * 0.25;
-            needed > 1.0 && node.moving() < MOVING || node.moving() < MOVING
-        });
-        if steady {
-            flags.push("idle_input");
-        }
-
+        let block = BlockNoise::new(self.design, inverse_square.sqrt());
         let [a_s, b_s] = self.table.synchronous[0].map(|c| c / self.table.amplitude);
         let [a_c, b_c] = self.table.synchronous[1].map(|c| c / self.table.amplitude);
         let inverse = inverse_square.sqrt();
         let mut error = PhaseError {
-            square: vec![0.0; PHASE_BINS],
+            bins: vec![Moments::default(); PHASE_BINS],
             ..PhaseError::default()
         };
         let (mut phase, mut along) = (0.0, 0.0);
+        let (mut across_doubt, mut along_doubt) = (0.0, 0.0);
         for (k, share) in self.bins() {
             let (sin, cos) = (bin_turns(k) * TAU).sin_cos();
             let (e_i, e_q) = (cos * a_s + sin * b_s, cos * a_c + sin * b_c);
             let mean_across = (cos * q.mean - sin * i.mean) * inverse;
             let across = cos * e_q - sin * e_i + mean_across;
             let white = cos * cos * q.white + sin * sin * i.white;
-            let square = (across * across + white * inverse_square) / (TAU * TAU) + own;
-            if let Some(bin) = error.square.get_mut(k) {
-                *bin = square;
+            let square = (across * across + white * inverse_square) / (TAU * TAU) + block.phase();
+            if let Some(bin) = error.bins.get_mut(k) {
+                *bin = Moments {
+                    mean: across / TAU,
+                    square,
+                };
             }
             phase += share * square;
             error.following += share * across * across / (TAU * TAU);
+            across_doubt += share * (cos * cos * q.doubtful + sin * sin * i.doubtful);
+            along_doubt += share * (cos * cos * i.doubtful + sin * sin * q.doubtful);
             let length = square_length.sqrt();
             let shift = (cos * e_i + sin * e_q) * length + cos * i.mean + sin * q.mean;
             along += share * (shift * shift + cos * cos * i.white + sin * sin * q.white);
         }
+        let mut magnitude_flags = flags.clone();
+        // The angle left, and the table's roundings, are spread only if the phase moves by as much.
+        let moves = self.node(at).is_some_and(|n| n.moving() >= MOVING);
+        if !moves && block.angle > DOUBTFUL * phase {
+            flags.push("idle_input");
+        }
+        if across_doubt * inverse_square / (TAU * TAU) > DOUBTFUL * phase {
+            flags.push("carrier_lines");
+        }
         set(all, at, Some(phase.sqrt()), &flags);
-        let gain: f64 = (0..cordic.iterations as i32)
-            .map(|k| (1.0 + pow2(-2 * k)).sqrt())
-            .product();
-        let constant = constants::cordic_gain(cordic.iterations, cordic.gain_bits) as f64
-            * pow2(-(cordic.gain_bits as i32));
-        let scale = constant * gain - 1.0;
-        let magnitude = along
-            + scale * scale * square_length
-            + n / 3.0 * (fine / gain).powi(2)
-            + lsb * lsb / 12.0;
-        set(all, at + 1, Some(magnitude.sqrt()), &flags);
+        let magnitude = along + block.magnitude(square_length);
+        if along_doubt > DOUBTFUL * magnitude {
+            magnitude_flags.push("carrier_lines");
+        }
+        set(all, at + 1, Some(magnitude.sqrt()), &magnitude_flags);
         error.flags = flags;
         error
     }
@@ -415,8 +418,12 @@ impl<'a> Theory<'a> {
         let mut idle = false;
         for (k, share) in self.bins() {
             let p = horner.variable(bin_turns(k));
-            let square = phase.square.get(k).copied().unwrap_or(0.0);
-            let errors = horner.mean_squares(p, 4.0 * square);
+            let turns = phase.bins.get(k).copied().unwrap_or_default();
+            let half_turns = Moments {
+                mean: 2.0 * turns.mean,
+                square: 4.0 * turns.square,
+            };
+            let errors = horner.mean_squares(p, half_turns);
             for (sum, e) in sums.iter_mut().zip(&errors) {
                 *sum += share * e;
             }
@@ -424,7 +431,9 @@ impl<'a> Theory<'a> {
             following += share * slope * slope * 4.0 * phase.following;
         }
         for k in 0..2 * steps {
-            let moving = self.node(first + k).is_some_and(|n| n.moving() >= MOVING);
+            let moving = self
+                .node(first + k)
+                .is_some_and(|n| n.is_active(MOVING, ENOUGH_WORDS));
             idle |= !moving;
             set(all, first + k, sums.get(k).map(|s| s.sqrt()), &flags);
             let step = all
@@ -434,7 +443,9 @@ impl<'a> Theory<'a> {
                 p.local_rms_lsb = Some(horner.rounding(k / 2).square.sqrt()).filter(|r| *r > 0.0);
             }
         }
-        let bias_moves = self.node(bias).is_some_and(|n| n.moving() >= MOVING);
+        let bias_moves = self
+            .node(bias)
+            .is_some_and(|n| n.is_active(MOVING, ENOUGH_WORDS));
         if idle || !bias_moves {
             flags.push("idle_input");
         }
@@ -467,15 +478,21 @@ impl<'a> Theory<'a> {
             from - c.output.format.fraction_bits as i32,
         );
         let lsb = c.output.format.lsb();
-        let moves = self.node(bias + 1).is_some_and(|n| n.moving() >= MOVING);
+        let moves = self
+            .node(bias + 1)
+            .is_some_and(|n| n.is_active(MOVING, ENOUGH_WORDS));
         let mut input_flags = sense.flags.clone();
         if own.square > 0.0 && !moves {
             input_flags.push("idle_input");
         }
         let mean = sense.mean * scale + own.mean * lsb;
         let following = sense.following * scale * scale;
+        let doubtful = sense.doubtful * scale * scale;
         let square =
             sense.white * scale * scale + following + mean * mean + own.variance() * lsb * lsb;
+        if doubtful > DOUBTFUL * square {
+            input_flags.push("carrier_lines");
+        }
         set(all, bias + 1, Some(square.sqrt()), &input_flags);
         if let Some(p) = all.get_mut(bias + 1) {
             p.local_rms_lsb = (own.square > 0.0 && moves).then(|| own.square.sqrt());
@@ -524,104 +541,4 @@ impl<'a> Theory<'a> {
 /// The middle of a phase bin, turns.
 fn bin_turns(bin: usize) -> f64 {
     (bin as f64 + 0.5) / PHASE_BINS as f64 - 0.5
-}
-
-/// The polynomial with its casts.
-struct Horner {
-    /// Lowest order first, deg/s.
-    coefficients: Vec<f64>,
-    clamp: Option<(f64, f64)>,
-    accumulator_lsb: f64,
-    first: Moments,
-    inner: Moments,
-    output: Moments,
-    output_lsb: f64,
-}
-
-impl Horner {
-    fn new(design: &Design, c: &Compensation) -> Self {
-        let p_bits = design.circuit.cordic.angle_bits as i32 - 1;
-        let lsb = c.coefficient_format.lsb();
-        let (coarse, fine) = (
-            c.coefficient_format.fraction_bits as i32,
-            c.accumulator.format.fraction_bits as i32,
-        );
-        let last = if c.coefficients_raw.len() > 1 {
-            fine
-        } else {
-            coarse
-        };
-        let rounding = c.accumulator.rounding;
-        Horner {
-            coefficients: c
-                .coefficients_raw
-                .iter()
-                .map(|raw| *raw as f64 * lsb)
-                .collect(),
-            clamp: c
-                .clamp_raw
-                .map(|(low, high)| (low as f64 * pow2(-p_bits), high as f64 * pow2(-p_bits))),
-            accumulator_lsb: c.accumulator.format.lsb(),
-            first: Moments::of_rounding(rounding, coarse + p_bits - fine),
-            inner: Moments::of_rounding(rounding, p_bits),
-            output: Moments::of_rounding(
-                c.output.rounding,
-                last - c.output.format.fraction_bits as i32,
-            ),
-            output_lsb: c.output.format.lsb(),
-        }
-    }
-
-    /// The polynomial's variable, half turns.
-    fn variable(&self, turns: f64) -> f64 {
-        2.0 * turns
-    }
-
-    fn limited(&self, p: f64) -> (f64, f64) {
-        match self.clamp {
-            Some((low, _)) if p < low => (low, 0.0),
-            Some((_, high)) if p > high => (high, 0.0),
-            _ => (p, 1.0),
-        }
-    }
-
-    /// Rounding of the product of a step, LSB.
-    fn rounding(&self, step: usize) -> Moments {
-        if step == 0 { self.first } else { self.inner }
-    }
-
-    /// The polynomial's derivative.
-    fn slope(&self, p: f64) -> f64 {
-        let (p, factor) = self.limited(p);
-        let (mut t, mut slope) = (0.0, 0.0);
-        for c in self.coefficients.iter().rev() {
-            slope = t + p * slope;
-            t = c + p * t;
-        }
-        slope * factor
-    }
-
-    /// Mean squares of the error after each cast (inner, outer, inner, ...) and of the bias, given that of p.
-    fn mean_squares(&self, p: f64, square: f64) -> Vec<f64> {
-        let (p, factor) = self.limited(p);
-        let mut orders = self.coefficients.iter().rev();
-        let mut t = orders.next().copied().unwrap_or(0.0);
-        // The error of t is slope * e_p plus roundings: variance, mean.
-        let (mut slope, mut variance, mut mean) = (0.0, 0.0, 0.0);
-        let lsb = self.accumulator_lsb;
-        let mut all = Vec::new();
-        for (step, c) in orders.enumerate() {
-            slope = t * factor + p * slope;
-            let own = self.rounding(step);
-            variance = p * p * variance + own.variance() * lsb * lsb;
-            mean = p * mean + own.mean * lsb;
-            t = c + p * t;
-            let of = slope * slope * square + variance + mean * mean;
-            all.extend([of, of]);
-        }
-        variance += self.output.variance() * self.output_lsb * self.output_lsb;
-        mean += self.output.mean * self.output_lsb;
-        all.push(slope * slope * square + variance + mean * mean);
-        all
-    }
 }

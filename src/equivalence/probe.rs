@@ -258,6 +258,7 @@ impl Watch for Probe {
             return output;
         };
         node.note(&output, self.sample.get());
+        node.different.mark(input.raw.wide() as u64);
         if !cast.is_proved() {
             node.note_before(rounded.wide());
         }

@@ -15,8 +15,12 @@ fn design(phase_bits: u32, tuning_word: i64, address_bits: u32, table: Format) -
     nco.tuning_word = tuning_word;
     nco.table_address_bits = address_bits;
     nco.table = table;
+    design.thermal_run.quadrature_dps = QUADRATURE_DPS;
     design
 }
+
+/// Of the gyro whose tone is looked for, deg/s.
+const QUADRATURE_DPS: f64 = 250.0;
 
 const FINE: Format = Format::q(1, 31);
 
@@ -177,7 +181,7 @@ fn a_damaged_entry_shows() {
     // Its sign bit, stuck.
     entries[100] -= 1 << 15;
     damaged.table.entries = entries.into();
-    let of = |o: &Oscillator| spurs_of(o, 56000.0, &d.circuit.decimator, 250.0);
+    let of = |o: &Oscillator| spurs_of(o, 56000.0, &d.circuit.decimator, QUADRATURE_DPS);
     let (good, damaged) = (of(&good), of(&damaged));
     show(&good);
     show(&damaged);
@@ -208,7 +212,7 @@ fn where_the_formula_says_nothing_the_reason_is_given() {
     assert!(reason(i64::MAX / 7, 64).contains("from another line"));
     let s = nco_spurs(&design(32, (1 << 27) + 1, 12, FINE));
     // The tone is in the band of the rate all the same.
-    let expected = 250.0 * 10f64.powf(s.predicted.truncation_dbc().unwrap() / 20.0);
+    let expected = QUADRATURE_DPS * 10f64.powf(s.predicted.truncation_dbc().unwrap() / 20.0);
     assert!((s.quadrature_tone_dps / expected - 1.0).abs() < 1e-3);
 }
 
@@ -229,7 +233,7 @@ fn the_tone_of_the_quadrature_is_that_of_the_spur_through_the_decimator() {
         spur.frequency_hz + s.carrier_hz,
     ]
     .map(gain);
-    let expected = 250.0 * 10f64.powf(spur.level_dbc / 20.0) * below.max(above);
+    let expected = QUADRATURE_DPS * 10f64.powf(spur.level_dbc / 20.0) * below.max(above);
     assert!(expected > 0.0);
     println!("{spur:?} {expected:e} {:e}", s.quadrature_tone_dps);
     assert!((s.quadrature_tone_dps / expected - 1.0).abs() < 1e-3);
@@ -251,7 +255,7 @@ fn decimated(input: impl Fn(usize) -> f64, ratio: usize, rows: usize) -> Vec<f64
 }
 
 /// The tone in the time domain: what is left of the sine without its carrier, times a quadrature of
-/// 250 deg/s, through a decimator of its own.
+/// [`QUADRATURE_DPS`], through a decimator of its own.
 #[test]
 fn the_tone_of_the_quadrature_is_there_in_the_time_domain() {
     let d = design(16, 63 << 8, 7, FINE);
@@ -266,7 +270,7 @@ fn the_tone_of_the_quadrature_is_there_in_the_time_domain() {
     let product = |n: usize| {
         let angle = turn * n as f64;
         let rest = sine[n % period] - p * angle.sin() - q * angle.cos();
-        2.0 * 250.0 * rest / p.hypot(q) * (angle - q.atan2(p)).cos()
+        2.0 * QUADRATURE_DPS * rest / p.hypot(q) * (angle - q.atan2(p)).cos()
     };
     let rows = decimated(product, 32, period);
     let simulated = lines(&rows, Method::WholePeriod).unwrap().largest.amplitude;
