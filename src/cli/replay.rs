@@ -24,10 +24,22 @@ pub struct Arguments {
     arith: Arith,
 }
 
-#[derive(Debug, Clone, Copy, clap::ValueEnum)]
-enum Arith {
+/// Which arithmetic's words are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Arith {
+    /// Bit-accurate, raw words.
     Fixed,
+    /// Without quantisation.
     Float,
+}
+
+impl From<Arith> for ArithmeticKind {
+    fn from(arith: Arith) -> Self {
+        match arith {
+            Arith::Fixed => ArithmeticKind::Fixed,
+            Arith::Float => ArithmeticKind::Float,
+        }
+    }
 }
 
 /// ADC samples that are read, processed and written at a time.
@@ -40,10 +52,7 @@ const BLOCK: usize = 1 << 16;
 /// no file is written then.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let design = super::design(arguments.design.as_deref())?;
-    let kind = match arguments.arith {
-        Arith::Fixed => ArithmeticKind::Fixed,
-        Arith::Float => ArithmeticKind::Float,
-    };
+    let kind = ArithmeticKind::from(arguments.arith);
     let mut capture = CaptureReader::open(&arguments.capture, design.circuit.adc.format)?;
     warn_of_mismatches(&design, &capture);
 

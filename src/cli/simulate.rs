@@ -1,10 +1,12 @@
 //! `gyrogen simulate`: plant and circuit in closed loop, float and fixed.
 
 use super::OutputFormat;
+use super::replay::Arith;
 use crate::error::{Error, Result};
 use crate::simulation::outcome::{Both, Outcome};
+use crate::simulation::trace::Wanted;
 use crate::simulation::{self, Course, Request, record_csv};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
@@ -25,12 +27,48 @@ pub struct Arguments {
     /// Folder for the results; made if it does not exist.
     #[arg(long)]
     out: PathBuf,
+    /// Nodes to trace from power-on, by name or beginning of a name (names as in `equiv`), separated by commas. Default: all.
+    #[arg(long, value_name = "NODE", value_delimiter = ',')]
+    trace: Vec<String>,
+    /// Decimated rows of the trace.
+    #[arg(long, value_name = "N", default_value_t = TRACE_ROWS, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    trace_rows: u64,
+    /// Format of the trace's file.
+    #[arg(long, value_enum, default_value = "vcd")]
+    trace_format: TraceFormat,
+    /// Raw words, or the float model's values.
+    #[arg(long, value_enum, default_value = "fixed")]
+    trace_arith: Arith,
     /// Threads; the results do not depend on it. Default: as many as the machine has.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// How the result is printed.
     #[arg(long, value_enum, default_value = "text")]
     format: OutputFormat,
+}
+
+/// Rows of a trace if nobody says how many.
+const TRACE_ROWS: u64 = 64;
+
+/// Formats of a trace; the variants' names are the file's extensions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum TraceFormat {
+    /// Table.
+    Csv,
+    /// NumPy array.
+    Npy,
+    /// Wave viewer.
+    Vcd,
+}
+
+impl TraceFormat {
+    fn file_name(self) -> &'static str {
+        match self {
+            TraceFormat::Csv => "trace.csv",
+            TraceFormat::Npy => "trace.npy",
+            TraceFormat::Vcd => "trace.vcd",
+        }
+    }
 }
 
 /// Runs the command.
@@ -47,6 +85,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         },
         profile_readings: arguments.readings,
         threads: super::threads(arguments.threads),
+        trace: Wanted {
+            nodes: arguments.trace.clone(),
+            rows: arguments.trace_rows as usize,
+            arithmetic: arguments.trace_arith.into(),
+        },
         command: command(arguments),
     };
     let bar = Bar::default();
@@ -55,7 +98,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     bar.done();
     let json = super::json(&outcome.summary);
     let html = crate::report::simulation::html(&outcome)?;
-    write(&outcome, &arguments.out, &json, &html)?;
+    let trace = arguments.trace_format.file_name();
+    write(&outcome, &arguments.out, trace, &json, &html)?;
     match arguments.format {
         OutputFormat::Json => say!("{}", json.trim_end()),
         OutputFormat::Text => print(&outcome, &arguments.out),
@@ -86,10 +130,35 @@ fn command(arguments: &Arguments) -> String {
             arguments.readings
         );
     }
+    if !arguments.trace.is_empty() {
+        command += &format!(" --trace \"{}\"", arguments.trace.join(","));
+    }
+    let mut option = |name: &str, is_default: bool, value: String| {
+        if !is_default {
+            command += &format!(" --{name} {value}");
+        }
+    };
+    option(
+        "trace-rows",
+        arguments.trace_rows == TRACE_ROWS,
+        arguments.trace_rows.to_string(),
+    );
+    let format = arguments.trace_format;
+    let extension = format.file_name().trim_start_matches("trace.");
+    option(
+        "trace-format",
+        format == TraceFormat::Vcd,
+        extension.to_owned(),
+    );
+    option(
+        "trace-arith",
+        arguments.trace_arith == Arith::Fixed,
+        "float".to_owned(),
+    );
     command
 }
 
-fn write(outcome: &Outcome, out: &std::path::Path, json: &str, html: &str) -> Result<()> {
+fn write(outcome: &Outcome, out: &Path, trace: &str, json: &str, html: &str) -> Result<()> {
     super::make_folder(out)?;
     let parts = &outcome.parts;
     let whole =
@@ -102,11 +171,12 @@ fn write(outcome: &Outcome, out: &std::path::Path, json: &str, html: &str) -> Re
     if let Some((fitted, _)) = &parts.calibrated {
         whole("design.toml", &crate::job::fitted_design::text(fitted))?;
     }
+    parts.trace.write(&out.join(trace))?;
     whole("report.html", html)?;
     whole("simulate.json", json)
 }
 
-fn print(outcome: &Outcome, out: &std::path::Path) {
+fn print(outcome: &Outcome, out: &Path) {
     let s = &outcome.summary;
     if !s.paper.is_empty() {
         let mut table = super::table(&[

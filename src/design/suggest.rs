@@ -217,7 +217,7 @@ pub(super) fn nearest<'a>(word: &str, known: &[&'a str]) -> Option<&'a str> {
 }
 
 /// As [`nearest`], for words that other tools spell differently.
-pub(super) fn nearest_word<'a>(word: &str, known: &[&'a str]) -> Option<&'a str> {
+pub(crate) fn nearest_word<'a>(word: &str, known: &[&'a str]) -> Option<&'a str> {
     let plain = word.trim().to_lowercase().replace(['-', ' '], "_");
     let alias = ALIASES.iter().find(|(other, _)| *other == plain);
     alias

@@ -19,6 +19,15 @@ pub struct Identity {
     pub step: f64,
 }
 
+/// Every word of a node, fixed and float.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct History {
+    /// Raw.
+    pub raw: Vec<i128>,
+    /// In the node's unit.
+    pub real: Vec<f64>,
+}
+
 /// Sums over all samples of a node.
 #[derive(Debug, Clone)]
 pub struct Node {
@@ -58,6 +67,8 @@ pub struct Node {
     pub sum_value_square: f64,
     /// Samples whose float value moved by a quarter of an LSB or more, and the last value.
     pub moved: (u64, f64),
+    /// Every word, where somebody asked for them.
+    pub history: Option<History>,
 }
 
 impl Node {
@@ -82,21 +93,31 @@ impl Node {
             before: (0, 0),
             sum_value_square: 0.0,
             moved: (0, 0.0),
+            history: None,
         }
     }
 
     /// Notes a word at an ADC sample.
     #[inline(always)]
     pub fn note<W: Lane>(&mut self, word: &Pair<W>, sample: u64) {
-        let raw = word.raw.wide();
-        self.min_raw = self.min_raw.min(raw);
-        self.max_raw = self.max_raw.max(raw);
-        self.note_error(word.error(), word.total_bound(), word.real, sample);
+        self.note_error(
+            word.raw.wide(),
+            word.error(),
+            word.total_bound(),
+            word.real,
+            sample,
+        );
     }
 
-    /// Notes an error with its bound.
+    /// Notes a raw word and a float value with their distance and its bound.
     #[inline(always)]
-    pub fn note_error(&mut self, error: f64, bound: f64, real: f64, sample: u64) {
+    pub fn note_error(&mut self, raw: i128, error: f64, bound: f64, real: f64, sample: u64) {
+        self.min_raw = self.min_raw.min(raw);
+        self.max_raw = self.max_raw.max(raw);
+        if let Some(history) = &mut self.history {
+            history.raw.push(raw);
+            history.real.push(real);
+        }
         let size = error.abs();
         self.count += 1;
         self.sum_error += error;

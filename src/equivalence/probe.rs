@@ -3,7 +3,7 @@
 
 use super::activity::Activity;
 use super::loops::PhaseLoopBound;
-use super::node::Node;
+use super::node::{History, Node};
 use super::overflow::Event;
 use super::polar::Polar;
 use crate::circuit::chain::Chain;
@@ -129,6 +129,14 @@ impl Probe {
         }
     }
 
+    /// Keeps every word of every node.
+    pub fn remembering(self) -> Self {
+        for node in self.nodes.borrow_mut().iter_mut() {
+            node.history = Some(History::default());
+        }
+        self
+    }
+
     /// The ADC sample that words belong to from now on.
     #[inline(always)]
     pub fn at_sample(&self, sample: u64) {
@@ -157,9 +165,7 @@ impl Probe {
     /// Notes a raw value with error and bound that were made elsewhere.
     pub fn note_error(&self, node: usize, raw: i128, error: f64, bound: f64, real: f64) {
         if let Some(node) = self.nodes.borrow_mut().get_mut(node) {
-            node.min_raw = node.min_raw.min(raw);
-            node.max_raw = node.max_raw.max(raw);
-            node.note_error(error, bound, real, self.sample.get());
+            node.note_error(raw, error, bound, real, self.sample.get());
         }
     }
 

@@ -17,15 +17,24 @@ pub fn run(design: &Design, drive: &[i32], sense: &[i32]) -> Seen {
     run_with_rows(design, drive, sense, &mut |_, _| {})
 }
 
+/// The same; every node keeps every word ([`super::node::History`]).
+pub fn run_remembering(design: &Design, drive: &[i32], sense: &[i32]) -> Seen {
+    staged(design, drive, sense, true, &mut |_, _| {})
+}
+
 /// The same; every row is handed over.
 pub fn run_with_rows(design: &Design, drive: &[i32], sense: &[i32], rows: RowSink) -> Seen {
+    staged(design, drive, sense, false, rows)
+}
+
+fn staged(design: &Design, drive: &[i32], sense: &[i32], keep: bool, rows: RowSink) -> Seen {
     match design.circuit.decimator.stages {
-        1 => with_stages::<1>(design, drive, sense, rows),
-        2 => with_stages::<2>(design, drive, sense, rows),
-        3 => with_stages::<3>(design, drive, sense, rows),
-        4 => with_stages::<4>(design, drive, sense, rows),
-        5 => with_stages::<5>(design, drive, sense, rows),
-        _ => with_stages::<6>(design, drive, sense, rows),
+        1 => with_stages::<1>(design, drive, sense, keep, rows),
+        2 => with_stages::<2>(design, drive, sense, keep, rows),
+        3 => with_stages::<3>(design, drive, sense, keep, rows),
+        4 => with_stages::<4>(design, drive, sense, keep, rows),
+        5 => with_stages::<5>(design, drive, sense, keep, rows),
+        _ => with_stages::<6>(design, drive, sense, keep, rows),
     }
 }
 
@@ -33,10 +42,14 @@ fn with_stages<const N: usize>(
     design: &Design,
     drive: &[i32],
     sense: &[i32],
+    keep: bool,
     rows: RowSink,
 ) -> Seen {
     let chain = Chain::<N>::new(design);
-    let probe = Probe::new(design, &chain);
+    let mut probe = Probe::new(design, &chain);
+    if keep {
+        probe = probe.remembering();
+    }
     if fits_narrow_lanes(design, &chain) {
         Running::<i64, i64, N>::new(&chain, &probe).process(drive, sense, rows);
     } else {

@@ -2,7 +2,7 @@
 //! compensation that it gives, what the loops do, and the published figures beside it.
 //!
 //! [`profile_run`] is a thermal run of warm-started readings, [`continuous`] simulates every sample;
-//! [`record_csv`] writes the record, [`startup`] switches the gyro on, [`hunting`] looks at what
+//! [`record_csv`] writes the record, [`startup`] switches the gyro on, [`trace`] keeps every node's words of it, [`hunting`] looks at what
 //! quantisation leaves of the loops, [`paper`] has the published figures; [`outcome`] is `simulate.json`.
 
 pub mod continuous;
@@ -11,6 +11,7 @@ pub mod outcome;
 pub mod paper;
 pub mod record_csv;
 pub mod startup;
+pub mod trace;
 
 use crate::cosim::readings::{self, Options, Taken};
 use crate::design::Design;
@@ -42,6 +43,8 @@ pub struct Request {
     pub profile_readings: u64,
     /// Threads; the result does not depend on it.
     pub threads: usize,
+    /// Which words of the power-on are kept.
+    pub trace: trace::Wanted,
     /// The command, for the results.
     pub command: String,
 }
@@ -140,6 +143,9 @@ pub fn simulate(design: &Design, request: &Request, progress: Progress) -> Resul
     };
     let startup = startup::startup(&uncompensated)?;
     let hunting = hunting::hunting(&uncompensated)?;
+    let firmware = calibrated.as_ref().map_or(design, |(fitted, _)| fitted);
+    let (drive, sense) = &startup.codes;
+    let trace = trace::trace(firmware, (drive, sense), &request.trace)?;
     let scale_factor = if run.continuous {
         Vec::new()
     } else {
@@ -153,6 +159,7 @@ pub fn simulate(design: &Design, request: &Request, progress: Progress) -> Resul
         calibrated,
         after,
         startup,
+        trace,
         hunting,
         scale_factor,
         warnings,

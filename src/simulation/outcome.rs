@@ -9,6 +9,7 @@ use crate::cosim::rest;
 use crate::design::Design;
 use crate::job::calibration::Calibration;
 use crate::record::Warning;
+use crate::trace_file::Trace;
 use serde::Serialize;
 use std::f64::consts::{PI, TAU};
 
@@ -29,6 +30,8 @@ pub struct Parts {
     pub after: Option<Vec<Taken>>,
     /// Power-on.
     pub startup: Startup,
+    /// The circuit's words in it.
+    pub trace: Trace,
     /// Dead bands and limit cycles.
     pub hunting: Vec<Hunting>,
     /// At each dwell.

@@ -61,9 +61,20 @@ impl AmplitudeLoop {
     }
 }
 
+/// `input` of `[compensation]`: what the polynomial's variable is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Thermometer {
+    /// The CORDIC's phase in half turns.
+    Phase,
+    /// What the phase loop has added to the design's tuning word for the samples of this row:
+    /// (the least residue in magnitude - offset) * 2^-scale.
+    TuningWord { offset_raw: i64, scale_bits: u32 },
+}
+
 /// `[compensation]`
 #[derive(Clone, Debug)]
 pub struct Compensation {
+    pub input: Thermometer,
     pub coefficients_raw: Vec<i64>,
     pub coefficient_format: Format,
     pub accumulator: CastTo,
@@ -125,6 +136,26 @@ impl Design {
         self.product.format.operand_bits() + self.growth_bits()
     }
 
+    /// Bits of the polynomial's variable, two's complement, and how many of them are fraction.
+    pub fn variable(&self, compensation: &Compensation) -> (u32, u32) {
+        match compensation.input {
+            Thermometer::Phase => (self.cordic.angle_bits, self.cordic.angle_bits - 1),
+            Thermometer::TuningWord {
+                offset_raw,
+                scale_bits,
+            } => {
+                let half = 1i128 << (self.nco.phase_bits - 1);
+                let ends = [-half, half - 1].map(|end| end - i128::from(offset_raw));
+                let holds = |bits: u32| {
+                    let half = 1i128 << (bits - 1);
+                    ends.iter().all(|end| (-half..half).contains(end))
+                };
+                let bits = (1..=66).find(|&bits| holds(bits)).expect("64 bits less 64");
+                (bits, scale_bits)
+            }
+        }
+    }
+
     /// Every exact intermediate that a cast takes: the cast's key and the bits,
     /// counted on the formats.
     pub fn intermediates(&self) -> Vec<Refusal> {
@@ -150,11 +181,11 @@ impl Design {
         if let Some(compensation) = &self.compensation {
             let accumulator = compensation.accumulator.format;
             if compensation.coefficients_raw.len() > 2 {
-                let angle_bits = self.cordic.angle_bits;
+                let (bits, fraction) = self.variable(compensation);
                 add(
                     "compensation.accumulator",
-                    accumulator.operand_bits() + angle_bits,
-                    i64::from(accumulator.n + angle_bits - 1),
+                    accumulator.operand_bits() + bits,
+                    i64::from(accumulator.n + fraction),
                     accumulator,
                 );
             }
@@ -209,7 +240,7 @@ impl Design {
             // With two coefficients the only product is c_1 p, "exact": the
             // text does not say in which of the two formats it is counted.
             let only_product =
-                compensation.accumulator.format.operand_bits() + self.cordic.angle_bits;
+                compensation.accumulator.format.operand_bits() + self.variable(compensation).0;
             let product_at_the_edge =
                 compensation.coefficients_raw.len() == 2 && only_product > WIDEST;
             let undecided = sum_at_the_edge || product_at_the_edge || coefficient_bits >= WIDEST;

@@ -1,7 +1,7 @@
 //! Random accepted designs with the rare features that emitted code has to get right: overflow that
 //! is an error and happens, unsigned words, the widest and the narrowest words of every stage.
 
-use super::design::{Design, Verdict};
+use super::design::{Design, Thermometer, Verdict};
 use super::generate::{self, Aim};
 use super::number::{CastTo, Format, Overflow, Rounding};
 use super::rng::Rng;
@@ -33,7 +33,11 @@ pub fn design(rng: &mut Rng) -> Design {
 
 /// `clamp_raw` for a design, as the line of its `[compensation]`.
 pub fn clamp_line(rng: &mut Rng, design: &Design) -> String {
-    let bits = design.cordic.angle_bits;
+    let compensation = design.compensation.as_ref();
+    let bits = match compensation.map(|c| c.input) {
+        Some(Thermometer::TuningWord { .. }) => design.nco.phase_bits,
+        _ => design.cordic.angle_bits,
+    };
     let (least, greatest) = limits_of(bits);
     let draw = |rng: &mut Rng| match rng.range(0, 5) {
         0 => least,
@@ -194,6 +198,12 @@ fn settle(design: &mut Design) {
     nco.address_bits = nco.address_bits.min(nco.phase_bits);
     if nco.phase_bits < 63 && nco.tuning_word >= 0 {
         nco.tuning_word &= (1i64 << nco.phase_bits) - 1;
+    }
+    if let Some(compensation) = &mut design.compensation
+        && let Thermometer::TuningWord { offset_raw, .. } = &mut compensation.input
+    {
+        let (least, greatest) = limits_of(nco.phase_bits);
+        *offset_raw = (*offset_raw).clamp(least, greatest);
     }
     if let Some(control) = &mut design.phase_loop {
         let (least, greatest) = limits_of(design.cordic.angle_bits);

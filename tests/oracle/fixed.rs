@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use super::constants;
-use super::design::{Compensation, Design};
+use super::design::{Compensation, Design, Thermometer};
 use super::number::{CastTo, wrap};
 
 /// One decimated sample.
@@ -140,7 +140,7 @@ fn compensate(
     for &c in coefficients {
         let c = i128::from(c);
         let node = "compensation.accumulator";
-        let product_fraction = fraction + i64::from(design.cordic.angle_bits) - 1;
+        let product_fraction = fraction + i64::from(design.variable(compensation).1);
         let inner = accumulator
             .cast(t * p, product_fraction)
             .map_err(|_| (node, vec![t, p], exact))?;
@@ -250,7 +250,15 @@ pub fn replay(design: &Design, capture: &[(i64, i64)]) -> Result<Vec<Row>, Stop>
         // 6. compensation
         let rate = match &design.compensation {
             Some(compensation) => {
-                let result = compensate(design, compensation, angle, channels[2]);
+                let p = match compensation.input {
+                    Thermometer::Phase => angle,
+                    // The word that the row's samples were mixed with: step 7 comes after.
+                    Thermometer::TuningWord { offset_raw, .. } => {
+                        wrap(tuning_word - given_word, design.nco.phase_bits)
+                            - i128::from(offset_raw)
+                    }
+                };
+                let result = compensate(design, compensation, p, channels[2]);
                 Some(result.map_err(|(node, operands, as_coefficient)| Stop {
                     sample: n,
                     node: node.to_owned(),

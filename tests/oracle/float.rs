@@ -6,7 +6,7 @@
 
 use std::f64::consts::TAU;
 
-use super::design::{Compensation, Design};
+use super::design::{Compensation, Design, Thermometer};
 
 /// One decimated sample, in the units of the contract.
 #[derive(Clone, Debug, PartialEq)]
@@ -94,10 +94,24 @@ pub fn wrap_turns(turns: f64) -> f64 {
     }
 }
 
+/// The polynomial's variable; `detuning` is what the phase loop has added, a wrapped turn.
+fn variable(design: &Design, input: Thermometer, phase: f64, detuning: Turn) -> f64 {
+    match input {
+        Thermometer::Phase => 2.0 * phase,
+        Thermometer::TuningWord {
+            offset_raw,
+            scale_bits,
+        } => {
+            let turns = detuning as i128 as f64 * 2f64.powi(-128);
+            let steps = turns * 2f64.powi(design.nco.phase_bits as i32);
+            (steps - offset_raw as f64) * 2f64.powi(-(scale_bits as i32))
+        }
+    }
+}
+
 /// sense I in deg/s less the polynomial.
-fn rate(compensation: &Compensation, phase: f64, sense_i: f64) -> f64 {
+fn rate(compensation: &Compensation, p: f64, sense_i: f64) -> f64 {
     let unit = 2f64.powi(-(compensation.coefficient_format.n as i32));
-    let p = 2.0 * phase;
     let bias = compensation
         .coefficients_raw
         .iter()
@@ -159,6 +173,10 @@ pub fn replay(design: &Design, capture: &[(i64, i64)], disturbance: Disturbance)
         }
         let angle = wrap_turns(channels[1].atan2(channels[0]) / TAU);
         let magnitude = channels[0].hypot(channels[1]);
+        let rate = design.compensation.as_ref().map(|compensation| {
+            let p = variable(design, compensation.input, angle, step.wrapping_sub(given));
+            rate(compensation, p, channels[2])
+        });
         let tuning_word = design.phase_loop.as_ref().map(|control| {
             let setpoint = control.setpoint_raw as f64 / angle_unit;
             let e = wrap_turns(angle - setpoint) * angle_unit;
@@ -187,10 +205,7 @@ pub fn replay(design: &Design, capture: &[(i64, i64)], disturbance: Disturbance)
             channels,
             phase: angle,
             magnitude,
-            rate: design
-                .compensation
-                .as_ref()
-                .map(|compensation| rate(compensation, angle, channels[2])),
+            rate,
             tuning_word,
             gain,
         });
@@ -260,11 +275,21 @@ pub fn scales(design: &Design, rows: &[FloatRow]) -> Vec<Scale> {
     ];
     if let Some(compensation) = &design.compensation {
         let unit = 2f64.powi(-(compensation.coefficient_format.n as i32));
-        let coefficients: f64 = compensation
-            .coefficients_raw
-            .iter()
-            .map(|&c| (c as f64 * unit).abs())
-            .sum();
+        // The variable's greatest value: one half turn, or the tuning word's range and offset.
+        let reach: f64 = match compensation.input {
+            Thermometer::Phase => 1.0,
+            Thermometer::TuningWord {
+                offset_raw,
+                scale_bits,
+            } => {
+                let half = 2f64.powi(design.nco.phase_bits as i32 - 1);
+                (half + (offset_raw as f64).abs()) * 2f64.powi(-(scale_bits as i32))
+            }
+        };
+        let mut coefficients = 0.0;
+        for (&c, order) in compensation.coefficients_raw.iter().zip(0..) {
+            coefficients += (c as f64 * unit).abs() * reach.powi(order);
+        }
         let sense = largest(|row| row.channels[2]) * 2f64.powi(compensation.rate_full_scale_log2);
         let terms = coefficients.max(sense);
         list.push(plain(compensation.output.format.full_scale().max(terms)));

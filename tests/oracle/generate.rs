@@ -4,7 +4,9 @@
 //! it, so that most designs run, many overflow, and some need more than the
 //! supported 127 bits.
 
-use super::design::{AmplitudeLoop, Compensation, Cordic, Design, Gain, Nco, PhaseLoop, Verdict};
+use super::design::{
+    AmplitudeLoop, Compensation, Cordic, Design, Gain, Nco, PhaseLoop, Thermometer, Verdict,
+};
 use super::float::greatest_channel;
 use super::number::{CastTo, Format, Overflow, Rounding};
 use super::rng::Rng;
@@ -199,7 +201,11 @@ fn draw(rng: &mut Rng) -> Design {
         design.amplitude_loop = Some(amplitude_loop(rng, &design));
     }
     if rng.chance(75) {
-        design.compensation = Some(compensation(rng, &design));
+        let mut compensation = compensation(rng, &design);
+        if design.phase_loop.is_some() && rng.chance(50) {
+            compensation.input = tuning_input(rng, design.nco.phase_bits);
+        }
+        design.compensation = Some(compensation);
     }
     design
 }
@@ -272,6 +278,26 @@ fn amplitude_loop(rng: &mut Rng, design: &Design) -> AmplitudeLoop {
     control
 }
 
+/// Offsets up to the ends; scales about the width, so that the variable is about one.
+fn tuning_input(rng: &mut Rng, phase_bits: u32) -> Thermometer {
+    let greatest = i64::MAX >> (64 - phase_bits);
+    let offset_raw = match rng.range(0, 9) {
+        0 => greatest,
+        1 => -greatest - 1,
+        2..=4 => 0,
+        _ => rng.range(-greatest - 1, greatest) >> rng.range(0, 8),
+    };
+    let scale_bits = if rng.chance(80) {
+        rng.bits(phase_bits - 2, phase_bits.min(63) + 1)
+    } else {
+        rng.bits(0, 64)
+    };
+    Thermometer::TuningWord {
+        offset_raw,
+        scale_bits,
+    }
+}
+
 fn compensation(rng: &mut Rng, design: &Design) -> Compensation {
     let coefficient_bits = rng.bits(2, 40);
     let signed = !rng.chance(15);
@@ -329,6 +355,7 @@ fn compensation(rng: &mut Rng, design: &Design) -> Compensation {
     };
     let output_m = i64::from(design.output.format.m) + rate_full_scale_log2;
     Compensation {
+        input: Thermometer::Phase,
         coefficients_raw,
         coefficient_format,
         accumulator,
@@ -368,6 +395,7 @@ fn widen(rng: &mut Rng, design: &mut Design, aim: Aim) {
         }
         2 => {
             if let Some(compensation) = &mut design.compensation {
+                compensation.input = Thermometer::Phase;
                 // accumulator: its bits and those of the angle
                 let format = &mut compensation.accumulator.format;
                 format.m = rng.bits(60, 64).max(format.n + 1) - format.n;

@@ -1,7 +1,7 @@
 //! The golden design and capture of the contract, and their checksum.
 
 use super::constants::sine_table;
-use super::design::{Compensation, Cordic, Design, Nco};
+use super::design::{Compensation, Cordic, Design, Nco, Thermometer};
 use super::fixed::Row;
 use super::number::{CastTo, Format, Overflow, Rounding};
 
@@ -32,6 +32,7 @@ pub fn design() -> Design {
         phase_loop: None,
         amplitude_loop: None,
         compensation: Some(Compensation {
+            input: Thermometer::Phase,
             coefficients_raw: vec![3_591_373, 7_961_641, 4_483_318],
             coefficient_format: Format::q(17, 15),
             accumulator: CastTo::new(Format::q(33, 15), Rounding::HalfUp, Overflow::Error),

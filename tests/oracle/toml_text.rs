@@ -1,6 +1,6 @@
 //! Design files: the same keys in many spellings.
 
-use super::design::Design;
+use super::design::{Design, Thermometer};
 use super::number::{CastTo, Overflow, Rounding};
 use super::rng::Rng;
 
@@ -243,9 +243,28 @@ impl Printer {
         }
         if let Some(compensation) = &design.compensation {
             let mut table = table("compensation");
-            table
-                .keys
-                .push(("input".to_owned(), "\"phase\"".to_owned()));
+            match compensation.input {
+                Thermometer::Phase => {
+                    table
+                        .keys
+                        .push(("input".to_owned(), "\"phase\"".to_owned()));
+                }
+                Thermometer::TuningWord {
+                    offset_raw,
+                    scale_bits,
+                } => {
+                    table
+                        .keys
+                        .push(("input".to_owned(), "\"tuning_word\"".to_owned()));
+                    table
+                        .keys
+                        .push(("input_offset_raw".to_owned(), self.integer(offset_raw)));
+                    table.keys.push((
+                        "input_scale_bits".to_owned(),
+                        self.integer(i64::from(scale_bits)),
+                    ));
+                }
+            }
             let coefficients: Vec<String> = compensation
                 .coefficients_raw
                 .iter()
