@@ -175,18 +175,18 @@ fn continuous_motion_is_where_warm_starts_are() {
     let design = folder.path().join("short.toml");
     // A slow ramp, so that the loops follow; no noise.
     let quiet = "[thermal_run]\nstart_degc = 20.0\nstop_degc = 30.0\nstep_k = 10.0\nramp_k_per_min = 30.0\n\
-        dwell_s = 1.0\nadc_noise_lsb = 0.0\nrate_noise_dps_rthz = 0.0\nflicker_dph = 0.0\n\
+        dwell_s = 1.0\nreadings_per_dwell = 1\nadc_noise_lsb = 0.0\nrate_noise_dps_rthz = 0.0\nflicker_dph = 0.0\n\
         rate_random_walk_dph_rth = 0.0\nquadrature_dps = 200.0\n";
     std::fs::write(&design, quiet).expect("written");
     let out = folder.path().join("continuous");
-    let s = simulate(&[text(&design), "--duration", "20"], &out);
+    let s = simulate(&[text(&design), "--duration", "30"], &out);
     assert_eq!(s["mode"], "continuous");
     let record = out.join("record.csv");
     let times = column(&record, "time_s");
-    assert_eq!(times.len(), 20);
-    // The same chamber as a profile.
+    assert_eq!(times.len(), 30);
+    // The same chamber as a profile: a dwell, ten seconds for its reading, the ramp.
     let profile = folder.path().join("profile.csv");
-    std::fs::write(&profile, "time_s,chamber_degc\n0,20\n1,20\n21,30\n22,30\n").expect("written");
+    std::fs::write(&profile, "time_s,chamber_degc\n0,20\n11,20\n31,30\n").expect("written");
     let warm = folder.path().join("warm");
     simulate(
         &[
@@ -194,7 +194,7 @@ fn continuous_motion_is_where_warm_starts_are() {
             "--profile",
             text(&profile),
             "--readings",
-            "2201",
+            "3101",
         ],
         &warm,
     );
@@ -203,13 +203,16 @@ fn continuous_motion_is_where_warm_starts_are() {
         column(&warm.join("record.csv"), "phase_rad"),
     );
     let continuous = column(&record, "phase_rad");
+    // The structure follows the ramp by 0.9 K, 9 mrad/K.
+    assert!((continuous[29] - continuous[0]).abs() > 5e-3);
     for (time, value) in times.iter().zip(&continuous).skip(1) {
         let nearest =
             (0..t.len()).min_by(|a, b| (t[*a] - time).abs().total_cmp(&(t[*b] - time).abs()));
         let expected = phase[nearest.expect("a reading")];
-        // The motion lags the temperature by 2 Q / w1 = 9 ms, and the phase moves by 4.5 mrad/s.
+        // At the end the phase moves by 1 mrad/s; the motion lags by 2 Q / w1 = 9 ms, and
+        // temperatures are up to date to 10 ms.
         assert!(
-            (value - expected).abs() < 6e-5,
+            (value - expected).abs() < 2e-5,
             "{time} s: {value} {expected}"
         );
     }
