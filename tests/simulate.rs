@@ -194,7 +194,7 @@ fn continuous_motion_is_where_warm_starts_are() {
             "--profile",
             text(&profile),
             "--readings",
-            "3101",
+            "311",
         ],
         &warm,
     );
