@@ -7,6 +7,7 @@
 
 pub mod activity;
 mod cordic_noise;
+mod front_noise;
 mod horner;
 pub mod job;
 pub mod layout;
@@ -19,3 +20,5 @@ pub mod predicted;
 pub mod probe;
 pub mod quantisation;
 pub mod run;
+mod slow_noise;
+pub mod table_noise;

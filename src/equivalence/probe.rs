@@ -122,7 +122,7 @@ impl Probe {
             table_errors: table_errors(chain),
             polar: Polar::new(design),
             phase_loop: RefCell::new(PhaseLoopBound::new(design)),
-            activity: RefCell::new(Activity::default()),
+            activity: RefCell::new(Activity::with_period(super::quantisation::repeats(design))),
             first_overflow: RefCell::new(None),
             needed_width: Cell::new(0),
             cut_rows: Cell::new(0),
