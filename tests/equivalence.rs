@@ -225,20 +225,6 @@ fn the_predicted_rms_is_the_observed_one_where_its_conditions_hold() {
         let predictions = predict(&design, &seen);
         for (node, p) in seen.nodes.iter().zip(&predictions) {
             all += 1;
-            for f in &p.flags {
-                *flagged
-                    .entry((
-                        *f,
-                        node.identity
-                            .name
-                            .split(' ')
-                            .next()
-                            .unwrap_or("")
-                            .to_owned(),
-                        p.rms.is_some(),
-                    ))
-                    .or_insert(0u32) += 1;
-            }
             let name = &node.identity.name;
             assert_eq!(node.outside, 0, "seed {seed}: {name} {:?}", node.worst);
             if let Some(rms) = p.rms {

@@ -1,6 +1,6 @@
 //! Runs a design's chain in both arithmetics at once over captured codes.
 
-use super::probe::{Probe, Seen};
+use super::probe::{Probe, Seen, Tap};
 use crate::circuit::chain::{Chain, FastState, SlowState};
 use crate::design::Design;
 use crate::numeric::cast::HasKernel;
@@ -19,13 +19,24 @@ pub fn run(design: &Design, drive: &[i32], sense: &[i32]) -> Seen {
 
 /// The same; every row is handed over.
 pub fn run_with_rows(design: &Design, drive: &[i32], sense: &[i32], rows: RowSink) -> Seen {
+    run_tapped(design, drive, sense, None, rows)
+}
+
+/// The same; `tap` sees every raw word.
+pub fn run_tapped(
+    design: &Design,
+    drive: &[i32],
+    sense: &[i32],
+    tap: Option<Box<dyn Tap>>,
+    rows: RowSink,
+) -> Seen {
     match design.circuit.decimator.stages {
-        1 => with_stages::<1>(design, drive, sense, rows),
-        2 => with_stages::<2>(design, drive, sense, rows),
-        3 => with_stages::<3>(design, drive, sense, rows),
-        4 => with_stages::<4>(design, drive, sense, rows),
-        5 => with_stages::<5>(design, drive, sense, rows),
-        _ => with_stages::<6>(design, drive, sense, rows),
+        1 => with_stages::<1>(design, drive, sense, tap, rows),
+        2 => with_stages::<2>(design, drive, sense, tap, rows),
+        3 => with_stages::<3>(design, drive, sense, tap, rows),
+        4 => with_stages::<4>(design, drive, sense, tap, rows),
+        5 => with_stages::<5>(design, drive, sense, tap, rows),
+        _ => with_stages::<6>(design, drive, sense, tap, rows),
     }
 }
 
@@ -33,10 +44,11 @@ fn with_stages<const N: usize>(
     design: &Design,
     drive: &[i32],
     sense: &[i32],
+    tap: Option<Box<dyn Tap>>,
     rows: RowSink,
 ) -> Seen {
     let chain = Chain::<N>::new(design);
-    let probe = Probe::new(design, &chain);
+    let probe = Probe::new(design, &chain).with_tap(tap);
     if fits_narrow_lanes(design, &chain) {
         Running::<i64, i64, N>::new(&chain, &probe).process(drive, sense, rows);
     } else {

@@ -15,6 +15,10 @@ use std::f64::consts::TAU;
 
 /// Phases that are looked at, at most.
 const MOST_SAMPLES: usize = 1 << 22;
+/// What is decimated: e_s sin, e_s cos, e_c sin, e_c cos, 2 sin^2, 2 sin cos.
+const SEQUENCES: usize = 6;
+/// What makes integers of the carrier's products.
+const CARRIER_SCALE: f64 = (1u64 << 44) as f64;
 /// A block of them: a multiple of every short period.
 const BLOCK: usize = 1 << 16;
 
@@ -33,8 +37,8 @@ pub struct TableErrors {
     pub stretch: Lines,
 }
 
-/// Table errors behind the decimator, relative to the signal: with x = [e_s sin, e_s cos, e_c sin, e_c cos]
-/// the errors of I and Q of a tone are I x0 + Q x1 and I x2 + Q x3.
+/// Table errors behind the decimator, relative to the signal: the errors of I and Q of a tone are I x0 + Q x1 and
+/// I x2 + Q x3. (I and Q themselves hold what the decimator leaves of twice the carrier.)
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Lines {
     /// Mean of x.
@@ -148,8 +152,8 @@ struct Sums<'a> {
     lsb: f64,
     /// What makes integers of e * sin.
     scale: f64,
-    integrators: [[i128; 4]; 6],
-    combs: [[[i128; 4]; 2]; 6],
+    integrators: [[i128; SEQUENCES]; 6],
+    combs: [[[i128; SEQUENCES]; 2]; 6],
     /// Samples of the block.
     count: usize,
     rows: u64,
@@ -177,8 +181,8 @@ impl<'a> Sums<'a> {
             lsb,
             // 45 bits, and a CIC's 78 at most: within 128.
             scale: pow2(44) / widest,
-            integrators: [[0; 4]; 6],
-            combs: [[[0; 4]; 2]; 6],
+            integrators: [[0; SEQUENCES]; 6],
+            combs: [[[0; SEQUENCES]; 2]; 6],
             count: 0,
             rows: 0,
             phases: 0,
@@ -191,8 +195,8 @@ impl<'a> Sums<'a> {
     }
 
     fn begin(&mut self) {
-        self.integrators = [[0; 4]; 6];
-        self.combs = [[[0; 4]; 2]; 6];
+        self.integrators = [[0; SEQUENCES]; 6];
+        self.combs = [[[0; SEQUENCES]; 2]; 6];
         self.count = 0;
     }
 
@@ -201,7 +205,7 @@ impl<'a> Sums<'a> {
         let table = &self.oscillator.table;
         let (sin, cos) = (phase as i64 as f64 * pow2(-64) * TAU).sin_cos();
         let weights = [1.0, cos * cos - sin * sin, 2.0 * sin * cos];
-        let mut input = [0i128; 4];
+        let mut input = [0i128; SEQUENCES];
         for (part, exact) in [(0, sin), (1, cos)] {
             let ahead = phase.wrapping_add((part as u64) << 62);
             let address = ahead.wrapping_add(self.half) >> (64 - table.address_bits);
@@ -218,11 +222,13 @@ impl<'a> Sums<'a> {
             input[2 * part] = (scaled * sin) as i64 as i128;
             input[2 * part + 1] = (scaled * cos) as i64 as i128;
         }
+        input[4] = (2.0 * sin * sin * CARRIER_SCALE) as i64 as i128;
+        input[5] = (2.0 * sin * cos * CARRIER_SCALE) as i64 as i128;
         self.phases += 1;
         self.decimate(input);
     }
 
-    fn decimate(&mut self, mut x: [i128; 4]) {
+    fn decimate(&mut self, mut x: [i128; SEQUENCES]) {
         for stage in self.integrators.iter_mut().take(self.stages) {
             for (sum, x) in stage.iter_mut().zip(&mut x) {
                 *sum = sum.wrapping_add(*x);
@@ -246,10 +252,26 @@ impl<'a> Sums<'a> {
         }
     }
 
-    fn row(&mut self, x: [i128; 4]) {
+    fn row(&mut self, sums: [i128; SEQUENCES]) {
         let taps = ((self.ratio * self.delay) as f64).powi(self.stages as i32);
-        let scale = 2.0 / (self.errors.amplitude * self.scale * taps);
-        let x = x.map(|x| x as f64 * scale);
+        let error_scale = 2.0 / (self.errors.amplitude * self.scale * taps);
+        let carrier_scale = 1.0 / (CARRIER_SCALE * taps);
+        let [a, b, c, d, p, q] = sums.map(|x| x as f64);
+        let [a, b, c, d] = [a, b, c, d].map(|x| x * error_scale);
+        // (D_s, D_c) makes I and Q of F = [[p, q], [q, 2 - p]]; the errors are given by I and Q: x = e F^-1.
+        let (p, q) = (p * carrier_scale, q * carrier_scale);
+        let determinant = p * (2.0 - p) - q * q;
+        if !(determinant > 0.01) {
+            return;
+        }
+        let by = |s: f64, c: f64| {
+            [
+                (s * (2.0 - p) - c * q) / determinant,
+                (c * p - s * q) / determinant,
+            ]
+        };
+        let ([x0, x1], [x2, x3]) = (by(a, b), by(c, d));
+        let x = [x0, x1, x2, x3];
         self.rows += 1;
         let turn = (x[2] - x[1]) / 2.0;
         let longer = turn * turn / 2.0;
