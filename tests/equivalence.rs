@@ -5,11 +5,11 @@
 mod oracle;
 
 use gyrogen::circuit::engine::{self, ArithmeticKind, Rows};
+use gyrogen::cosim::stream::stimulus;
 use gyrogen::design::{Design, reader};
 use gyrogen::equivalence::job::{Stimulus, repairs};
 use gyrogen::equivalence::predicted::predict;
 use gyrogen::equivalence::run::{run, run_with_rows};
-use gyrogen::equivalence::stimulus::operating;
 use gyrogen::numeric::format::{Format, Overflow, Rounding};
 use oracle::generate::{self, Aim};
 use oracle::harness::setting;
@@ -178,6 +178,12 @@ fn sensible_design(seed: u64) -> Design {
     c.cordic.guard_bits = rng.range(0, 8) as u32;
     c.cordic.width = 2 + output as u32 + c.cordic.guard_bits + 2;
     c.cordic.angle_bits = rng.range(12, 32) as u32;
+    // The oscillator stays at the gyro's resonance, the amplitude where it was.
+    let turns = c.nco.tuning_word as f64 / f64::powi(2.0, c.nco.phase_bits as i32);
+    c.sample_rate_hz = 1750.0 / turns;
+    if let Some(l) = &mut c.amplitude_loop {
+        l.setpoint_raw = 1 << (output - 2);
+    }
     if let Some(comp) = &mut design.compensation {
         comp.accumulator.format = Format::q(14, rng.range(20, 30) as u32);
         comp.accumulator.rounding = rng.pick(&Rounding::ALL);
@@ -187,16 +193,34 @@ fn sensible_design(seed: u64) -> Design {
     design
 }
 
+fn parameters(design: &Design) -> String {
+    let c = &design.circuit;
+    format!(
+        "word {} adc {} table {} a {} product {} N {} R {} M {} output {} iterations {} guard {}",
+        c.nco.tuning_word,
+        c.adc.format,
+        c.nco.table,
+        c.nco.table_address_bits,
+        c.demodulator.product,
+        c.decimator.stages,
+        c.decimator.ratio,
+        c.decimator.differential_delay,
+        c.decimator.output,
+        c.cordic.iterations,
+        c.cordic.guard_bits
+    )
+}
+
 /// Predicted and observed rms within 10 % on every node that no flag excuses.
 #[test]
 fn the_predicted_rms_is_the_observed_one_where_its_conditions_hold() {
     let first: u64 = setting("GYROGEN_SEED", 7);
     let designs: u64 = setting("GYROGEN_EQUIV_DESIGNS", 24);
     let mut failures = Vec::new();
-    let (mut predicted, mut all, mut locals) = (0, 0, 0);
+    let (mut predicted, mut unflagged, mut all, mut locals) = (0, 0, 0, 0);
     for seed in first..first + designs {
         let design = sensible_design(seed);
-        let (drive, sense) = operating(&design, 400_000);
+        let (drive, sense) = stimulus(&design, 400_000).expect("a run");
         let seen = run(&design, &drive, &sense);
         let predictions = predict(&design, &seen);
         for (node, p) in seen.nodes.iter().zip(&predictions) {
@@ -209,10 +233,13 @@ fn the_predicted_rms_is_the_observed_one_where_its_conditions_hold() {
                 let off = (rms / observed - 1.0).abs();
                 // Both exact, but for the float's own rounding.
                 let nothing = observed.max(rms) < 1e-13 * node.mean_square_value().sqrt();
-                if !nothing && !(off <= 0.1) {
+                // With a flag the figure is a model's whose conditions do not hold.
+                let allowed = if p.flags.is_empty() { 0.1 } else { 2.0 };
+                unflagged += u32::from(p.flags.is_empty());
+                if !nothing && !(off <= allowed) {
                     failures.push(format!(
-                        "seed {seed}: {name}: predicted {rms:.4e}, observed {observed:.4e} ({:.2}) flags {:?}",
-                        rms / observed, p.flags
+                        "seed {seed}: {name}: predicted {rms:.4e}, observed {observed:.4e} ({:.2}) flags {:?} {}",
+                        rms / observed, p.flags, parameters(&design)
                     ));
                 }
             }
@@ -226,12 +253,14 @@ fn the_predicted_rms_is_the_observed_one_where_its_conditions_hold() {
             }
         }
     }
-    println!("{predicted} of {all} nodes predicted, {locals} roundings");
+    println!(
+        "{predicted} of {all} nodes predicted, {unflagged} without a flag, {locals} roundings"
+    );
     assert!(
         failures.is_empty(),
         "{} of {predicted}\n{}",
         failures.len(),
         failures.join("\n")
     );
-    assert!(predicted > all / 4);
+    assert!(predicted > all / 2 && unflagged > all / 5);
 }

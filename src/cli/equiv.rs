@@ -3,8 +3,9 @@
 use super::OutputFormat;
 use crate::cosim::stream::stimulus;
 use crate::design::Design;
-use crate::equivalence::job::{self, Stimulus};
+use crate::equivalence::job::{self, Request, Stimulus};
 use crate::equivalence::outcome::{Equivalence, NodeReport};
+use crate::equivalence::shrink;
 use crate::error::{Error, Result};
 use crate::record::capture::CaptureReader;
 use std::path::{Path, PathBuf};
@@ -23,6 +24,12 @@ pub struct Arguments {
     /// What is made where no capture is given.
     #[arg(long, value_enum, default_value = "operating")]
     stimulus: Kind,
+    /// A second design: its chain runs on the same codes, and the first word that differs is reported.
+    #[arg(long, value_name = "OTHER")]
+    against: Option<PathBuf>,
+    /// Threads; the results do not depend on it. Default: as many as the machine has.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
     /// Folder for the results; made if it does not exist.
     #[arg(long, default_value = "gyrogen-out")]
     out: PathBuf,
@@ -46,7 +53,7 @@ const SAMPLES: usize = 10_000_000;
 ///
 /// # Errors
 /// An unusable design or capture, no compiler (exit 2); a node outside its bound, an overflow, emitted
-/// code that differs (exit 1).
+/// code that differs, a difference from the design given with `--against` (exit 1).
 pub fn run(arguments: &Arguments) -> Result<()> {
     let design = super::design(arguments.design.as_deref())?;
     let (drive, sense, origin) = codes(&design, arguments)?;
@@ -55,10 +62,26 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         sense: &sense,
         origin: &origin,
     };
-    let result = job::equivalence(&design, stimulus, &command(arguments))?;
+    let other = arguments.against.as_deref().map(|p| super::design(Some(p)));
+    let other = other.transpose()?;
+    let request = Request {
+        command: &command(arguments),
+        against: other.as_ref(),
+        threads: super::threads(arguments.threads),
+    };
+    let (result, counterexample) = job::equivalence(&design, stimulus, request)?;
     let json = super::json(&result);
     super::make_folder(&arguments.out)?;
     crate::output::write_whole(&arguments.out.join("equiv.json"), json.as_bytes())?;
+    let shrunk = arguments.out.join(job::COUNTEREXAMPLE);
+    if let Some((drive, sense)) = counterexample {
+        let text = shrink::capture_text(&design, &drive, &sense);
+        crate::output::write_whole(&shrunk, text.as_bytes())?;
+    } else if shrunk.exists() {
+        // Of an earlier run: it would contradict this one.
+        let failed = |e: std::io::Error| crate::error::io_error(&shrunk, "remove", &e);
+        std::fs::remove_file(&shrunk).map_err(failed)?;
+    }
     match arguments.format {
         OutputFormat::Json => say!("{}", json.trim_end()),
         OutputFormat::Text => print(&result),
@@ -81,6 +104,9 @@ fn command(arguments: &Arguments) -> String {
     }
     if let Some(path) = &arguments.capture {
         push(format!("--capture {}", path.display()));
+    }
+    if let Some(path) = &arguments.against {
+        push(format!("--against {}", path.display()));
     }
     if let Some(samples) = arguments.samples {
         push(format!("--samples {samples}"));
@@ -170,10 +196,51 @@ fn print(e: &Equivalence) {
             say!("  with that, run again: nothing overflows");
         }
     }
+    print_spurs(e);
+    if !e.loops.is_empty() {
+        say!("{}", super::simulate::loops(&e.loops));
+    }
+    if let Some(against) = &e.against {
+        match &against.first_difference {
+            Some(first) => say!("{}", first.sentence()),
+            None => say!(
+                "no word of {} nodes differs from the other design's",
+                against.nodes
+            ),
+        }
+        if !against.not_compared.is_empty() {
+            say!("  of one design only: {}", against.not_compared.join(", "));
+        }
+    }
+    if let Some(name) = &e.counterexample {
+        say!("shrunk stimulus: {name}");
+    }
     for note in &e.notes {
         say!("note: {note}");
     }
     say!("{}", if e.holds { "holds" } else { "does not hold" });
+}
+
+fn print_spurs(e: &Equivalence) {
+    let s = &e.nco_spurs;
+    let Some(measured) = &s.measured else {
+        say!("NCO: no carrier to measure spurs against");
+        return;
+    };
+    let db = |level: Option<f64>| level.map_or("none".to_owned(), |l| format!("{l:.2} dBc"));
+    say!(
+        "NCO at {:.3} Hz: worst spur {} (predicted {}), {} in all; with the design's quadrature a tone of {:.3e} deg/s",
+        s.carrier_hz,
+        db(measured.sfdr_dbc.map(|l| -l)),
+        db(
+            match (s.predicted.truncation_dbc(), s.predicted.table_dbc) {
+                (Some(a), Some(b)) => Some(a.max(b)),
+                (a, b) => a.or(b),
+            }
+        ),
+        measured.spurs,
+        s.quadrature_tone_dps
+    );
 }
 
 fn row(n: &NodeReport) -> Vec<String> {

@@ -3,6 +3,7 @@
 use super::OutputFormat;
 use super::replay::Arith;
 use crate::error::{Error, Result};
+use crate::simulation::hunting::Hunting;
 use crate::simulation::outcome::{Both, Outcome};
 use crate::simulation::trace::Wanted;
 use crate::simulation::{self, Course, Request, record_csv};
@@ -224,7 +225,7 @@ fn print(outcome: &Outcome, out: &Path) {
     }
     say!("{table}");
     if !s.loops.is_empty() {
-        say!("{}", loops(outcome));
+        say!("{}", loops(&s.loops));
     }
     print_sentences(outcome);
     say!("wrote {} ({:.1} s)", out.display(), s.seconds);
@@ -268,7 +269,8 @@ fn print_sentences(outcome: &Outcome) {
     );
 }
 
-fn loops(outcome: &Outcome) -> comfy_table::Table {
+/// What quantisation leaves of the loops.
+pub(super) fn loops(found: &[Hunting]) -> comfy_table::Table {
     let mut table = super::table(&[
         "loop without noise",
         "degC",
@@ -280,7 +282,7 @@ fn loops(outcome: &Outcome) -> comfy_table::Table {
         "mean error, LSB",
         "dead band predicted",
     ]);
-    for h in &outcome.summary.loops {
+    for h in found {
         table.add_row([
             h.name.to_owned(),
             format!("{}", h.chamber_degc),

@@ -16,7 +16,7 @@ use std::f64::consts::TAU;
 pub(super) struct BlockNoise {
     /// Mean square of the angle left and of the table's roundings, turns^2.
     pub(super) angle: f64,
-    /// Of the floors, turns^2.
+    /// Of the floors, turns^2, times the vectors' mean square length.
     floors: f64,
     /// Mean and variance of x, in the output's unit, but for the angle left.
     along: (f64, f64),
@@ -52,7 +52,7 @@ impl BlockNoise {
         BlockNoise {
             angle: (last_rad / TAU).powi(2) / 3.0 + table,
             // The vector is on the average 1.6 times as long while it is turned.
-            floors: across / 3.0 * (fine * inverse_length / (1.6 * TAU)).powi(2),
+            floors: across / 3.0 * (fine / (1.6 * TAU)).powi(2),
             along: (
                 late / 2.0 * unit,
                 (along / 3.0 + late / 4.0) * unit * unit + lsb * lsb / 12.0,
@@ -62,17 +62,19 @@ impl BlockNoise {
         }
     }
 
-    /// Mean square of the phase's error, turns^2.
-    pub(super) fn phase(&self) -> f64 {
-        self.angle + self.floors
+    /// Mean square of the phase's error, turns^2, given the mean of 1 / length^2.
+    pub(super) fn phase(&self, inverse_square: f64) -> f64 {
+        self.angle + self.floors * inverse_square
     }
 
-    /// Mean square of the magnitude's error, given the vectors' mean square length.
-    pub(super) fn magnitude(&self, square_length: f64) -> f64 {
-        let length = square_length.sqrt();
+    /// Mean of what the block adds to a magnitude.
+    pub(super) fn along_mean(&self, length: f64) -> f64 {
+        self.along.0 + length * (self.gain_error - self.last_rad * self.last_rad / 6.0)
+    }
+
+    /// Variance of it, given the vectors' mean square length.
+    pub(super) fn along_variance(&self, square_length: f64) -> f64 {
         let a2 = self.last_rad * self.last_rad;
-        let mean = self.along.0 + length * (self.gain_error - a2 / 6.0);
-        let shortened = square_length * a2 * a2 * (1.0 / 20.0 - 1.0 / 36.0);
-        mean * mean + self.along.1 + shortened
+        self.along.1 + square_length * a2 * a2 * (1.0 / 20.0 - 1.0 / 36.0)
     }
 }

@@ -1,5 +1,7 @@
 //! The compensation's errors: Horner's slopes and the roundings on the way.
 
+use super::front_noise::with_sign;
+use super::node::Node;
 use super::quantisation::Moments;
 use crate::design::{Compensation, Design};
 use crate::numeric::format::pow2;
@@ -10,14 +12,15 @@ pub(super) struct Horner {
     coefficients: Vec<f64>,
     clamp: Option<(f64, f64)>,
     accumulator_lsb: f64,
-    first: Moments,
-    inner: Moments,
+    /// Rounding of the product of each step, LSB.
+    steps: Vec<Moments>,
     pub(super) output: Moments,
     output_lsb: f64,
 }
 
 impl Horner {
-    pub(super) fn new(design: &Design, c: &Compensation) -> Self {
+    /// `nodes` begin with the first step's; their signs matter to a rounding toward zero.
+    pub(super) fn new(design: &Design, c: &Compensation, nodes: &[Node]) -> Self {
         let p_bits = design.circuit.cordic.angle_bits as i32 - 1;
         let lsb = c.coefficient_format.lsb();
         let (coarse, fine) = (
@@ -30,6 +33,7 @@ impl Horner {
             coarse
         };
         let rounding = c.accumulator.rounding;
+        let steps = c.coefficients_raw.len().saturating_sub(1);
         Horner {
             coefficients: c
                 .coefficients_raw
@@ -40,11 +44,20 @@ impl Horner {
                 .clamp_raw
                 .map(|(low, high)| (low as f64 * pow2(-p_bits), high as f64 * pow2(-p_bits))),
             accumulator_lsb: c.accumulator.format.lsb(),
-            first: Moments::of_rounding(rounding, coarse + p_bits - fine),
-            inner: Moments::of_rounding(rounding, p_bits),
-            output: Moments::of_rounding(
+            steps: (0..steps)
+                .map(|step| {
+                    let above = if step == 0 { coarse - fine } else { 0 };
+                    let own = Moments::of_rounding(rounding, p_bits + above);
+                    with_sign(own, rounding, nodes.get(2 * step))
+                })
+                .collect(),
+            output: with_sign(
+                Moments::of_rounding(
+                    c.output.rounding,
+                    last - c.output.format.fraction_bits as i32,
+                ),
                 c.output.rounding,
-                last - c.output.format.fraction_bits as i32,
+                nodes.get(2 * steps),
             ),
             output_lsb: c.output.format.lsb(),
         }
@@ -65,7 +78,7 @@ impl Horner {
 
     /// Rounding of the product of a step, LSB.
     pub(super) fn rounding(&self, step: usize) -> Moments {
-        if step == 0 { self.first } else { self.inner }
+        self.steps.get(step).copied().unwrap_or_default()
     }
 
     /// The polynomial's derivative.
@@ -77,6 +90,15 @@ impl Horner {
             t = c + p * t;
         }
         slope * factor
+    }
+
+    /// Mean of the bias's error, given that of p.
+    pub(super) fn mean(&self, p: f64, error: f64) -> f64 {
+        let slope = self.slope(p);
+        let (p, _) = self.limited(p);
+        let steps = self.coefficients.len().saturating_sub(1);
+        let sum = (0..steps).fold(0.0, |mean, k| p * mean + self.rounding(k).mean);
+        slope * error + sum * self.accumulator_lsb + self.output.mean * self.output_lsb
     }
 
     /// Mean squares of the error after each cast (inner, outer, inner, ...) and of the bias, given that of p.

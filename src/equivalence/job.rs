@@ -5,10 +5,13 @@ use super::overflow::{self, Repair};
 use super::predicted;
 use super::probe::Seen;
 use super::run;
+use super::{against, shrink};
 use crate::design::Design;
 use crate::emit::bundle::Bundle;
 use crate::error::Result;
 use crate::job::firmware::{Built, Firmware};
+use crate::simulation::hunting::{Hunting, hunting};
+use crate::spectrum::{NcoSpurs, nco_spurs};
 use crate::verify::compare;
 
 /// Rows that are compared with emitted code; a decimator of small ratio makes as many rows as samples.
@@ -28,46 +31,159 @@ pub struct Stimulus<'a> {
     pub origin: &'a str,
 }
 
-/// Runs everything. The result depends on design and codes alone.
-///
-/// # Errors
-/// No compiler, or emitted code that cannot be built or run.
-pub fn equivalence(design: &Design, stimulus: Stimulus, command: &str) -> Result<Equivalence> {
-    let (seen, emitted) = std::thread::scope(|scope| {
-        let emitted = scope.spawn(|| emitted(design, stimulus, command));
-        let seen = run::run(design, stimulus.drive, stimulus.sense);
-        match emitted.join() {
-            Ok(emitted) => (seen, emitted),
-            Err(panic) => std::panic::resume_unwind(panic),
-        }
-    });
-    let [c, rust] = emitted?;
-    Ok(assemble(design, stimulus, command, &seen, c, rust))
+/// How much of it, and how.
+#[derive(Debug, Clone, Copy)]
+pub struct Request<'a> {
+    /// Written into the result.
+    pub command: &'a str,
+    /// A second design, whose chain runs on the same codes.
+    pub against: Option<&'a Design>,
+    /// More than one: emitted code is built and compared beside the paired run. The result is the same.
+    pub threads: usize,
 }
 
-/// C and Rust: every table and function, the chain on its own stimulus and on these codes.
-fn emitted(design: &Design, stimulus: Stimulus, command: &str) -> Result<[Emitted; 2]> {
-    let firmware = Firmware::make(design, command)?;
+/// Runs everything; with the result the shrunk stimulus, if a node left its bound or emitted code differs. The result
+/// depends on designs, codes and command alone.
+///
+/// # Errors
+/// No compiler, emitted code that cannot be built or run, a design to compare with that does not fit.
+pub fn equivalence(
+    design: &Design,
+    stimulus: Stimulus,
+    request: Request,
+) -> Result<(Equivalence, Option<Codes>)> {
+    let against = request
+        .against
+        .map(|other| against::against(design, other, stimulus.drive, stimulus.sense));
+    let against = against.transpose()?;
+    let beside = || Beside::new(design, stimulus, request.command);
+    let (seen, beside) = if request.threads < 2 {
+        let beside = beside();
+        (run::run(design, stimulus.drive, stimulus.sense), beside)
+    } else {
+        std::thread::scope(|scope| {
+            let beside = scope.spawn(beside);
+            let seen = run::run(design, stimulus.drive, stimulus.sense);
+            match beside.join() {
+                Ok(beside) => (seen, beside),
+                Err(panic) => std::panic::resume_unwind(panic),
+            }
+        })
+    };
+    let beside = beside?;
+    let outside = |d: &[i32], s: &[i32]| {
+        let seen = run::run(design, d, s);
+        seen.nodes.iter().any(|n| n.outside > 0)
+    };
+    let mismatched = |d: &[i32], s: &[i32]| beside.differs(design, d, s);
+    let counterexample = counterexample(&seen, &beside.emitted, stimulus, &outside, &mismatched);
+    let mut result = assemble(design, stimulus, request.command, &seen, beside);
+    result.counterexample = counterexample.as_ref().map(|_| COUNTEREXAMPLE.to_owned());
+    if let Some(against) = against {
+        result.first_difference = against.first_difference.clone();
+        if let Some(first) = &against.first_difference {
+            result.holds = false;
+            result.reasons.push(first.sentence());
+        }
+        result.against = Some(against);
+    }
+    Ok((result, counterexample))
+}
+
+/// Drive and sense codes.
+pub type Codes = (Vec<i32>, Vec<i32>);
+
+/// The name of the file with the shrunk stimulus.
+pub const COUNTEREXAMPLE: &str = "counterexample.csv";
+
+/// The stimulus shrunk to what still makes a node leave its bound (`outside`), or else what still makes emitted code differ
+/// from the model (`mismatched`). `None` if neither happened, or emitted code differs elsewhere only.
+pub fn counterexample(
+    seen: &Seen,
+    emitted: &[Emitted; 2],
+    stimulus: Stimulus,
+    outside: &dyn Fn(&[i32], &[i32]) -> bool,
+    mismatched: &dyn Fn(&[i32], &[i32]) -> bool,
+) -> Option<Codes> {
+    let on_stimulus = |e: &Emitted| {
+        let mut parts = e.parts.iter();
+        parts.any(|p| p.name == ON_STIMULUS && p.mismatches > 0)
+    };
+    let fails = if seen.nodes.iter().any(|n| n.outside > 0) {
+        outside
+    } else if emitted.iter().any(on_stimulus) {
+        mismatched
+    } else {
+        return None;
+    };
+    let (drive, sense) = (stimulus.drive, stimulus.sense);
+    Some(shrink::shrink(drive, sense, shrink::MOST_RUNS, fails))
+}
+
+/// The chain's comparison on the stimulus, among the parts.
+const ON_STIMULUS: &str = "chain on the stimulus";
+
+/// What is done beside the paired run.
+struct Beside {
+    firmware: Firmware,
+    emitted: [Emitted; 2],
+    nco_spurs: NcoSpurs,
+    loops: Vec<Hunting>,
+    notes: Vec<String>,
+}
+
+impl Beside {
+    fn new(design: &Design, stimulus: Stimulus, command: &str) -> Result<Self> {
+        let firmware = Firmware::make(design, command)?;
+        let emitted = [
+            compared(design, stimulus, &firmware.c, &firmware.bundle)?,
+            compared(design, stimulus, &firmware.rust, &firmware.bundle)?,
+        ];
+        let mut notes = Vec::new();
+        let loops = hunting(design).unwrap_or_else(|error| {
+            notes.push(format!("loops are not measured: {error}"));
+            Vec::new()
+        });
+        Ok(Beside {
+            firmware,
+            emitted,
+            nco_spurs: nco_spurs(design),
+            loops,
+            notes,
+        })
+    }
+
+    /// Does emitted code differ from the model on these codes?
+    fn differs(&self, design: &Design, drive: &[i32], sense: &[i32]) -> bool {
+        let built = [&self.firmware.c, &self.firmware.rust];
+        built.iter().any(|b| {
+            let chain = compare::chain(design, b.language, &b.harness, drive, sense);
+            chain.is_ok_and(|c| c.mismatches > 0)
+        })
+    }
+}
+
+/// Every table and function of a language, the chain on its own stimulus and on these codes.
+fn compared(
+    design: &Design,
+    stimulus: Stimulus,
+    built: &Built,
+    bundle: &Bundle,
+) -> Result<Emitted> {
     let limit = MOST_ROWS.saturating_mul(design.circuit.decimator.ratio as usize);
     let count = stimulus.drive.len().min(limit);
     let (drive, sense) = (
         stimulus.drive.get(..count).unwrap_or_default(),
         stimulus.sense.get(..count).unwrap_or_default(),
     );
-    let one = |built: &Built, bundle: &Bundle| -> Result<Emitted> {
-        let mut parts = compare::with_model(design, bundle, built.language, &built.harness)?;
-        if bundle.has_chain {
-            let harness = &built.harness;
-            let mut chain = compare::chain(design, built.language, harness, drive, sense)?;
-            chain.name = "chain on the stimulus".into();
-            parts.push(chain);
-        }
-        Ok(Emitted::new(parts))
-    };
-    Ok([
-        one(&firmware.c, &firmware.bundle)?,
-        one(&firmware.rust, &firmware.bundle)?,
-    ])
+    let mut parts = compare::with_model(design, bundle, built.language, &built.harness)?;
+    if bundle.has_chain {
+        let harness = &built.harness;
+        let mut chain = compare::chain(design, built.language, harness, drive, sense)?;
+        chain.name = ON_STIMULUS.into();
+        parts.push(chain);
+    }
+    Ok(Emitted::new(parts))
 }
 
 /// Repairs overflow after overflow, running the design again after each, until nothing overflows.
@@ -94,9 +210,9 @@ fn assemble(
     stimulus: Stimulus,
     command: &str,
     seen: &Seen,
-    c: Emitted,
-    rust: Emitted,
+    beside: Beside,
 ) -> Equivalence {
+    let [c, rust] = beside.emitted;
     let predictions = predicted::predict(design, seen);
     let pairs = seen.nodes.iter().zip(&predictions);
     let nodes: Vec<NodeReport> = pairs.map(|(n, p)| NodeReport::new(n, p)).collect();
@@ -145,7 +261,11 @@ fn assemble(
         }),
         holds: reasons.is_empty(),
         reasons,
-        notes: notes(design, seen, &predictions),
+        notes: [notes(design, seen, &predictions), beside.notes].concat(),
+        nco_spurs: beside.nco_spurs,
+        loops: beside.loops,
+        against: None,
+        first_difference: None,
         counterexample: None,
     }
 }

@@ -6,7 +6,9 @@
 //! [`overflow`] finds the smallest format that removes the first overflow. [`outcome`] is `equiv.json`.
 
 pub mod activity;
+pub mod against;
 mod cordic_noise;
+mod front_noise;
 mod horner;
 pub mod job;
 pub mod layout;
@@ -19,3 +21,6 @@ pub mod predicted;
 pub mod probe;
 pub mod quantisation;
 pub mod run;
+pub mod shrink;
+mod slow_noise;
+pub mod table_noise;

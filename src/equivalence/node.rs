@@ -65,6 +65,8 @@ pub struct Node {
     pub before: (i128, i128),
     /// Sum of squares of the float value.
     pub sum_value_square: f64,
+    /// Positive less negative float values.
+    pub balance: i64,
     /// Samples whose float value moved by a quarter of an LSB or more, and the last value.
     pub moved: (u64, f64),
     /// Every word, where somebody asked for them.
@@ -92,6 +94,7 @@ impl Node {
             overflows: 0,
             before: (0, 0),
             sum_value_square: 0.0,
+            balance: 0,
             moved: (0, 0.0),
             history: None,
         }
@@ -120,6 +123,7 @@ impl Node {
         }
         let size = error.abs();
         self.count += 1;
+        self.balance += i64::from(real > 0.0) - i64::from(real < 0.0);
         self.sum_error += error;
         self.sum_square += error * error;
         self.max_abs_error = self.max_abs_error.max(size);

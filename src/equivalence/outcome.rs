@@ -1,10 +1,13 @@
 //! `equiv.json` (`gyrogen.equiv/1`): what a run comes to.
 
+use super::against::{Against, FirstDifference};
 use super::node::Node;
 use super::overflow::{self, Repair};
 use super::predicted::Prediction;
 use super::probe::Seen;
 use crate::design::Design;
+use crate::simulation::hunting::Hunting;
+use crate::spectrum::NcoSpurs;
 use crate::verify::compare::Compared;
 use serde::Serialize;
 
@@ -223,7 +226,15 @@ pub struct Equivalence {
     pub reasons: Vec<String>,
     /// What the flags mean, and what else to know.
     pub notes: Vec<String>,
-    /// The shrunk stimulus on which a node leaves its bound or overflows.
+    /// The oscillator's spurs, at the design's tuning word.
+    pub nco_spurs: NcoSpurs,
+    /// What quantisation leaves of the loops: dead band and limit cycle, measured and predicted; empty without a loop.
+    pub loops: Vec<Hunting>,
+    /// The other design's chain on the same codes; null if none was given.
+    pub against: Option<Against>,
+    /// The first word in which the two chains differ; null if none does, or if there is one chain only.
+    pub first_difference: Option<FirstDifference>,
+    /// The shrunk stimulus on which a node leaves its bound, or emitted code differs: a file beside this one.
     pub counterexample: Option<String>,
 }
 

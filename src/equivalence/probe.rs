@@ -69,6 +69,14 @@ pub struct Probe {
     needed_width: Cell<u32>,
     /// Rows on which fixed and float phase lay on both sides of the cut at half a turn.
     cut_rows: Cell<u64>,
+    /// Sees every raw word.
+    tap: Option<Box<dyn Tap>>,
+}
+
+/// Sees every raw word of a run, in the order of the steps.
+pub trait Tap: std::fmt::Debug {
+    /// A word of a node at an ADC sample.
+    fn word(&self, node: usize, sample: u64, raw: i128);
 }
 
 impl Probe {
@@ -122,10 +130,24 @@ impl Probe {
             table_errors: table_errors(chain),
             polar: Polar::new(design),
             phase_loop: RefCell::new(PhaseLoopBound::new(design)),
-            activity: RefCell::new(Activity::default()),
+            activity: RefCell::new(Activity::with_period(super::quantisation::repeats(design))),
             first_overflow: RefCell::new(None),
             needed_width: Cell::new(0),
             cut_rows: Cell::new(0),
+            tap: None,
+        }
+    }
+
+    /// The same with a tap.
+    pub fn with_tap(mut self, tap: Box<dyn Tap>) -> Self {
+        self.tap = Some(tap);
+        self
+    }
+
+    #[inline(always)]
+    fn tap(&self, node: usize, raw: i128) {
+        if let Some(tap) = &self.tap {
+            tap.word(node, self.sample.get(), raw);
         }
     }
 
@@ -157,6 +179,7 @@ impl Probe {
 
     /// Notes a word that is no cast.
     pub fn note<W: Lane>(&self, node: usize, word: &Pair<W>) {
+        self.tap(node, word.raw.wide());
         if let Some(node) = self.nodes.borrow_mut().get_mut(node) {
             node.note(word, self.sample.get());
         }
@@ -164,6 +187,7 @@ impl Probe {
 
     /// Notes a raw value with error and bound that were made elsewhere.
     pub fn note_error(&self, node: usize, raw: i128, error: f64, bound: f64, real: f64) {
+        self.tap(node, raw);
         if let Some(node) = self.nodes.borrow_mut().get_mut(node) {
             node.note_error(raw, error, bound, real, self.sample.get());
         }
@@ -263,6 +287,7 @@ impl Watch for Probe {
         let Some(node) = nodes.get_mut(place) else {
             return output;
         };
+        self.tap(place, output.raw.wide());
         node.note(&output, self.sample.get());
         node.different.mark(input.raw.wide() as u64);
         if !cast.is_proved() {
@@ -288,6 +313,7 @@ impl Watch for Probe {
     #[inline(always)]
     fn sine<W: Lane>(&self, word: &Pair<W>) {
         let cosine = self.cosine_is_next.replace(!self.cosine_is_next.get());
+        self.tap(self.places.sine + usize::from(cosine), word.raw.wide());
         if let Some(node) = self
             .nodes
             .borrow_mut()

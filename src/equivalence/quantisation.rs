@@ -1,10 +1,8 @@
-//! Moments of rounding errors and of a sine table's errors (Widrow and Kollar, Quantization Noise, 2008).
+//! Moments of rounding errors (Widrow and Kollar, Quantization Noise, 2008), and how an oscillator's phases are spread.
 
 use crate::design::Design;
 use crate::numeric::cast::Cast;
-use crate::numeric::constants;
 use crate::numeric::format::{Rounding, pow2};
-use std::f64::consts::TAU;
 
 /// Mean and mean square of an error.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -42,148 +40,87 @@ impl Moments {
         Moments { mean, square }
     }
 
+    /// The same, all *odd* values being equally likely: each of them is half of all values, and the even ones
+    /// are those of one bit less.
+    pub fn of_rounding_odd(rounding: Rounding, bits: i32) -> Moments {
+        if bits <= 0 {
+            return Moments::default();
+        }
+        let (all, even) = (
+            Moments::of_rounding(rounding, bits),
+            Moments::of_rounding(rounding, bits - 1),
+        );
+        Moments {
+            mean: 2.0 * all.mean - even.mean,
+            square: 2.0 * all.square - even.square,
+        }
+    }
+
     /// The rounding of a cast, LSB of its target.
     pub fn of_cast(cast: &Cast) -> Moments {
         Moments::of_rounding(cast.rounding, cast.shift)
     }
 }
 
-/// How the oscillator's phases are spread.
+/// How the oscillator's phases are spread over a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Spread {
-    /// Few phases, all of them visited again and again: this many.
+    /// A short period: this many phases, again and again.
     Coherent(u64),
-    /// So many that the phase below the address is uniform.
-    Uniform,
-    /// Neither: a slow drift over few phases, or too few samples.
-    Unknown,
+    /// Phases in this many clusters, which hardly drift during the run.
+    Clusters(u64),
+    /// Many phases.
+    Many,
 }
 
-/// Phases that are enumerated at most.
-const MOST_PHASES: u64 = 1 << 20;
+impl Spread {
+    /// Places on the circle.
+    pub fn places(self) -> f64 {
+        match self {
+            Spread::Coherent(count) | Spread::Clusters(count) => count as f64,
+            Spread::Many => f64::INFINITY,
+        }
+    }
+}
+
 /// Below this many phases a period, the table's errors are lines and no noise.
 pub const FEW_PHASES: u64 = 1 << 12;
 
 /// How a fixed tuning word spreads the phases over `samples` samples.
 ///
 /// With x = word / 2^w, every convergent p/q of x says that the phases lie in q clusters that drift by
-/// samples * |q x - p| of their distance. They cover the circle if they drift by their distance several times,
-/// or if q is far beyond the table's addresses.
+/// samples * |q x - p| / q; the circle is covered if they drift by their distance 1 / q.
 pub fn spread(design: &Design, samples: u64) -> Spread {
     let nco = &design.circuit.nco;
     let circle = 1i128 << nco.phase_bits;
     let word = i128::from(nco.tuning_word).rem_euclid(circle);
-    let period = if word == 0 {
-        1
-    } else {
-        circle >> word.trailing_zeros()
-    };
-    if period <= i128::from(MOST_PHASES) && period * 10 <= i128::from(samples) {
-        return Spread::Coherent(period as u64);
-    }
-    let fine = 64i128 << nco.table_address_bits;
-    // Continued fraction of word / circle.
+    // Continued fraction of word / circle; ends where the period is met.
     let (mut a, mut b) = (circle, word);
     let (mut q_before, mut q) = (0i128, 1i128);
     while b != 0 {
-        if q > fine {
-            return Spread::Uniform;
+        if q > i128::from(FEW_PHASES) {
+            return Spread::Many;
         }
-        // |q x - p| = remainder / circle.
-        let drift = b as f64 / circle as f64 * samples as f64;
-        if drift < 10.0 {
-            return Spread::Unknown;
+        // |q x - p| = b / circle.
+        if (b as f64 / circle as f64) * (samples as f64) < 1.0 {
+            return Spread::Clusters(q as u64);
         }
         let whole = a / b;
         (a, b) = (b, a % b);
         (q_before, q) = (q, whole.saturating_mul(q).saturating_add(q_before));
     }
-    if q > fine {
-        Spread::Uniform
+    if q > i128::from(FEW_PHASES) {
+        Spread::Many
     } else {
-        Spread::Unknown
+        Spread::Coherent(q as u64)
     }
 }
 
-/// Errors of sine and cosine over the phases.
-#[derive(Debug, Clone, Default)]
-pub struct TableErrors {
-    /// A.
-    pub amplitude: f64,
-    /// Of [sine, cosine]: mean of e^2 times [1, cos 2 theta, sin 2 theta].
-    pub square: [[f64; 3]; 2],
-    /// Twice the mean of e times [sin theta, cos theta]: what is synchronous with the carrier.
-    pub synchronous: [[f64; 2]; 2],
-    /// Share of phases whose entry ends in j zero bits, by j; the last stands for the entry 0.
-    pub zero_bits: [Vec<f64>; 2],
-}
-
-impl TableErrors {
-    /// Enumerates all phases of a coherent oscillator, or every address with phases evenly between.
-    pub fn new(design: &Design, spread: Spread) -> Self {
-        let nco = &design.circuit.nco;
-        let bits = nco.table.bits();
-        let entries = constants::sine_table(nco.table_address_bits, bits);
-        let addresses = entries.len() as u64;
-        let (phases, offset) = match spread {
-            Spread::Coherent(period) => (period, 0.0),
-            _ => (addresses * 8, 0.5),
-        };
-        let lsb = nco.table.lsb();
-        let amplitude = ((1i64 << (bits - 1)) - 1) as f64 * lsb;
-        let half = if nco.address_rounding == Rounding::HalfUp
-            && nco.phase_bits > nco.table_address_bits
-        {
-            0.5
-        } else {
-            0.0
-        };
-        let mut errors = TableErrors {
-            amplitude,
-            zero_bits: [vec![0.0; 65], vec![0.0; 65]],
-            ..TableErrors::default()
-        };
-        let share = 1.0 / phases as f64;
-        for k in 0..phases {
-            let turns = (k as f64 + offset) / phases as f64;
-            let (sin, cos) = (turns * TAU).sin_cos();
-            let weights = [1.0, cos * cos - sin * sin, 2.0 * sin * cos];
-            let address = (turns * addresses as f64 + half).floor() as u64;
-            for (part, exact) in [(0, sin), (1, cos)] {
-                let entry = entries
-                    .get(((address + part as u64 * addresses / 4) % addresses) as usize)
-                    .copied()
-                    .unwrap_or(0);
-                let error = entry as f64 * lsb - amplitude * exact;
-                for (sum, weight) in errors.square[part].iter_mut().zip(weights) {
-                    *sum += error * error * weight * share;
-                }
-                for (sum, weight) in errors.synchronous[part].iter_mut().zip([sin, cos]) {
-                    *sum += 2.0 * error * weight * share;
-                }
-                let zeros = (entry.trailing_zeros() as usize).min(64);
-                if let Some(sum) = errors.zero_bits[part].get_mut(zeros) {
-                    *sum += share;
-                }
-            }
-        }
-        errors
-    }
-
-    /// rms of the error of sine (0) or cosine (1).
-    pub fn rms(&self, part: usize) -> f64 {
-        self.square.get(part).map_or(0.0, |s| s[0].max(0.0).sqrt())
-    }
-
-    /// Rounding of code * entry by `bits` bits, LSB: an entry that ends in zero bits leaves fewer to round.
-    pub fn product_rounding(&self, part: usize, rounding: Rounding, bits: i32) -> Moments {
-        let mut moments = Moments::default();
-        for (zeros, share) in self.zero_bits.get(part).into_iter().flatten().enumerate() {
-            let of = Moments::of_rounding(rounding, bits - zeros as i32);
-            moments.mean += share * of.mean;
-            moments.square += share * of.square;
-        }
-        moments
+/// The period after which phases repeat, exactly or as nearly as 2^20 samples show.
+pub fn repeats(design: &Design) -> Option<usize> {
+    match spread(design, 1 << 20) {
+        Spread::Coherent(count) | Spread::Clusters(count) => Some(count as usize),
+        Spread::Many => None,
     }
 }
 

@@ -1,6 +1,6 @@
 //! Runs a design's chain in both arithmetics at once over captured codes.
 
-use super::probe::{Probe, Seen};
+use super::probe::{Probe, Seen, Tap};
 use crate::circuit::chain::{Chain, FastState, SlowState};
 use crate::design::Design;
 use crate::numeric::cast::HasKernel;
@@ -19,22 +19,41 @@ pub fn run(design: &Design, drive: &[i32], sense: &[i32]) -> Seen {
 
 /// The same; every node keeps every word ([`super::node::History`]).
 pub fn run_remembering(design: &Design, drive: &[i32], sense: &[i32]) -> Seen {
-    staged(design, drive, sense, true, &mut |_, _| {})
+    staged(design, drive, sense, Extra::History, &mut |_, _| {})
 }
 
 /// The same; every row is handed over.
 pub fn run_with_rows(design: &Design, drive: &[i32], sense: &[i32], rows: RowSink) -> Seen {
-    staged(design, drive, sense, false, rows)
+    staged(design, drive, sense, Extra::Nothing, rows)
 }
 
-fn staged(design: &Design, drive: &[i32], sense: &[i32], keep: bool, rows: RowSink) -> Seen {
+/// The same; `tap` sees every raw word.
+pub fn run_tapped(
+    design: &Design,
+    drive: &[i32],
+    sense: &[i32],
+    tap: Box<dyn Tap>,
+    rows: RowSink,
+) -> Seen {
+    staged(design, drive, sense, Extra::Tap(tap), rows)
+}
+
+/// What is kept beside the sums.
+enum Extra {
+    Nothing,
+    /// Every word of every node.
+    History,
+    Tap(Box<dyn Tap>),
+}
+
+fn staged(design: &Design, drive: &[i32], sense: &[i32], extra: Extra, rows: RowSink) -> Seen {
     match design.circuit.decimator.stages {
-        1 => with_stages::<1>(design, drive, sense, keep, rows),
-        2 => with_stages::<2>(design, drive, sense, keep, rows),
-        3 => with_stages::<3>(design, drive, sense, keep, rows),
-        4 => with_stages::<4>(design, drive, sense, keep, rows),
-        5 => with_stages::<5>(design, drive, sense, keep, rows),
-        _ => with_stages::<6>(design, drive, sense, keep, rows),
+        1 => with_stages::<1>(design, drive, sense, extra, rows),
+        2 => with_stages::<2>(design, drive, sense, extra, rows),
+        3 => with_stages::<3>(design, drive, sense, extra, rows),
+        4 => with_stages::<4>(design, drive, sense, extra, rows),
+        5 => with_stages::<5>(design, drive, sense, extra, rows),
+        _ => with_stages::<6>(design, drive, sense, extra, rows),
     }
 }
 
@@ -42,14 +61,16 @@ fn with_stages<const N: usize>(
     design: &Design,
     drive: &[i32],
     sense: &[i32],
-    keep: bool,
+    extra: Extra,
     rows: RowSink,
 ) -> Seen {
     let chain = Chain::<N>::new(design);
-    let mut probe = Probe::new(design, &chain);
-    if keep {
-        probe = probe.remembering();
-    }
+    let probe = Probe::new(design, &chain);
+    let probe = match extra {
+        Extra::Nothing => probe,
+        Extra::History => probe.remembering(),
+        Extra::Tap(tap) => probe.with_tap(tap),
+    };
     if fits_narrow_lanes(design, &chain) {
         Running::<i64, i64, N>::new(&chain, &probe).process(drive, sense, rows);
     } else {
