@@ -1,6 +1,6 @@
 //! The raw part is `Fixed`'s and the real part `Float`'s, bit for bit; every error is within its bound.
 
-use super::super::arithmetic::{Arithmetic, Block, Ring};
+use super::super::arithmetic::{Arithmetic, Ring};
 use super::super::cast::{Cast, Label};
 use super::super::fixed::Fixed;
 use super::super::float::Float;
@@ -12,12 +12,13 @@ use crate::design::{Design, template::default_design};
 use crate::equivalence::run::run_with_rows;
 use proptest::prelude::*;
 
-/// Looks on and changes nothing.
-struct Nobody;
+/// Looks on; makes the bounds of casts smaller by a factor, 1 for an honest one.
+struct Shrunk(f64);
 
-impl Watch for Nobody {
+impl Watch for Shrunk {
     fn cast<W: Lane>(&self, _: &Cast, _: &Pair<W>, _: W, _: &[Pair<W>], o: Pair<W>) -> Pair<W> {
-        o
+        let bound = o.bound * self.0;
+        Pair { bound, ..o }
     }
     fn sine<W: Lane>(&self, _: &Pair<W>) {}
     fn table_error(&self, _: usize) -> f64 {
@@ -133,7 +134,7 @@ proptest! {
         start in (-3000i128..3000, -3000i128..3000),
     ) {
         let start = [start.0, start.1];
-        let pairs = program(&Paired::<i128, i128, Nobody>::new(&Nobody), &steps, start);
+        let pairs = program(&Paired::<i128, i128, Shrunk>::new(&Shrunk(1.0)), &steps, start);
         let raw = program(&Fixed::<i128, i128>::new(), &steps, start);
         let real = program(&Float, &steps, start);
         for (k, pair) in pairs.iter().enumerate() {
@@ -148,7 +149,7 @@ proptest! {
     #[test]
     fn a_ring_has_both_arithmetics_bits(words in prop::collection::vec(-512i128..512, 8..60)) {
         let ring = Ring { bits: 22, fraction_bits: 9, reach: 12 };
-        let paired = Paired::<i64, i64, Nobody>::new(&Nobody);
+        let paired = Paired::<i64, i64, Shrunk>::new(&Shrunk(1.0));
         let (fixed, float) = (Fixed::<i64, i64>::new(), Float);
         let mut a = [paired.residue_constant(0, &ring); 2];
         let mut b = [fixed.residue_constant(0, &ring); 2];
@@ -166,6 +167,21 @@ proptest! {
             prop_assert!(pair.error().abs() <= pair.total_bound());
         }
     }
+}
+
+#[test]
+fn a_bound_that_is_a_tenth_too_small_is_seen() {
+    let steps = [Step::Cast(Rounding::HalfUp, Overflow::Saturate, 8, 4)];
+    let outside = |factor| {
+        let watch = Shrunk(factor);
+        let words = (0..64).flat_map(|k| {
+            let arithmetic = Paired::<i128, i128, Shrunk>::new(&watch);
+            program(&arithmetic, &steps, [k, 0])
+        });
+        words.filter(|w| w.error().abs() > w.total_bound()).count()
+    };
+    assert_eq!(outside(1.0), 0);
+    assert!(outside(0.9) > 0);
 }
 
 fn design(decimator: (u32, u32, u32), address_bits: u32, word: i64) -> Design {
