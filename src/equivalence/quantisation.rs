@@ -86,14 +86,20 @@ impl Spread {
 /// Below this many phases a period, the table's errors are lines and no noise.
 pub const FEW_PHASES: u64 = 1 << 12;
 
+/// Addresses that a slow drift has to pass.
+const STEPS: f64 = 64.0;
+
 /// How a fixed tuning word spreads the phases over `samples` samples.
 ///
 /// With x = word / 2^w, every convergent p/q of x says that the phases lie in q clusters that drift by
-/// samples * |q x - p| / q; the circle is covered if they drift by their distance 1 / q.
+/// samples * |q x - p| / q; the circle is covered if they drift by their distance 1 / q. If the clusters are not finer than
+/// the table's addresses, its errors are waves as slow as that drift: they go round often enough to have nothing in
+/// common with the signal's own changes if the drift is over [`STEPS`] addresses.
 pub fn spread(design: &Design, samples: u64) -> Spread {
     let nco = &design.circuit.nco;
     let circle = 1i128 << nco.phase_bits;
     let word = i128::from(nco.tuning_word).rem_euclid(circle);
+    let addresses = 1i128 << nco.table_address_bits;
     // Continued fraction of word / circle; ends where the period is met.
     let (mut a, mut b) = (circle, word);
     let (mut q_before, mut q) = (0i128, 1i128);
@@ -102,7 +108,9 @@ pub fn spread(design: &Design, samples: u64) -> Spread {
             return Spread::Many;
         }
         // |q x - p| = b / circle.
-        if (b as f64 / circle as f64) * (samples as f64) < 1.0 {
+        let drift = (b as f64 / circle as f64) * (samples as f64) / q as f64;
+        let slow = q < 8 * addresses && drift * (addresses as f64) < STEPS;
+        if drift * (q as f64) < 1.0 || slow {
             return Spread::Clusters(q as u64);
         }
         let whole = a / b;

@@ -33,7 +33,7 @@ pub struct TableErrors {
     zero_bits: [Vec<f64>; 2],
     /// Behind the decimator.
     pub lines: Lines,
-    /// The same with half the squared turn added to x0 and x3: a turned vector keeps its length.
+    /// The same with what a turn adds to the length added to x0 and x3: a turned vector keeps its length.
     pub stretch: Lines,
 }
 
@@ -274,7 +274,8 @@ impl<'a> Sums<'a> {
         let x = [x0, x1, x2, x3];
         self.rows += 1;
         let turn = (x[2] - x[1]) / 2.0;
-        let longer = turn * turn / 2.0;
+        let along = (x[0] + x[3]) / 2.0;
+        let longer = (1.0 + along).hypot(turn) - 1.0 - along;
         self.errors.lines.add(x, turn);
         let stretched = [x[0] + longer, x[1], x[2], x[3] + longer];
         self.errors.stretch.add(stretched, turn);

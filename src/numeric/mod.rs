@@ -12,4 +12,5 @@ pub mod float;
 pub mod format;
 pub mod lane;
 pub mod paired;
+mod paired_word;
 pub mod trace;
