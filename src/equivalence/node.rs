@@ -132,7 +132,8 @@ impl Node {
             self.worst = (size / bound, sample);
         }
         // Written so that a NaN is outside.
-        if !(size <= bound) {
+        let inside = size <= bound;
+        if !inside {
             self.outside += 1;
             self.first_outside.get_or_insert(sample);
         }

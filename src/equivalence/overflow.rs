@@ -114,8 +114,7 @@ fn holding(from: Format, (high, low): (i128, i128), symmetric: bool) -> Option<F
     Some(Format {
         signed,
         integer_bits: bits
-            .checked_sub(from.fraction_bits)
-            .unwrap_or(0)
+            .saturating_sub(from.fraction_bits)
             .max(u32::from(signed)),
         fraction_bits: from.fraction_bits,
     })

@@ -49,7 +49,8 @@ impl Theory<'_> {
         flags.extend(q.flags.iter().filter(|f| !i.flags.contains(f)));
         // Few short vectors must not make the mean of 1 / r^2.
         let enough = ENOUGH_ROWS as f64 / 3.0 * self.activity.inverse_fourth;
-        if !(self.activity.inverse_square.powi(2) > enough) || i.white * inverse_square > 0.01 {
+        let strong = self.activity.inverse_square.powi(2) > enough;
+        if !strong || i.white * inverse_square > 0.01 {
             flags.push("weak_vector");
         }
         flags.extend(self.nco_flags());

@@ -261,7 +261,7 @@ impl<'a> Sums<'a> {
         // (D_s, D_c) makes I and Q of F = [[p, q], [q, 2 - p]]; the errors are given by I and Q: x = e F^-1.
         let (p, q) = (p * carrier_scale, q * carrier_scale);
         let determinant = p * (2.0 - p) - q * q;
-        if !(determinant > 0.01) {
+        if determinant.is_nan() || determinant < 0.01 {
             return;
         }
         let by = |s: f64, c: f64| {
