@@ -317,7 +317,8 @@ impl<W: HasKernel, R: Lane, P: Watch> Arithmetic for Paired<'_, W, R, P> {
             bound: a.bound as f64 * step + real.abs() * UNIT,
             phase_bound: a.phase_bound as f64 * step,
             fraction_bits: ring.fraction_bits,
-            cyclic: false,
+            // A turn: the two may lie on both sides of the cut.
+            cyclic: *ring == Ring::cyclic(ring.bits, ring.bits as i32),
         }
     }
     /// Entry k stands for the phases that are addressed to it. Its bound is its own error as an
