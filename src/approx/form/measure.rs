@@ -1,0 +1,216 @@
+//! How far a form is from its function: over every code by running it, and over the real domain by proof.
+//!
+//! The proof, piece by piece (a piece is an interval of codes on which the form's data stand for one
+//! polynomial p): sup |f - p| over the piece's real interval, by a rigorous method, plus the greatest |result - p|
+//! over the piece's codes. The latter is evaluation and output rounding together; where every code is run, it is known exactly
+//! (integers), else it is bounded by analysis. The sum is taken on each piece and not globally.
+
+use super::{Form, Piece, Settled, run_in};
+use crate::error::{Error, Result};
+use crate::numeric::cast::HasKernel;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Codes that are run where there are too many to run all.
+const SAMPLE: u128 = 1 << 20;
+
+/// The function that a form stands for, with proved enclosures.
+pub trait Reference: Sync {
+    /// f(x) and a certified radius, the rounding of the value included.
+    fn at(&self, x: f64) -> (f64, f64);
+    /// Certified sup |f - p| over `low ..= high`, p the piece's polynomial.
+    fn supremum(&self, piece: &Piece, low: f64, high: f64) -> f64;
+    /// A certified enclosure of f's range.
+    fn range(&self, low: f64, high: f64) -> (f64, f64);
+    /// The domain.
+    fn domain(&self) -> (f64, f64);
+}
+
+/// What was found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measured {
+    /// Proved over the real domain.
+    pub certified: f64,
+    /// Of the data alone: sup |f - p|, proved.
+    pub data_only: f64,
+    /// Greatest |result - p| on any piece: evaluation and output rounding.
+    pub rounding: f64,
+    /// Greatest error over the codes that were run; certified from above.
+    pub observed: f64,
+    /// The first code with it.
+    pub at_input_raw: i128,
+    /// Codes that were run.
+    pub inputs_checked: u64,
+    /// They were all.
+    pub exhaustive: bool,
+}
+
+/// How much is run, and who is told.
+pub struct Effort<'a> {
+    /// All codes are run if there are at most so many.
+    pub most_codes: u128,
+    /// Threads.
+    pub threads: usize,
+    /// Told of codes that have been run.
+    pub progress: &'a (dyn Fn(u64) + Sync),
+}
+
+/// The result for one piece.
+#[derive(Debug, Clone, Copy)]
+struct OfPiece {
+    data: f64,
+    rounding: f64,
+    observed: f64,
+    at: i128,
+    checked: u64,
+}
+
+/// Runs the form and proves its bound.
+///
+/// # Errors
+/// A result outside the proved bound: an error of this program.
+pub fn measure(settled: &Settled, reference: &dyn Reference, effort: &Effort) -> Result<Measured> {
+    let pieces = settled.form.pieces();
+    let codes = settled.form.codes();
+    let exhaustive = codes.count() <= effort.most_codes;
+    let stride = match exhaustive {
+        true => 1,
+        false => (codes.count() / SAMPLE).max(1) as i128,
+    };
+    let results = Mutex::new(vec![None; pieces.len()]);
+    let next = AtomicUsize::new(0);
+    std::thread::scope(|scope| {
+        for _ in 0..effort.threads.clamp(1, pieces.len().max(1)) {
+            scope.spawn(|| {
+                loop {
+                    let k = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(piece) = pieces.get(k) else { break };
+                    let end = ends(&pieces, k, settled, reference);
+                    let result = of_piece(settled, reference, piece, end, exhaustive, stride);
+                    (effort.progress)(result.checked);
+                    if let Ok(mut results) = results.lock() {
+                        results[k] = Some(result);
+                    }
+                }
+            });
+        }
+    });
+    let results = results.into_inner().unwrap_or_default();
+    let mut all = Measured {
+        certified: 0.0,
+        data_only: 0.0,
+        rounding: 0.0,
+        observed: 0.0,
+        at_input_raw: codes.low,
+        inputs_checked: 0,
+        exhaustive,
+    };
+    for result in results.into_iter().flatten() {
+        all.certified = all.certified.max(result.data + result.rounding);
+        all.data_only = all.data_only.max(result.data);
+        all.rounding = all.rounding.max(result.rounding);
+        if result.observed > all.observed {
+            (all.observed, all.at_input_raw) = (result.observed, result.at);
+        }
+        all.inputs_checked += result.checked;
+    }
+    checked(all, settled, reference)
+}
+
+/// Nothing that was observed lies outside what was proved.
+fn checked(mut all: Measured, settled: &Settled, reference: &dyn Reference) -> Result<Measured> {
+    let x = settled.form.codes().real(all.at_input_raw);
+    let (value, radius) = reference.at(x);
+    let result = settled.run(all.at_input_raw) as f64 * settled.form.output().lsb();
+    if (result - value).abs() - radius > all.certified * (1.0 + 1e-9) {
+        return Err(Error::Check(format!(
+            "internal: at input {} the error {:e} exceeds the proved bound {:e}; please report this",
+            all.at_input_raw,
+            (result - value).abs(),
+            all.certified
+        )));
+    }
+    // Both are proved bounds of what was observed.
+    all.observed = all.observed.min(all.certified);
+    Ok(all)
+}
+
+/// The real interval of piece k.
+fn ends(
+    pieces: &[Piece],
+    k: usize,
+    settled: &Settled,
+    reference: &dyn Reference,
+) -> (f64, f64) {
+    let codes = settled.form.codes();
+    let piece = &pieces[k];
+    let (a, b) = reference.domain();
+    let (low, high) = (codes.real(piece.low), codes.real(piece.high));
+    if !matches!(settled.form, Form::Polynomial(_)) {
+        return (low.max(a), high.min(b));
+    }
+    // A polynomial goes on between the codes and up to the domain's ends.
+    let low = if k == 0 { a } else { low };
+    let high = if k + 1 == pieces.len() { b } else { codes.real(piece.high + 1) };
+    (low, high)
+}
+
+fn of_piece(
+    settled: &Settled,
+    reference: &dyn Reference,
+    piece: &Piece,
+    (low, high): (f64, f64),
+    exhaustive: bool,
+    stride: i128,
+) -> OfPiece {
+    let data = reference.supremum(piece, low, high);
+    let mut result = if settled.bits <= 64 {
+        run_piece::<i64>(&settled.form, reference, piece, stride)
+    } else {
+        run_piece::<i128>(&settled.form, reference, piece, stride)
+    };
+    result.data = data;
+    if !exhaustive {
+        let output = settled.form.output();
+        let lsb = output.lsb();
+        let (least, greatest) = reference.range(low, high);
+        let above = greatest + data - output.max_raw() as f64 * lsb;
+        let below = output.min_raw() as f64 * lsb - (least - data);
+        let outside = above.max(below).max(0.0);
+        result.rounding = piece.evaluation_bound + 0.5 * lsb + outside;
+    }
+    result
+}
+
+fn run_piece<L: HasKernel>(
+    form: &Form,
+    reference: &dyn Reference,
+    piece: &Piece,
+    stride: i128,
+) -> OfPiece {
+    let codes = form.codes();
+    let lsb = form.output().lsb();
+    let mut result = OfPiece {
+        data: 0.0,
+        rounding: 0.0,
+        observed: -1.0,
+        at: piece.low,
+        checked: 0,
+    };
+    let mut code = piece.low;
+    while code <= piece.high {
+        let x = codes.real(code);
+        let y = run_in::<L>(form, L::low(code)).real() * lsb;
+        let (value, radius) = reference.at(x);
+        let error = (y - value).abs() + radius;
+        if error > result.observed {
+            (result.observed, result.at) = (error, code);
+        }
+        let (ideal, slack) = piece.value(x);
+        result.rounding = result.rounding.max((y - ideal).abs() + slack);
+        result.checked += 1;
+        // The last code is always run.
+        code = if code < piece.high { (code + stride).min(piece.high) } else { code + 1 };
+    }
+    result
+}
