@@ -2,7 +2,8 @@
 //!
 //! The proof, piece by piece (a piece is an interval of codes on which the form's data stand for one
 //! polynomial p): sup |f - p| over the piece's real interval, by a rigorous method, plus the greatest |result - p|
-//! over the piece's codes. The latter is evaluation and output rounding together; where every code is run, it is known exactly
+//! over the piece's codes. Here p is limited to the output's range, as the result is: that moves p towards f, or f is outside the
+//! range by no less than the distance. The latter is evaluation and output rounding together; where every code is run, it is known exactly
 //! (integers), else it is bounded by analysis. The sum is taken on each piece and not globally.
 
 use super::{Form, Piece, Settled, run_in};
@@ -59,6 +60,8 @@ pub struct Effort<'a> {
 #[derive(Debug, Clone, Copy)]
 struct OfPiece {
     data: f64,
+    /// sup |f - p limited to the output's range|.
+    distance: f64,
     rounding: f64,
     observed: f64,
     at: i128,
@@ -106,7 +109,7 @@ pub fn measure(settled: &Settled, reference: &dyn Reference, effort: &Effort) ->
         exhaustive,
     };
     for result in results.into_iter().flatten() {
-        all.certified = all.certified.max(result.data + result.rounding);
+        all.certified = all.certified.max(result.distance + result.rounding);
         all.data_only = all.data_only.max(result.data);
         all.rounding = all.rounding.max(result.rounding);
         if result.observed > all.observed {
@@ -155,6 +158,13 @@ fn ends(
     (low, high)
 }
 
+/// The output's least and greatest value.
+fn limits(form: &Form) -> (f64, f64) {
+    let output = form.output();
+    let value = |raw| raw as f64 * output.lsb();
+    (value(output.min_raw()), value(output.max_raw()))
+}
+
 fn of_piece(
     settled: &Settled,
     reference: &dyn Reference,
@@ -170,14 +180,12 @@ fn of_piece(
         run_piece::<i128>(&settled.form, reference, piece, stride)
     };
     result.data = data;
+    // What the output's limits cannot reach.
+    let (bottom, top) = limits(&settled.form);
+    let (least, greatest) = reference.range(low, high);
+    result.distance = data.max(greatest - top).max(bottom - least);
     if !exhaustive {
-        let output = settled.form.output();
-        let lsb = output.lsb();
-        let (least, greatest) = reference.range(low, high);
-        let above = greatest + data - output.max_raw() as f64 * lsb;
-        let below = output.min_raw() as f64 * lsb - (least - data);
-        let outside = above.max(below).max(0.0);
-        result.rounding = piece.evaluation_bound + 0.5 * lsb + outside;
+        result.rounding = piece.evaluation_bound + 0.5 * settled.form.output().lsb();
     }
     result
 }
@@ -190,8 +198,10 @@ fn run_piece<L: HasKernel>(
 ) -> OfPiece {
     let codes = form.codes();
     let lsb = form.output().lsb();
+    let (bottom, top) = limits(form);
     let mut result = OfPiece {
         data: 0.0,
+        distance: 0.0,
         rounding: 0.0,
         observed: -1.0,
         at: piece.low,
@@ -207,6 +217,7 @@ fn run_piece<L: HasKernel>(
             (result.observed, result.at) = (error, code);
         }
         let (ideal, slack) = piece.value(x);
+        let ideal = ideal.clamp(bottom, top);
         result.rounding = result.rounding.max((y - ideal).abs() + slack);
         result.checked += 1;
         // The last code is always run.

@@ -4,6 +4,7 @@
 //! prints its trace. A form also says which exact piecewise polynomial its data stand for ([`Piece`]): what
 //! is left between the two is rounding.
 
+pub mod generate;
 pub mod measure;
 pub mod piecewise;
 pub mod polynomial;
@@ -258,3 +259,6 @@ pub fn run_in<L: HasKernel>(form: &Form, input: L) -> L {
 pub(crate) fn integer_bits_of(range: Interval, fraction_bits: i32) -> i32 {
     range.bits() as i32 - fraction_bits
 }
+
+#[cfg(test)]
+mod tests;
