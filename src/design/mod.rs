@@ -13,7 +13,7 @@ mod keys;
 pub mod limits;
 pub mod reader;
 pub mod schema;
-mod suggest;
+pub(crate) mod suggest;
 mod table;
 pub mod template;
 

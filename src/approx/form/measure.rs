@@ -225,3 +225,8 @@ fn run_piece<L: HasKernel>(
     }
     result
 }
+
+/// The threads of this machine.
+pub fn threads() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}

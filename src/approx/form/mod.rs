@@ -6,6 +6,7 @@
 
 pub mod generate;
 pub mod measure;
+pub mod overflow;
 pub mod piecewise;
 pub mod polynomial;
 pub mod split;
@@ -160,6 +161,24 @@ impl Form {
 
     fn casts_mut(&mut self) -> Vec<&mut Cast> {
         each!(self, f => f.casts_mut())
+    }
+
+    /// Copies in which one rounding constant is off by one.
+    pub fn with_nudged_casts(&self) -> Vec<Form> {
+        let mut all = Vec::new();
+        let count = self.clone().casts_mut().len();
+        for k in 0..count {
+            for step in [-1, 1] {
+                let mut copy = self.clone();
+                let mut casts = copy.casts_mut();
+                let cast = casts.get_mut(k);
+                if let Some((cast, moved)) = cast.and_then(|c| c.nudged(step).map(|m| (c, m))) {
+                    **cast = moved;
+                    all.push(copy);
+                }
+            }
+        }
+        all
     }
 
     /// Numbers the casts, records the program, and lets go of the casts' limits where ranges prove that they

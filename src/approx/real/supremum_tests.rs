@@ -1,0 +1,107 @@
+use std::time::Instant;
+
+use super::*;
+
+/// Functions with their domains.
+const CASES: [(&str, &str, &str); 14] = [
+    ("atan(x)/(2*pi)", "0", "1"),
+    ("sin(pi*x/2)", "0", "1"),
+    ("sqrt(x)", "0.25", "1"),
+    ("136.82*x^2 + 242.97*x + 109.60", "-0.9", "0.2"),
+    ("exp(x)", "-1", "1"),
+    ("log(1+x)", "0", "1"),
+    ("1/(1+x^2)", "-1", "2"),
+    ("tan(x)", "0", "pi/4"),
+    ("asin(x)", "0", "1"),
+    ("acos(x)", "-1", "0.5"),
+    ("sqrt(x)", "0", "1"),
+    ("abs(x-0.3)", "0", "1"),
+    ("x^2.5", "0", "1"),
+    ("cos(3*x)*exp(-x^2/2) + x^3/7", "-2", "2.3"),
+];
+
+fn case(text: &str, low: &str, high: &str) -> (Expression, Domain) {
+    (
+        Expression::parse(text).unwrap(),
+        Domain::parse(low, high).unwrap(),
+    )
+}
+
+/// Coefficients of a polynomial near f: interpolation at Chebyshev nodes by Newton's differences.
+fn interpolated(f: &impl Fn(f64) -> f64, low: f64, high: f64, degree: usize) -> Vec<Dyadic> {
+    let n = degree + 1;
+    let nodes: Vec<f64> = (0..n)
+        .map(|k| {
+            let angle = std::f64::consts::PI * (2 * k + 1) as f64 / (2 * n) as f64;
+            0.5 * (low + high) + 0.5 * (high - low) * angle.cos()
+        })
+        .collect();
+    let mut d: Vec<f64> = nodes.iter().map(|x| f(*x)).collect();
+    for k in 1..n {
+        for i in (k..n).rev() {
+            d[i] = (d[i] - d[i - 1]) / (nodes[i] - nodes[i - k]);
+        }
+    }
+    let mut p = vec![d[n - 1]];
+    for i in (0..n - 1).rev() {
+        p.insert(0, 0.0);
+        for k in 0..p.len() - 1 {
+            p[k] -= nodes[i] * p[k + 1];
+        }
+        p[0] += d[i];
+    }
+    p.iter().map(|c| Dyadic::from_f64(*c)).collect()
+}
+
+/// The largest |f - p| on many points, both in 106 bits by plain evaluation of the expression.
+fn sampled(f: &Expression, p: &[Dyadic], domain: &Domain, count: usize) -> f64 {
+    let (low, high) = domain.inner();
+    let mut largest: f64 = 0.0;
+    for k in 0..=count {
+        // Dense at the ends.
+        let s = 0.5 - 0.5 * (std::f64::consts::PI * k as f64 / count as f64).cos();
+        let x = Interval::from((low + (high - low) * s).clamp(low, high));
+        let p = p
+            .iter()
+            .rev()
+            .fold(Interval::ZERO, |sum, c| sum * x + c.to_interval());
+        largest = largest.max((f.enclosed(x) - p).mignitude());
+    }
+    largest
+}
+
+#[test]
+fn the_supremum_is_above_every_sample_and_not_by_much() {
+    for (text, low, high) in CASES {
+        let (f, domain) = case(text, low, high);
+        let start = Instant::now();
+        let enclosure = Enclosure::new(&f, &domain, 1e-15).unwrap();
+        let made = start.elapsed();
+        let (a, b) = domain.inner();
+        for degree in [1, 3, 5, 8, 12] {
+            let p = interpolated(&|x| f.value(x), a, b, degree);
+            let start = Instant::now();
+            let found = enclosure.supremum(&p, a, b);
+            let spent = start.elapsed();
+            let seen = sampled(&f, &p, &domain, 4000);
+            println!(
+                "{text} [{low},{high}] {} segments {made:?}; degree {degree}: {} .. {} at {} seen {seen} {spent:?}",
+                enclosure.segments().len(),
+                found.lower,
+                found.upper,
+                found.at,
+            );
+            assert!(found.upper >= seen, "{text} {degree}: {found:?} {seen}");
+            assert!(found.upper >= found.lower);
+            let floor = 2f64.powi(-58) * enclosure.size();
+            assert!(
+                found.upper <= seen * 1.001 + floor,
+                "{text} {degree}: {found:?} {seen}"
+            );
+            assert!(
+                found.upper <= found.lower * 1.0001 + floor,
+                "{text} {degree}: {found:?}"
+            );
+        }
+    }
+}
