@@ -8,13 +8,13 @@
 //! ([`super::ellipsoid`]), by Schnorr and Euchner's enumeration. Few points are left, for the
 //! ellipsoid is nearly the smallest one, so that polynomials of ten coefficients take milliseconds.
 
-use super::problem::{Candidate, Frame, Problem};
+use super::problem::{self, Candidate, Frame, Problem};
 use crate::error::{InputError, Result};
 
 /// How much may be spent. Steps, not seconds: the same result on every machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Budget {
-    /// Nodes of the enumeration; some 10 million take a second.
+    /// Nodes of the enumeration, a point within the limit counting as 50; some 10 million take a second.
     pub nodes: u64,
 }
 
@@ -58,6 +58,9 @@ pub struct Enumeration {
     /// Nodes visited.
     pub nodes: u64,
 }
+
+/// What a point whose error is looked at everywhere costs, in nodes.
+const LEAF_COST: u64 = 50;
 
 /// Slack of comparisons between rounded sums, relative.
 const SLACK: f64 = 1e-9;
@@ -125,7 +128,9 @@ impl Problem<'_, '_> {
         let mut scratch = vec![0.0; frame.errors.len()];
         let first = square(limit);
         let mut leaf = |z: &[i64]| {
+            let mut cost = 0;
             if let Some(found) = self.look(&frame, z, limit, &mut scratch) {
+                cost = LEAF_COST;
                 candidates.push(found);
                 if candidates.len() >= 2 * most.max(1) {
                     sort(&mut candidates);
@@ -133,7 +138,7 @@ impl Problem<'_, '_> {
                     limit = candidates.last().map_or(limit, |c| c.error);
                 }
             }
-            square(limit)
+            (square(limit), cost)
         };
         let (nodes, complete) = frame.ball.visit(first, budget.nodes, &mut leaf);
         sort(&mut candidates);
@@ -151,18 +156,15 @@ impl Problem<'_, '_> {
     /// Babai's point, or the rounded one if it is outside the formats.
     fn babai(&self, frame: &Frame) -> Candidate {
         match frame.raw(&frame.ball.nearest_plane()) {
-            Some(raw) if self.admits(&raw) => Candidate {
-                error: self.error(&raw),
-                raw,
-            },
+            Some(raw) if self.admits(&raw) => self.candidate(raw),
             _ => self.rounded.clone(),
         }
     }
 
     fn exactly(&self, candidate: &Candidate) -> Candidate {
         Candidate {
-            raw: candidate.raw.clone(),
             error: self.exact_error(&candidate.raw).max(candidate.error),
+            ..candidate.clone()
         }
     }
 
@@ -174,7 +176,11 @@ impl Problem<'_, '_> {
             return None;
         }
         let error = self.samples.supremum(scratch);
-        (error <= limit).then_some(Candidate { raw, error })
+        (error <= limit).then(|| Candidate {
+            raw,
+            error,
+            rms: problem::rms(scratch),
+        })
     }
 
     /// Enumerates what is better than `best`; (nodes, whether that was all).
@@ -187,7 +193,7 @@ impl Problem<'_, '_> {
             if let Some(found) = self.look(frame, z, limit, &mut scratch) {
                 *best = found;
             }
-            square(best.error)
+            (square(best.error), 0)
         };
         frame.ball.visit(first, nodes, &mut leaf)
     }
@@ -239,8 +245,15 @@ fn square(limit: f64) -> f64 {
     limit * limit * (1.0 + SLACK)
 }
 
+/// By error, errors that are equal but for rounding by their rms.
 fn sort(candidates: &mut [Candidate]) {
-    candidates.sort_by(|a, b| a.error.total_cmp(&b.error).then_with(|| a.raw.cmp(&b.raw)));
+    let least = candidates.iter().fold(f64::INFINITY, |m, c| m.min(c.error));
+    let step = (least * SLACK).max(f64::MIN_POSITIVE);
+    let key = |c: &Candidate| (c.error / step).round();
+    candidates.sort_by(|a, b| {
+        let by_error = key(a).total_cmp(&key(b)).then(a.rms.total_cmp(&b.rms));
+        by_error.then_with(|| a.raw.cmp(&b.raw))
+    });
 }
 
 fn too_fine() -> crate::error::Error {

@@ -248,13 +248,13 @@ impl Ball {
     }
 
     /// Visits every integer point whose squared distance is at most `limit`, near ones first in each
-    /// coordinate. `leaf` gets the point and returns the limit from then on. The result is the number
-    /// of nodes, and whether all were visited before `most_nodes` were spent.
+    /// coordinate. `leaf` gets the point and returns the limit from then on and what the look cost, in
+    /// nodes. The result is the number of nodes, and whether all were visited before `most_nodes` were spent.
     pub fn visit(
         &self,
         mut limit: f64,
         most_nodes: u64,
-        leaf: &mut dyn FnMut(&[i64]) -> f64,
+        leaf: &mut dyn FnMut(&[i64]) -> (f64, u64),
     ) -> (u64, bool) {
         let n = self.centre.len();
         if n == 0 {
@@ -291,7 +291,9 @@ impl Ball {
                     enter = true;
                     continue;
                 }
-                limit = leaf(&z);
+                let (next, cost) = leaf(&z);
+                limit = next;
+                nodes += cost;
             } else {
                 k += 1;
                 if k == n {
@@ -370,7 +372,7 @@ mod tests {
             }}}
             let ball = Ball::new(&rows, &offset);
             let mut found = Vec::new();
-            let (_, complete) = ball.visit(radius, 1_000_000, &mut |z| { found.push(z.to_vec()); radius });
+            let (_, complete) = ball.visit(radius, 1_000_000, &mut |z| { found.push(z.to_vec()); (radius, 0) });
             found.sort();
             prop_assert!(complete);
             prop_assert_eq!(found, brute);

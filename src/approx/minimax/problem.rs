@@ -99,6 +99,15 @@ pub struct Candidate {
     pub raw: Vec<i128>,
     /// Largest weighted error, real arithmetic.
     pub error: f64,
+    /// Root mean square of the weighted error over the points. Where a single place decides the
+    /// largest error (all coefficients have one format, and p(1) is a multiple of it) many choices share
+    /// it; this tells them apart.
+    pub rms: f64,
+}
+
+/// Root mean square.
+pub(super) fn rms(errors: &[f64]) -> f64 {
+    (errors.iter().map(|e| e * e).sum::<f64>() / errors.len().max(1) as f64).sqrt()
 }
 
 /// The approximation with its formats.
@@ -155,10 +164,14 @@ impl<'s, 'a> Problem<'s, 'a> {
             samples,
             minimax,
             formats,
-            rounded: Candidate { raw, error: 0.0 },
+            rounded: Candidate {
+                raw: Vec::new(),
+                error: 0.0,
+                rms: 0.0,
+            },
             columns,
         };
-        problem.rounded.error = problem.error(&problem.rounded.raw);
+        problem.rounded = problem.candidate(raw);
         Ok(problem)
     }
 
@@ -174,6 +187,16 @@ impl<'s, 'a> Problem<'s, 'a> {
     pub fn error(&self, raw: &[i128]) -> f64 {
         self.samples
             .supremum(&self.samples.errors(&self.values(raw)))
+    }
+
+    /// These coefficients with their errors.
+    pub fn candidate(&self, raw: Vec<i128>) -> Candidate {
+        let errors = self.samples.errors(&self.values(&raw));
+        Candidate {
+            raw,
+            error: self.samples.supremum(&errors),
+            rms: rms(&errors),
+        }
     }
 
     /// The same with the function evaluated at the peaks.

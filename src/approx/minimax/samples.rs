@@ -88,7 +88,7 @@ impl<'a> Samples<'a> {
     ) -> Result<Samples<'a>> {
         check_interval(low, high)?;
         let (low, high) = reduced(target, basis, low, high);
-        let count = (64 * basis.len() + 1).clamp(321, 1025);
+        let count = (64 * basis.len() + 1).clamp(321, 1601);
         let places: Vec<f64> = (0..count)
             .map(|k| place(low, high, PI * k as f64 / (count - 1) as f64))
             .collect();
@@ -114,7 +114,7 @@ impl<'a> Samples<'a> {
     ) -> Result<Samples<'a>> {
         check_interval(low, high)?;
         let (from, to) = reduced(target, basis, low, high);
-        let count = (64 * basis.len() + 1).clamp(321, 1025);
+        let count = (64 * basis.len() + 1).clamp(321, 1601);
         let mut places: Vec<f64> = (0..count)
             .map(|k| nearest(place(from, to, PI * k as f64 / (count - 1) as f64)))
             .filter(|x| (low..=high).contains(x))
@@ -429,6 +429,20 @@ fn weight_of(value: Wide, weight: Weight) -> f64 {
     }
 }
 
+/// Moves an end at 0 inward by a thousandth of the first step: every odd polynomial is 0 at 0, and so
+/// must the function be; the quotient has a limit, which is reached to 1e-10 beside it.
+fn beside_zero(places: &mut [f64]) {
+    if let [first, second, ..] = places
+        && *first == 0.0
+    {
+        *first = 1e-3 * *second;
+    } else if let [.., second, last] = places
+        && *last == 0.0
+    {
+        *last = 1e-3 * *second;
+    }
+}
+
 /// The function at its points, refusing what cannot be approximated.
 fn evaluate(
     target: &dyn Target,
@@ -436,8 +450,12 @@ fn evaluate(
     places: &[f64],
     weight: Weight,
 ) -> Result<Vec<Point>> {
+    let mut places = places.to_vec();
+    if weight == Weight::Relative && basis.monomials == Monomials::Odd {
+        beside_zero(&mut places);
+    }
     let mut values = Vec::with_capacity(places.len());
-    for &x in places {
+    for x in places {
         let value = target.value_wide(Wide::from(x));
         if !value.is_finite() {
             return Err(InputError::new(format!("the function is not finite at x = {x}")).into());
@@ -449,10 +467,6 @@ fn evaluate(
     let mut sign = 0.0;
     for (x, value) in values {
         let vanishes = value.abs().hi <= 1e-25 * size;
-        if weight == Weight::Relative && basis.monomials == Monomials::Odd && x == 0.0 && vanishes {
-            sign = 0.0; // every odd polynomial is 0 here as well; the quotient has a limit beside it
-            continue;
-        }
         let changes = sign != 0.0 && value.hi.signum() != sign;
         if weight == Weight::Relative && (vanishes || changes) {
             return Err(InputError::new(format!(

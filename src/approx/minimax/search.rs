@@ -44,7 +44,7 @@ impl Default for Effort {
         Effort {
             candidates: 2000,
             evaluations: 20_000,
-            budget: Budget::default(),
+            budget: Budget { nodes: 2_000_000 },
         }
     }
 }
@@ -102,6 +102,7 @@ pub fn search(problem: &Problem, datapath: &dyn Datapath, effort: Effort) -> Res
     let ideal = Candidate {
         raw: best.raw.clone(),
         error: best.error,
+        rms: 0.0,
     };
     let mut baselines = Vec::new();
     for (name, candidate) in [
@@ -248,7 +249,17 @@ impl<'p> Run<'p> {
         }
         let bound = self.datapath.evaluation_bound(&candidate.raw);
         self.largest_bound = self.largest_bound.max(bound);
-        let limit = self.total * (1.0 + NEAR);
+        // A total error that is only near the least one helps if the ideal error is smaller.
+        let least = self
+            .near
+            .iter()
+            .fold(f64::INFINITY, |m, (c, _)| m.min(c.error));
+        let part = if candidate.error < least {
+            NEAR
+        } else {
+            -1e-12
+        };
+        let limit = self.total * (1.0 + part);
         if candidate.error > limit + bound {
             return true; // its total error cannot be near the least one
         }
@@ -296,8 +307,8 @@ impl<'p> Run<'p> {
                 if !self.problem.admits(&raw) || self.seen.contains(&raw) {
                     continue;
                 }
-                let error = self.problem.error(&raw);
-                if !self.judge(&Candidate { raw, error }) {
+                let candidate = self.problem.candidate(raw);
+                if !self.judge(&candidate) {
                     return;
                 }
             }

@@ -3,6 +3,7 @@ use crate::approx::minimax::{
     Basis, CoefficientFormat, Monomials, Samples, Target, Weight, minimax,
 };
 use crate::numeric::format::Format;
+use std::cell::RefCell;
 use std::f64::consts::PI;
 
 /// 16-bit input and output, Horner with one rounding a step: t = round(t x + c).
@@ -10,6 +11,8 @@ struct Horner<'a> {
     f: &'a dyn Target,
     codes: Vec<(i64, f64)>,
     sample: Vec<(i64, f64)>,
+    /// Codes where earlier candidates were worst.
+    worst: RefCell<Vec<(i64, f64)>>,
     input_bits: u32,
     coefficient_bits: u32,
     inner_bits: u32,
@@ -34,6 +37,7 @@ impl<'a> Horner<'a> {
             f,
             codes,
             sample,
+            worst: RefCell::default(),
             input_bits,
             coefficient_bits: 14,
             inner_bits: 18,
@@ -63,10 +67,15 @@ impl<'a> Horner<'a> {
     fn largest(&self, raw: &[i128], codes: &[(i64, f64)], limit: f64) -> Option<f64> {
         let mut largest = 0.0f64;
         for &(code, f) in codes {
-            largest = largest.max((self.run(raw, code) - f).abs());
-            if largest > limit {
+            let error = (self.run(raw, code) - f).abs();
+            if error > limit {
+                let mut worst = self.worst.borrow_mut();
+                if !worst.contains(&(code, f)) {
+                    worst.push((code, f));
+                }
                 return None;
             }
+            largest = largest.max(error);
         }
         Some(largest)
     }
@@ -77,6 +86,8 @@ impl Datapath for Horner<'_> {
         self.largest(raw, &self.codes, limit)
     }
     fn sample_error(&self, raw: &[i128], limit: f64) -> Option<f64> {
+        let worst = self.worst.borrow().clone();
+        self.largest(raw, &worst, limit)?;
         self.largest(raw, &self.sample, limit)
     }
     fn evaluation_bound(&self, raw: &[i128]) -> f64 {
