@@ -4,8 +4,9 @@ use super::cost::{Cost, Target};
 use super::form::generate::{self, MOST_BIPARTITE_CODES, MOST_SEGMENTS};
 use super::form::measure::{Effort, Measured, Reference, measure};
 use super::form::polynomial::Monomials;
+use super::form::piecewise::Piecewise;
 use super::form::split::{Spacing, Split, Symmetry};
-use super::form::table::Kind;
+use super::form::table::{Kind, Table};
 use super::form::{Codes, Form, Settled};
 use super::job::{self, Request};
 use super::outcome::Alternative;
@@ -15,14 +16,16 @@ use crate::numeric::format::Format;
 
 /// Codes that are run for each candidate; beyond them its bound comes from analysis.
 const QUICK_CODES: u128 = 1 << 16;
+/// Codes of a first look at a candidate.
+const FIRST_LOOK: u128 = 2000;
 /// The highest degree of a polynomial that is looked for.
 const HIGHEST_DEGREE: usize = 12;
 /// Fraction bits of entries beyond the output's.
-const GUARD_BITS: [u32; 2] = [2, 5];
+const GUARD_BITS: [u32; 4] = [1, 2, 3, 6];
 /// Bytes of read-only memory that weigh as much as a cycle.
 const BYTES_A_CYCLE: u64 = 32;
 /// Pairs of sizes that are tried for a bipartite table.
-const PAIRS: usize = 24;
+const PAIRS: usize = 12;
 
 /// A form with its measured error and cost.
 #[derive(Debug, Clone)]
@@ -38,16 +41,25 @@ pub struct Candidate {
 }
 
 impl Candidate {
-    /// Settles and measures a form without running more codes than a search can afford.
-    pub fn of(form: Form, reference: &dyn Reference, target: Target) -> Option<Candidate> {
+    /// Settles and measures a form without running more codes than a search can afford; `None` if
+    /// it does not keep to the bound.
+    pub fn within(
+        form: Form,
+        reference: &dyn Reference,
+        target: Target,
+        bound: f64,
+    ) -> Option<Candidate> {
         let settled = form.settle().ok()?;
+        if !keeps_to(&settled, reference, bound) {
+            return None;
+        }
         let effort = Effort {
             most_codes: QUICK_CODES,
             threads: super::form::measure::threads(),
             progress: &|_| (),
         };
         let measured = measure(&settled, reference, &effort).ok()?;
-        Some(Candidate {
+        (measured.certified <= bound).then(|| Candidate {
             detail: job::detail(&settled.form),
             cost: Cost::of(&settled, target),
             measured,
@@ -74,6 +86,18 @@ impl Candidate {
             || x < y;
         no_worse && better
     }
+}
+
+/// Quickly: whether some codes keep to the bound. Most candidates do not.
+fn keeps_to(settled: &Settled, reference: &dyn Reference, bound: f64) -> bool {
+    let codes = settled.form.codes();
+    let lsb = settled.form.output().lsb();
+    // A step that meets every place in segments of 2^k codes.
+    let step = (codes.count() / FIRST_LOOK) as usize | 1;
+    (codes.low..=codes.high).step_by(step).all(|code| {
+        let (value, radius) = reference.at(codes.real(code));
+        (settled.run(code) as f64 * lsb - value).abs() <= bound + radius
+    })
 }
 
 /// Which forms are looked for.
@@ -167,8 +191,7 @@ fn polynomials(search: &Search, request: &Request) -> Vec<Candidate> {
                 return None;
             }
             let form = job::polynomial_within(search.function, search.codes, request, kind, degree, search.bound)?;
-            let candidate = Candidate::of(form, search.function, search.target)?;
-            (candidate.measured.certified <= search.bound).then_some(candidate)
+            Candidate::within(form, search.function, search.target, search.bound)
         })
     };
     kinds.into_iter().filter_map(smallest).collect()
@@ -199,32 +222,46 @@ impl Search<'_> {
     }
 
     fn meets(&self, form: Option<Form>) -> Option<Candidate> {
-        let candidate = Candidate::of(form?, self.function, self.target)?;
-        (candidate.measured.certified <= self.bound).then_some(candidate)
+        Candidate::within(form?, self.function, self.target, self.bound)
     }
 
-    /// The longest segments that meet the bound: errors grow with their length.
+    /// The longest segments that meet the bound, with the fewest fraction bits that do: errors grow with
+    /// the segments' length.
     fn longest(&self, make: &dyn Fn(Split, u32) -> Option<Form>, guards: &[u32]) -> Option<Candidate> {
+        let (most, fewer) = guards.split_last()?;
+        let best = self.longest_with(make, *most)?;
+        let (Form::Table(Table { split, .. }) | Form::Piecewise(Piecewise { split, .. })) =
+            &best.settled.form
+        else {
+            return Some(best);
+        };
+        let smaller = fewer.iter().find_map(|guard| self.meets(make(split.clone(), *guard)));
+        Some(smaller.unwrap_or(best))
+    }
+
+    fn longest_with(
+        &self,
+        make: &dyn Fn(Split, u32) -> Option<Form>,
+        guard: u32,
+    ) -> Option<Candidate> {
         let split = |bits| Split::new(self.codes, self.symmetry, Spacing::Uniform { bits });
         let longest = self.width();
         let most = longest.saturating_sub(MOST_SEGMENTS.ilog2());
-        guards.iter().find_map(|guard| {
-            let at = |bits: u32| self.meets(make(split(bits), *guard));
-            let mut best = None;
-            let (mut low, mut high) = (most, longest);
-            while low <= high {
-                let bits = (low + high) / 2;
-                match at(bits) {
-                    Some(candidate) => {
-                        best = Some(candidate);
-                        low = bits + 1;
-                    }
-                    None if bits == 0 => break,
-                    None => high = bits - 1,
+        let at = |bits: u32| self.meets(make(split(bits), guard));
+        let mut best = None;
+        let (mut low, mut high) = (most, longest);
+        while low <= high {
+            let bits = (low + high) / 2;
+            match at(bits) {
+                Some(candidate) => {
+                    best = Some(candidate);
+                    low = bits + 1;
                 }
+                None if bits == 0 => break,
+                None => high = bits - 1,
             }
-            best
-        })
+        }
+        best
     }
 
     fn table(&self, kind: Kind) -> Option<Candidate> {
@@ -246,18 +283,18 @@ impl Search<'_> {
     }
 
     fn power_of_two(&self, degree: usize) -> Option<Candidate> {
-        self.guards().into_iter().find_map(|fraction_bits| {
-            (1..=4u32).find_map(|steps| {
-                if self.width() < (1 << steps) + 2 {
-                    return None;
-                }
-                let spacing = Spacing::PowerOfTwo { steps };
-                let split = Split::new(self.codes, self.symmetry, spacing);
-                let form =
-                    generate::piecewise(self.function, split, degree, self.output, fraction_bits);
-                self.meets(form)
-            })
-        })
+        let with = |steps: u32, fraction_bits: u32| {
+            let spacing = Spacing::PowerOfTwo { steps };
+            let split = Split::new(self.codes, self.symmetry, spacing);
+            let (f, output) = (self.function, self.output);
+            self.meets(generate::piecewise(f, split, degree, output, fraction_bits))
+        };
+        let guards = self.guards();
+        let (most, fewer) = guards.split_last()?;
+        let possible = (1..=4u32).filter(|steps| self.width() >= (1 << steps) + 2);
+        let (steps, best) = { possible }.find_map(|k| with(k, *most).map(|c| (k, c)))?;
+        let smaller = fewer.iter().find_map(|guard| with(steps, *guard));
+        Some(smaller.unwrap_or(best))
     }
 
     /// The smallest pair of tables that meets the bound.
@@ -275,7 +312,7 @@ impl Search<'_> {
         }
         sizes.sort_unstable();
         // A bound near half an LSB is out of reach, and small pairs are far from it: bisect first.
-        self.guards().into_iter().find_map(|fraction_bits| {
+        self.guards().into_iter().step_by(2).find_map(|fraction_bits| {
             let at = |k: usize| {
                 let (_, middle, low) = sizes[k];
                 let sizes = (middle, low);

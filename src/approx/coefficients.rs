@@ -1,9 +1,11 @@
 //! A polynomial's coefficients: from the search, with the bit-accurate evaluation in its loop.
 
-use super::form::polynomial::Monomials;
-use super::form::{Codes, Form, Settled};
+use super::datapath::Evaluation;
 use super::form::measure::Reference;
+use super::form::polynomial::{Monomials, Polynomial};
+use super::form::{Codes, Form};
 use super::job::{self, Request, Weight};
+use super::minimax::search::{Effort, Judged};
 use super::minimax::{self, Basis, Budget, CoefficientFormat, Problem, Samples};
 use super::outcome::{Compared, Search};
 use super::reference::Function;
@@ -13,6 +15,9 @@ use crate::numeric::trace::ir::Interval;
 
 /// Fraction bits beyond the output's that are tried for coefficients.
 const GUARD_BITS: [u32; 4] = [0, 2, 4, 8];
+
+/// Fraction bits that the search's intermediate does without.
+const SPARE_BITS: i32 = 4;
 
 /// Coefficients with how they were found.
 #[derive(Debug, Clone)]
@@ -61,51 +66,61 @@ pub fn choose(
     format: Format,
 ) -> Result<Chosen> {
     let basis = basis(kind, degree)?;
-    let (low, high) = function.domain();
-    let samples = Samples::new(function, &basis, low, high, weight(request))?;
+    let (low, high) = (codes.real(codes.low), codes.real(codes.high));
+    let lsb = codes.format.lsb();
+    let nearest = |x: f64| (x / lsb).round().clamp(codes.low as f64, codes.high as f64) * lsb;
+    let weight = weight(request);
+    let few = codes.count() <= 4 * (degree as u128 + 2);
+    let samples = match few {
+        // Fewer codes than a search could use: the interval decides.
+        true => Samples::new(function, &basis, function.domain().0, function.domain().1, weight)?,
+        false => Samples::on_codes(function, &basis, low, high, weight, &nearest)?,
+    };
     let best_real = minimax::minimax(&samples)?;
     let problem = Problem::new(&samples, &best_real, &[CoefficientFormat::from(format)])?;
-    let best = problem.best(Budget::default())?;
-    let total = |raw: &[i128]| {
-        let all = spread(raw, kind, degree);
-        let form = job::compiled(codes, request, kind, format, all).ok()?;
-        let settled = Form::Polynomial(form).settle().ok()?;
-        Some(worst(&settled, function))
-    };
-    let compared = |name, raw: &[i128], ideal| Compared {
-        name,
-        raw: raw.to_vec(),
-        ideal_max_abs: ideal,
-        total_max_abs: total(raw),
-    };
-    let all = vec![
-        compared("rounded minimax", &best.rounded.raw, best.rounded.error),
-        compared("nearest plane (as fpminimax)", &best.babai.raw, best.babai.error),
-        compared("best under ideal evaluation", &best.raw, best.error),
-    ];
+    let rounded = spread(&problem.rounded.raw, kind, degree);
+    let first = job::compiled(codes, request, kind, format, rounded.clone())?;
+    let mut formats = first.formats;
+    if request.intermediate.is_none() {
+        // Words a little shorter than the widest, for coefficients a little larger.
+        let spare = SPARE_BITS.min(formats.intermediate.fraction_bits.max(0));
+        formats.intermediate.fraction_bits -= spare;
+    }
+    let pattern = Polynomial::new(formats, kind, rounded)?;
+    let settled = Form::Polynomial(pattern).settle()?;
+    let path = Evaluation::new(function, &settled, formats, kind, degree, request.weight);
+    let found = minimax::search(&problem, &path, Effort::default())?;
+    let mut compared: Vec<Compared> = found.baselines.iter().map(shown).collect();
+    compared.push(Compared {
+        name: "chosen with the evaluation in the loop",
+        raw: found.raw.clone(),
+        ideal_max_abs: found.ideal_error,
+        total_max_abs: found.total_error.is_finite().then_some(found.total_error),
+    });
     Ok(Chosen {
-        raw: spread(&best.raw, kind, degree),
+        raw: spread(&found.raw, kind, degree),
         search: Search {
-            minimax_error: best.minimax_error,
-            proved_best: best.proved,
-            compared: all,
+            minimax_error: found.best.minimax_error,
+            proved_best: found.proved,
+            coefficients_proved_best: found.best.proved,
+            evaluations: found.evaluations,
+            compared,
         },
     })
 }
 
-/// The greatest error over a dense subset of the codes.
-fn worst(settled: &Settled, function: &Function) -> f64 {
-    let codes = settled.form.codes();
-    let lsb = settled.form.output().lsb();
-    let stride = (codes.count() as i128 >> 16).max(1);
-    let mut code = codes.low;
-    let mut worst = 0.0f64;
-    while code <= codes.high {
-        let value = function.at(codes.real(code)).0;
-        worst = worst.max((settled.run(code) as f64 * lsb - value).abs());
-        code += stride;
+fn shown(judged: &Judged) -> Compared {
+    Compared {
+        name: match judged.name {
+            "rounded" => "rounded minimax",
+            "babai" => "nearest plane of the lattice (as fpminimax)",
+            "ideal" => "best under ideal evaluation",
+            other => other,
+        },
+        raw: judged.raw.clone(),
+        ideal_max_abs: judged.ideal_error,
+        total_max_abs: judged.total_error.is_finite().then_some(judged.total_error),
     }
-    worst
 }
 
 /// Coefficients whose ideal error leaves some of `room`, in the request's format or in the shortest that does.

@@ -1,9 +1,14 @@
-//! Functions in fixed point: polynomials and tables with proved error.
+//! Functions in fixed point: approximations with a proved error.
+//!
+//! [`real`] encloses the function that is wanted, [`minimax`] finds coefficients, [`form`] has the fixed-point
+//! forms; [`coefficients`] puts them together for a polynomial, [`choice`] among all forms; [`job`] does what
+//! `gyrogen approx` is asked, [`bundle`] emits it.
 
 pub mod bundle;
 pub mod choice;
 pub mod coefficients;
 pub mod cost;
+mod datapath;
 pub mod form;
 pub mod job;
 pub mod minimax;

@@ -181,7 +181,11 @@ impl Polynomial {
                 None => product,
             };
             let c = ar.constant(step.coefficient, step.fraction_bits);
-            t = ar.cast(ar.add(product, c), &step.cast, &[product, c]);
+            let sum = match step.coefficient {
+                0 => product,
+                _ => ar.add(product, c),
+            };
+            t = ar.cast(sum, &step.cast, &[product, c]);
         }
         let last = match self.monomials {
             Monomials::Odd => ar.mul(t, x),
@@ -211,7 +215,7 @@ impl Polynomial {
 
     /// A bound on what the casts of the steps add between two codes: each cast's half LSB times what
     /// follows it.
-    fn evaluation_bound(&self, low: i128, high: i128) -> f64 {
+    pub(crate) fn evaluation_bound(&self, low: i128, high: i128) -> f64 {
         let x = self.codes.real(low).abs().max(self.codes.real(high).abs());
         let half = |cast: &Cast| match cast.shift > 0 {
             true => pow2(-cast.target.fraction_bits - 1),
