@@ -291,7 +291,7 @@ impl Search<'_> {
         };
         let guards = self.guards();
         let (most, fewer) = guards.split_last()?;
-        let possible = (1..=4u32).filter(|steps| self.width() >= (1 << steps) + 2);
+        let possible = (1..=4u32).filter(|steps| self.width() >= 1 << steps);
         let (steps, best) = { possible }.find_map(|k| with(k, *most).map(|c| (k, c)))?;
         let smaller = fewer.iter().find_map(|guard| with(steps, *guard));
         Some(smaller.unwrap_or(best))

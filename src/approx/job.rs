@@ -154,6 +154,10 @@ pub fn approximate(
         input_codes: [codes.low, codes.high],
         form: settled.form.name(),
         detail: detail(&settled.form),
+        monomials: match &settled.form {
+            Form::Polynomial(p) => Some(p.monomials),
+            _ => None,
+        },
         formats: formats(&settled.form, request),
         coefficients,
         table,

@@ -1,6 +1,7 @@
 //! `approx.json` (`gyrogen.approx/1`): what was made and how accurate it is.
 
 use super::cost::Cost;
+use super::form::polynomial::Monomials;
 use super::form::split::{Spacing, Symmetry};
 use serde::Serialize;
 
@@ -25,6 +26,9 @@ pub struct Outcome {
     pub form: &'static str,
     /// The form in words.
     pub detail: String,
+    /// Of a polynomial: which orders it has.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub monomials: Option<Monomials>,
     /// Formats, as given or chosen.
     pub formats: Formats,
     /// Of a polynomial: from order 0 to the degree; zeros where the monomials have none.

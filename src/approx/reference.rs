@@ -48,12 +48,12 @@ impl Reference for Function {
     }
 
     fn supremum(&self, piece: &Piece, low: f64, high: f64) -> f64 {
-        let (terms, dropped) = expanded(piece, low.abs().max(high.abs()));
         if low >= high {
             let (value, radius) = self.enclosure.at(low);
             let (ideal, slack) = piece.value(low);
             return (value - ideal).abs() + radius + slack;
         }
+        let (terms, dropped) = expanded(piece, low.abs().max(high.abs()));
         self.enclosure.supremum(&terms, low, high).upper + dropped
     }
 

@@ -2,10 +2,11 @@
 //!
 //! The proof, piece by piece (a piece is an interval of codes on which the form's data stand for one
 //! polynomial p): sup |f - p| over the piece's real interval, by a rigorous method, plus the greatest |result - p|
-//! over the piece's codes. Here p is limited to the output's range, as the result is: that moves p towards f, or f is outside the
+//! over the piece's codes. Where p leaves the output's range it is limited to it, as the result is: that moves p towards f, or f is outside the
 //! range by no less than the distance. The latter is evaluation and output rounding together; where every code is run, it is known exactly
 //! (integers), else it is bounded by analysis. The sum is taken on each piece and not globally.
 
+use super::polynomial::split;
 use super::{Form, Piece, Settled, run_in};
 use crate::error::{Error, Result};
 use crate::numeric::cast::HasKernel;
@@ -14,6 +15,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Codes that are run where there are too many to run all.
 const SAMPLE: u128 = 1 << 20;
+
+/// Pieces are divided so that there are about so many at least: a sum of maxima is the tighter the shorter the piece.
+const PARTS: i128 = 128;
 
 /// The function that a form stands for, with proved enclosures.
 pub trait Reference: Sync {
@@ -62,7 +66,10 @@ struct OfPiece {
     data: f64,
     /// sup |f - p limited to the output's range|.
     distance: f64,
+    /// Greatest |y - p| where p is inside the output's range.
     rounding: f64,
+    /// Greatest |y - p limited| where p is outside, if it is anywhere.
+    limited: Option<f64>,
     observed: f64,
     at: i128,
     checked: u64,
@@ -73,13 +80,17 @@ struct OfPiece {
 /// # Errors
 /// A result outside the proved bound: an error of this program.
 pub fn measure(settled: &Settled, reference: &dyn Reference, effort: &Effort) -> Result<Measured> {
-    let pieces = settled.form.pieces();
     let codes = settled.form.codes();
+    let pieces = divided(settled.form.pieces(), codes.count() as i128 / PARTS);
     let exhaustive = codes.count() <= effort.most_codes;
     let stride = match exhaustive {
         true => 1,
         false => (codes.count() / SAMPLE).max(1) as i128,
     };
+    let (a, b) = reference.domain();
+    let (least, greatest) = reference.range(a, b);
+    let (bottom, top) = limits(&settled.form);
+    let may_exceed = least < bottom || greatest > top;
     let results = Mutex::new(vec![None; pieces.len()]);
     let next = AtomicUsize::new(0);
     std::thread::scope(|scope| {
@@ -89,7 +100,8 @@ pub fn measure(settled: &Settled, reference: &dyn Reference, effort: &Effort) ->
                     let k = next.fetch_add(1, Ordering::Relaxed);
                     let Some(piece) = pieces.get(k) else { break };
                     let end = ends(&pieces, k, settled, reference);
-                    let result = of_piece(settled, reference, piece, end, exhaustive, stride);
+                    let result =
+                        of_piece(settled, reference, piece, end, exhaustive, stride, may_exceed);
                     (effort.progress)(result.checked);
                     if let Ok(mut results) = results.lock() {
                         results[k] = Some(result);
@@ -109,15 +121,29 @@ pub fn measure(settled: &Settled, reference: &dyn Reference, effort: &Effort) ->
         exhaustive,
     };
     for result in results.into_iter().flatten() {
-        all.certified = all.certified.max(result.distance + result.rounding);
+        let limited = result.limited.map_or(0.0, |rounding| result.distance + rounding);
+        all.certified = all.certified.max(result.data + result.rounding).max(limited);
         all.data_only = all.data_only.max(result.data);
-        all.rounding = all.rounding.max(result.rounding);
+        all.rounding = all.rounding.max(result.rounding).max(result.limited.unwrap_or(0.0));
         if result.observed > all.observed {
             (all.observed, all.at_input_raw) = (result.observed, result.at);
         }
         all.inputs_checked += result.checked;
     }
     checked(all, settled, reference)
+}
+
+/// The same pieces, none of much more than so many codes.
+fn divided(pieces: Vec<Piece>, most: i128) -> Vec<Piece> {
+    let parts = |piece: Piece| {
+        let count = (piece.high - piece.low + 1) / most.max(1);
+        split(piece.low, piece.high, count.max(1)).map(move |(low, high)| Piece {
+            low,
+            high,
+            ..piece.clone()
+        })
+    };
+    pieces.into_iter().flat_map(parts).collect()
 }
 
 /// Nothing that was observed lies outside what was proved.
@@ -172,6 +198,7 @@ fn of_piece(
     (low, high): (f64, f64),
     exhaustive: bool,
     stride: i128,
+    may_exceed: bool,
 ) -> OfPiece {
     let data = reference.supremum(piece, low, high);
     let mut result = if settled.bits <= 64 {
@@ -180,12 +207,16 @@ fn of_piece(
         run_piece::<i128>(&settled.form, reference, piece, stride)
     };
     result.data = data;
-    // What the output's limits cannot reach.
-    let (bottom, top) = limits(&settled.form);
-    let (least, greatest) = reference.range(low, high);
-    result.distance = data.max(greatest - top).max(bottom - least);
+    result.distance = data;
+    if may_exceed {
+        // What the output's limits cannot reach.
+        let (bottom, top) = limits(&settled.form);
+        let (least, greatest) = reference.range(low, high);
+        result.distance = data.max(greatest - top).max(bottom - least);
+    }
     if !exhaustive {
         result.rounding = piece.evaluation_bound + 0.5 * settled.form.output().lsb();
+        result.limited = Some(result.rounding);
     }
     result
 }
@@ -203,6 +234,7 @@ fn run_piece<L: HasKernel>(
         data: 0.0,
         distance: 0.0,
         rounding: 0.0,
+        limited: None,
         observed: -1.0,
         at: piece.low,
         checked: 0,
@@ -217,8 +249,12 @@ fn run_piece<L: HasKernel>(
             (result.observed, result.at) = (error, code);
         }
         let (ideal, slack) = piece.value(x);
-        let ideal = ideal.clamp(bottom, top);
-        result.rounding = result.rounding.max((y - ideal).abs() + slack);
+        let difference = (y - ideal.clamp(bottom, top)).abs() + slack;
+        if bottom <= ideal && ideal <= top {
+            result.rounding = result.rounding.max(difference);
+        } else {
+            result.limited = Some(result.limited.unwrap_or(0.0).max(difference));
+        }
         result.checked += 1;
         // The last code is always run.
         code = if code < piece.high { (code + stride).min(piece.high) } else { code + 1 };
