@@ -29,7 +29,7 @@ fn damaged(form: &Form) -> Vec<Form> {
                 let mut raw = p.coefficients.clone();
                 raw[order] += step;
                 let moved = Polynomial::new(p.formats, p.monomials, raw);
-                all.extend(moved.ok().map(Form::Polynomial));
+                all.extend(moved.ok().map(|p| Form::Polynomial(Box::new(p))));
             }
         }
     }
@@ -67,7 +67,11 @@ fn facts(outcome: &Outcome) -> Vec<String> {
         (None, None) => String::new(),
     };
     vec![
-        format!("f(x) = {} for x from {}", outcome.function, outcome.domain.replace(',', " to ")),
+        format!(
+            "f(x) = {} for x from {}",
+            outcome.function,
+            outcome.domain.replace(',', " to ")
+        ),
         outcome.detail.clone(),
         format!(
             "input {}, output {}, coefficients {}, intermediate {}",

@@ -1,12 +1,12 @@
 //! Forms that meet a bound, and the cheapest of them.
 
 use super::cost::{Cost, Target};
+use super::describe;
 use super::form::generate::{self, MOST_BIPARTITE_CODES, MOST_SEGMENTS};
 use super::form::measure::{Effort, Measured, Reference, measure};
 use super::form::polynomial::Monomials;
-use super::form::piecewise::Piecewise;
 use super::form::split::{Spacing, Split, Symmetry};
-use super::form::table::{Kind, Table};
+use super::form::table::Kind;
 use super::form::{Codes, Form, Settled};
 use super::job::{self, Request};
 use super::outcome::Alternative;
@@ -60,7 +60,7 @@ impl Candidate {
         };
         let measured = measure(&settled, reference, &effort).ok()?;
         (measured.certified <= bound).then(|| Candidate {
-            detail: job::detail(&settled.form),
+            detail: describe::detail(&settled.form),
             cost: Cost::of(&settled, target),
             measured,
             settled,
@@ -80,10 +80,8 @@ impl Candidate {
             && a.multiplies <= b.multiplies
             && a.adds <= b.adds
             && x <= y;
-        let better = a.rom_bytes < b.rom_bytes
-            || a.multiplies < b.multiplies
-            || a.adds < b.adds
-            || x < y;
+        let better =
+            a.rom_bytes < b.rom_bytes || a.multiplies < b.multiplies || a.adds < b.adds || x < y;
         no_worse && better
     }
 }
@@ -190,7 +188,14 @@ fn polynomials(search: &Search, request: &Request) -> Vec<Candidate> {
             if kind != Monomials::All && degree % 2 != usize::from(kind == Monomials::Odd) {
                 return None;
             }
-            let form = job::polynomial_within(search.function, search.codes, request, kind, degree, search.bound)?;
+            let form = job::polynomial_within(
+                search.function,
+                search.codes,
+                request,
+                kind,
+                degree,
+                search.bound,
+            )?;
             Candidate::within(form, search.function, search.target, search.bound)
         })
     };
@@ -227,15 +232,19 @@ impl Search<'_> {
 
     /// The longest segments that meet the bound, with the fewest fraction bits that do: errors grow with
     /// the segments' length.
-    fn longest(&self, make: &dyn Fn(Split, u32) -> Option<Form>, guards: &[u32]) -> Option<Candidate> {
+    fn longest(
+        &self,
+        make: &dyn Fn(Split, u32) -> Option<Form>,
+        guards: &[u32],
+    ) -> Option<Candidate> {
         let (most, fewer) = guards.split_last()?;
         let best = self.longest_with(make, *most)?;
-        let (Form::Table(Table { split, .. }) | Form::Piecewise(Piecewise { split, .. })) =
-            &best.settled.form
-        else {
+        let Some(split) = best.settled.form.split() else {
             return Some(best);
         };
-        let smaller = fewer.iter().find_map(|guard| self.meets(make(split.clone(), *guard)));
+        let smaller = fewer
+            .iter()
+            .find_map(|guard| self.meets(make(split.clone(), *guard)));
         Some(smaller.unwrap_or(best))
     }
 
@@ -312,27 +321,36 @@ impl Search<'_> {
         }
         sizes.sort_unstable();
         // A bound near half an LSB is out of reach, and small pairs are far from it: bisect first.
-        self.guards().into_iter().step_by(2).find_map(|fraction_bits| {
-            let at = |k: usize| {
-                let (_, middle, low) = sizes[k];
-                let sizes = (middle, low);
-                let (f, symmetry) = (self.function, self.symmetry);
-                let form =
-                    generate::bipartite(f, self.codes, symmetry, sizes, self.output, fraction_bits);
-                self.meets(form)
-            };
-            let (mut low, mut high) = (0, sizes.len());
-            let mut best = None;
-            while low < high {
-                let k = (low + high) / 2;
-                match at(k) {
-                    Some(candidate) => (best, high) = (Some(candidate), k),
-                    None => low = k + 1,
+        self.guards()
+            .into_iter()
+            .step_by(2)
+            .find_map(|fraction_bits| {
+                let at = |k: usize| {
+                    let (_, middle, low) = sizes[k];
+                    let sizes = (middle, low);
+                    let (f, symmetry) = (self.function, self.symmetry);
+                    let form = generate::bipartite(
+                        f,
+                        self.codes,
+                        symmetry,
+                        sizes,
+                        self.output,
+                        fraction_bits,
+                    );
+                    self.meets(form)
+                };
+                let (mut low, mut high) = (0, sizes.len());
+                let mut best = None;
+                while low < high {
+                    let k = (low + high) / 2;
+                    match at(k) {
+                        Some(candidate) => (best, high) = (Some(candidate), k),
+                        None => low = k + 1,
+                    }
                 }
-            }
-            // Not quite monotone: look a little below.
-            let start = high.saturating_sub(PAIRS);
-            (start..high).find_map(at).or(best)
-        })
+                // Not quite monotone: look a little below.
+                let start = high.saturating_sub(PAIRS);
+                (start..high).find_map(at).or(best)
+            })
     }
 }

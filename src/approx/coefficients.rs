@@ -73,7 +73,13 @@ pub fn choose(
     let few = codes.count() <= 4 * (degree as u128 + 2);
     let samples = match few {
         // Fewer codes than a search could use: the interval decides.
-        true => Samples::new(function, &basis, function.domain().0, function.domain().1, weight)?,
+        true => Samples::new(
+            function,
+            &basis,
+            function.domain().0,
+            function.domain().1,
+            weight,
+        )?,
         false => Samples::on_codes(function, &basis, low, high, weight, &nearest)?,
     };
     let best_real = minimax::minimax(&samples)?;
@@ -87,7 +93,7 @@ pub fn choose(
         formats.intermediate.fraction_bits -= spare;
     }
     let pattern = Polynomial::new(formats, kind, rounded)?;
-    let settled = Form::Polynomial(pattern).settle()?;
+    let settled = Form::Polynomial(Box::new(pattern)).settle()?;
     let path = Evaluation::new(function, &settled, formats, kind, degree, request.weight);
     let found = minimax::search(&problem, &path, Effort::default())?;
     let mut compared: Vec<Compared> = found.baselines.iter().map(shown).collect();
@@ -141,7 +147,9 @@ pub fn within(
     }
     let tried: Vec<u32> = match request.coefficients {
         Some(format) => vec![format.fraction_bits],
-        None => GUARD_BITS.map(|g| request.output.fraction_bits + g).to_vec(),
+        None => GUARD_BITS
+            .map(|g| request.output.fraction_bits + g)
+            .to_vec(),
     };
     tried.into_iter().find_map(|fraction_bits| {
         let format = match request.coefficients {
@@ -153,9 +161,15 @@ pub fn within(
         if best.error >= room {
             return None;
         }
-        let range = best.raw.iter().map(|raw| Interval::point(*raw)).reduce(Interval::join)?;
+        let range = best
+            .raw
+            .iter()
+            .map(|raw| Interval::point(*raw))
+            .reduce(Interval::join)?;
         let integer_bits = (range.bits() as i32 - fraction_bits as i32).max(1) as u32;
-        let format = request.coefficients.unwrap_or(Format::q(integer_bits, fraction_bits));
+        let format = request
+            .coefficients
+            .unwrap_or(Format::q(integer_bits, fraction_bits));
         (format.bits() <= 64).then(|| (format, spread(&best.raw, kind, degree)))
     })
 }

@@ -67,7 +67,7 @@ impl Evaluation {
             all[order] = *value;
         }
         let form = Polynomial::new(self.formats, self.monomials, all).ok()?;
-        Some(Form::Polynomial(form))
+        Some(Form::Polynomial(Box::new(form)))
     }
 
     fn error(&self, form: &Form, k: usize) -> f64 {
@@ -107,7 +107,9 @@ impl Evaluation {
     fn judge(&self, raw: &[i128], limit: f64, stride: usize) -> Option<f64> {
         let form = self.form(raw)?;
         let first = self.worst.borrow().clone();
-        let places = first.into_iter().chain((0..self.points.len()).step_by(stride));
+        let places = first
+            .into_iter()
+            .chain((0..self.points.len()).step_by(stride));
         match self.largest(&form, places, limit) {
             Ok(error) => Some(error),
             Err(place) => {

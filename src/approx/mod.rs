@@ -5,10 +5,12 @@
 //! `gyrogen approx` is asked, [`bundle`] emits it.
 
 pub mod bundle;
+mod check;
 pub mod choice;
 pub mod coefficients;
 pub mod cost;
 mod datapath;
+mod describe;
 pub mod form;
 pub mod job;
 pub mod minimax;

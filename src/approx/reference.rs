@@ -74,7 +74,9 @@ impl minimax::Target for Function {
     fn value_wide(&self, x: minimax::Wide) -> minimax::Wide {
         let high = x.to_f64();
         let low = (x - minimax::Wide::from(high)).to_f64();
-        let value = self.target.value_exactly(super::real::Wide::of_sum(high, low));
+        let value = self
+            .target
+            .value_exactly(super::real::Wide::of_sum(high, low));
         minimax::Wide::sum(value.to_f64(), value.rest())
     }
 }
@@ -116,7 +118,10 @@ fn expanded(piece: &Piece, reach: f64) -> (Vec<Dyadic>, f64) {
         if excess > 0 {
             dropped += pow2(-fraction_bits) * reach.powi(k as i32);
         }
-        terms.push(Dyadic::new(i128::try_from(kept).unwrap_or(0), fraction_bits));
+        terms.push(Dyadic::new(
+            i128::try_from(kept).unwrap_or(0),
+            fraction_bits,
+        ));
     }
     (terms, dropped * (1.0 + 1e-12))
 }
@@ -138,7 +143,12 @@ mod tests {
                 low: 0,
                 high: 1,
                 centre,
-                terms: vec![number(12345, 17), number(-999, 9), number(77, -3), number(5, -11)],
+                terms: vec![
+                    number(12345, 17),
+                    number(-999, 9),
+                    number(77, -3),
+                    number(5, -11),
+                ],
                 evaluation_bound: 0.0,
             };
             let (terms, dropped) = expanded(&piece, 2.0);
@@ -150,7 +160,10 @@ mod tests {
                     .map(|(k, t)| t.raw as f64 * pow2(-t.fraction_bits) * f64::powi(x, k as i32))
                     .sum();
                 let (value, _) = piece.value(x);
-                assert!((sum - value).abs() < 1e-9 * (1.0 + value.abs()), "{x}: {sum} {value}");
+                assert!(
+                    (sum - value).abs() < 1e-9 * (1.0 + value.abs()),
+                    "{x}: {sum} {value}"
+                );
             }
         }
     }

@@ -52,7 +52,11 @@ pub struct Arguments {
     #[arg(long, value_enum, default_value = "absolute")]
     weight: Weight,
     /// A named value in the function.
-    #[arg(long = "parameter", value_name = "NAME=VALUE", allow_hyphen_values = true)]
+    #[arg(
+        long = "parameter",
+        value_name = "NAME=VALUE",
+        allow_hyphen_values = true
+    )]
     parameters: Vec<String>,
     /// Run every input code up to 2^32 of them, not only up to 2^24.
     #[arg(long)]
@@ -91,7 +95,15 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     bar.done();
     let made = made?;
     let model = bundle::model(&made.settled)?;
-    let emit = |language| bundle::emit(&made.settled, &model, &made.outcome, &request.name, language);
+    let emit = |language| {
+        bundle::emit(
+            &made.settled,
+            &model,
+            &made.outcome,
+            &request.name,
+            language,
+        )
+    };
     let (c, rust) = (emit(Language::C)?, emit(Language::Rust)?);
     let json = super::json(&made.outcome);
     super::make_folder(&arguments.out)?;
@@ -161,7 +173,10 @@ fn spelled<T: clap::ValueEnum>(value: &T) -> String {
 
 /// The command that makes the same result again; where it is written does not matter.
 fn command(a: &Arguments) -> String {
-    let mut command = format!("gyrogen approx --function '{}' --domain={}", a.function, a.domain);
+    let mut command = format!(
+        "gyrogen approx --function '{}' --domain={}",
+        a.function, a.domain
+    );
     let mut push = |name: &str, value: Option<String>| {
         if let Some(value) = value {
             command += &format!(" --{name} {value}");
@@ -176,11 +191,17 @@ fn command(a: &Arguments) -> String {
     let form = (a.form != Asked::default()).then(|| spelled(&a.form));
     push("form", form);
     push("bound", a.bound.map(|b| b.to_string()));
-    push("weight", (a.weight != Weight::default()).then(|| spelled(&a.weight)));
+    push(
+        "weight",
+        (a.weight != Weight::default()).then(|| spelled(&a.weight)),
+    );
     for parameter in &a.parameters {
         push("parameter", Some(parameter.clone()));
     }
-    push("target", (a.target != Target::default()).then(|| spelled(&a.target)));
+    push(
+        "target",
+        (a.target != Target::default()).then(|| spelled(&a.target)),
+    );
     push("name", (a.name != "approx").then(|| a.name.clone()));
     if a.exhaustive {
         command += " --exhaustive";
@@ -239,7 +260,10 @@ fn print(o: &Outcome, out: &std::path::Path) {
     );
     let lsb = f.output.parse::<Format>().map_or(1.0, Format::lsb);
     let shown = |v: f64| format!("{v:.5e} ({:.3} LSB)", v / lsb);
-    say!("certified error at most {}", shown(o.error.certified_max_abs));
+    say!(
+        "certified error at most {}",
+        shown(o.error.certified_max_abs)
+    );
     match (o.error.exhaustive_max_abs, o.error.sampled_max_abs) {
         (Some(v), _) => say!(
             "observed over all {} input codes {}, at input {}",

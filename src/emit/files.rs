@@ -109,8 +109,8 @@ pub fn emit(
     let models = model::models(design, &bundle.program);
     let banner = manifest::banner(&design.source.sha256, command);
     let facts = manifest::facts(design, &bundle);
-    let view = View::new(&bundle, &models, language, banner, facts)
-        .with_chain(design, &bundle, language);
+    let view =
+        View::new(&bundle, &models, language, banner, facts).with_chain(design, &bundle, language);
     let mut files = sources(&view, part, language)?;
     if part != Part::Tables {
         files.extend(vectors(design, &bundle, &models));

@@ -92,7 +92,8 @@ pub fn verify(folder: &Path, command: &str) -> Result<Verification> {
             if let Some(path) = &function.every_input {
                 let blocks = read_words(&folder.join(path), 3)?;
                 let words = function.outputs + 1;
-                let every = compare::every_input(language, &harness, &function.name, words, &blocks)?;
+                let every =
+                    compare::every_input(language, &harness, &function.name, words, &blocks)?;
                 functions.push(every);
             }
         }

@@ -62,7 +62,11 @@ impl Model {
     }
 
     /// The model of a function without state. `narrow`: 64-bit lanes hold every word.
-    pub fn new<const I: usize, const O: usize, B>(function: &Function, block: B, narrow: bool) -> Self
+    pub fn new<const I: usize, const O: usize, B>(
+        function: &Function,
+        block: B,
+        narrow: bool,
+    ) -> Self
     where
         B: Block<Fixed<i64, i64>, I, O, State = ()> + Block<Fixed<i128, i128>, I, O, State = ()>,
         B: 'static,

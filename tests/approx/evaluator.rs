@@ -38,7 +38,11 @@ enum Shape {
 
 fn format(text: &str) -> Format {
     let signed = !text.starts_with('U');
-    let (m, n) = text.trim_start_matches('U').trim_start_matches('Q').split_once('.').unwrap();
+    let (m, n) = text
+        .trim_start_matches('U')
+        .trim_start_matches('Q')
+        .split_once('.')
+        .unwrap();
     let (m, n): (i32, i32) = (m.parse().unwrap(), n.parse().unwrap());
     Format {
         signed,
@@ -86,7 +90,16 @@ impl Evaluator {
             },
             _ => {
                 let t = &json["table"];
-                let names = ["table", "values", "corrections", "a0", "a1", "a2", "a3", "a4"];
+                let names = [
+                    "table",
+                    "values",
+                    "corrections",
+                    "a0",
+                    "a1",
+                    "a2",
+                    "a3",
+                    "a4",
+                ];
                 let entries = names.iter().filter_map(|n| t["entries"].get(n));
                 let list = |e: &Value| e.as_array().unwrap().iter().map(number).collect();
                 let s = &t["symmetry"];
@@ -198,7 +211,11 @@ impl Evaluator {
         };
         let i = i as usize;
         let local = s.max(1) as i32 - 1;
-        let d = if s == 0 { 0 } else { w.rem_euclid(1i128 << s) - (1i128 << (s - 1)) };
+        let d = if s == 0 {
+            0
+        } else {
+            w.rem_euclid(1i128 << s) - (1i128 << (s - 1))
+        };
         let (sum, bits) = match kind.as_str() {
             "plain" => (tables[0][i], *f),
             "linear" => {
@@ -215,7 +232,10 @@ impl Evaluator {
             "bipartite" => {
                 let j = if d < 0 { -1 - d } else { d } as usize;
                 let correction = tables[1][(i >> middle_bits) * (1 << (s - 1)) + j];
-                (tables[0][i] + if d < 0 { -correction } else { correction }, *f)
+                (
+                    tables[0][i] + if d < 0 { -correction } else { correction },
+                    *f,
+                )
             }
             _ => {
                 let degree = tables.len() - 1;

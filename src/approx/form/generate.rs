@@ -26,7 +26,7 @@ pub fn symmetry(reference: &dyn Reference, codes: Codes) -> Option<Symmetry> {
     let (mut odd, mut even) = (true, true);
     for k in 0..=128 {
         // A step without common factors with the function's periods.
-        let t = reach * (f64::from(k) + 0.318) / 128.5;
+        let t = reach * (f64::from(k) + 0.293) / 128.5;
         let (above, r) = reference.at(centre + t);
         let (below, s) = reference.at(centre - t);
         let size = 1e-12 * above.abs() + r + s;
@@ -41,7 +41,9 @@ fn mirrored(reference: &dyn Reference, split: &Split, x: f64) -> f64 {
     let (a, b) = reference.domain();
     match split.symmetry {
         Some(s) if x > b => {
-            let value = reference.at((2.0 * split.codes.real(s.about_raw) - x).clamp(a, b)).0;
+            let value = reference
+                .at((2.0 * split.codes.real(s.about_raw) - x).clamp(a, b))
+                .0;
             if s.odd { -value } else { value }
         }
         _ => reference.at(x.clamp(a, b)).0,
@@ -114,7 +116,7 @@ pub fn piecewise(
         coefficients.push(c?);
     }
     let form = Piecewise::new(split, output, fraction_bits, &coefficients);
-    Some(Form::Piecewise(form))
+    Some(Form::Piecewise(Box::new(form)))
 }
 
 /// A table; `None` if an entry is too large.
@@ -134,14 +136,18 @@ pub fn table(
         // An entry that the output cannot hold would only be limited later.
         Kind::Plain if fraction_bits == output.fraction_bits => {
             let raw = rounded(*v, fraction_bits)?;
-            let low = if split.symmetry.is_some_and(|s| s.odd) { -output.max_raw() } else { output.min_raw() };
+            let low = if split.symmetry.is_some_and(|s| s.odd) {
+                -output.max_raw()
+            } else {
+                output.min_raw()
+            };
             Some(i128::from(raw).clamp(low, output.max_raw()) as i64)
         }
         _ => rounded(*v, fraction_bits),
     };
     let entries: Option<Vec<i64>> = values.iter().map(entry).collect();
     let form = Table::new(split, kind, output, fraction_bits, entries?);
-    Some(Form::Table(form))
+    Some(Form::Table(Box::new(form)))
 }
 
 /// The middle of the function's range over each segment's codes.
@@ -244,7 +250,10 @@ pub fn bipartite(
         };
         for j in 0..half {
             let (above, below) = (at(half + j), at(half - 1 - j));
-            hull(&mut corrections[(i >> middle_bits) * half + j], 0.5 * (above - below));
+            hull(
+                &mut corrections[(i >> middle_bits) * half + j],
+                0.5 * (above - below),
+            );
         }
     }
     let middle = |(low, high): &(f64, f64)| if low > high { 0.0 } else { 0.5 * (low + high) };
@@ -259,7 +268,10 @@ pub fn bipartite(
             let j = if d < 0 { -1 - d } else { d } as usize;
             let c = corrections[(i >> middle_bits) * half + j];
             let c = if d < 0 { -c } else { c };
-            hull(value, mirrored(reference, &split, first + k as f64 * lsb) - c);
+            hull(
+                value,
+                mirrored(reference, &split, first + k as f64 * lsb) - c,
+            );
         }
     }
     let raw = |v: f64| rounded(v, fraction_bits);
@@ -267,5 +279,5 @@ pub fn bipartite(
     let corrections: Option<Vec<i64>> = corrections.iter().map(|v| raw(*v)).collect();
     let tables = [values?, corrections?];
     let form = Bipartite::new(split, middle_bits, output, fraction_bits, tables);
-    Some(Form::Bipartite(form))
+    Some(Form::Bipartite(Box::new(form)))
 }

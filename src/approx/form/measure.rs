@@ -100,8 +100,9 @@ pub fn measure(settled: &Settled, reference: &dyn Reference, effort: &Effort) ->
                     let k = next.fetch_add(1, Ordering::Relaxed);
                     let Some(piece) = pieces.get(k) else { break };
                     let end = ends(&pieces, k, settled, reference);
-                    let result =
-                        of_piece(settled, reference, piece, end, exhaustive, stride, may_exceed);
+                    let result = of_piece(
+                        settled, reference, piece, end, exhaustive, stride, may_exceed,
+                    );
                     (effort.progress)(result.checked);
                     if let Ok(mut results) = results.lock() {
                         results[k] = Some(result);
@@ -121,10 +122,18 @@ pub fn measure(settled: &Settled, reference: &dyn Reference, effort: &Effort) ->
         exhaustive,
     };
     for result in results.into_iter().flatten() {
-        let limited = result.limited.map_or(0.0, |rounding| result.distance + rounding);
-        all.certified = all.certified.max(result.data + result.rounding).max(limited);
+        let limited = result
+            .limited
+            .map_or(0.0, |rounding| result.distance + rounding);
+        all.certified = all
+            .certified
+            .max(result.data + result.rounding)
+            .max(limited);
         all.data_only = all.data_only.max(result.data);
-        all.rounding = all.rounding.max(result.rounding).max(result.limited.unwrap_or(0.0));
+        all.rounding = all
+            .rounding
+            .max(result.rounding)
+            .max(result.limited.unwrap_or(0.0));
         if result.observed > all.observed {
             (all.observed, all.at_input_raw) = (result.observed, result.at);
         }
@@ -165,12 +174,7 @@ fn checked(mut all: Measured, settled: &Settled, reference: &dyn Reference) -> R
 }
 
 /// The real interval of piece k.
-fn ends(
-    pieces: &[Piece],
-    k: usize,
-    settled: &Settled,
-    reference: &dyn Reference,
-) -> (f64, f64) {
+fn ends(pieces: &[Piece], k: usize, settled: &Settled, reference: &dyn Reference) -> (f64, f64) {
     let codes = settled.form.codes();
     let piece = &pieces[k];
     let (a, b) = reference.domain();
@@ -180,7 +184,11 @@ fn ends(
     }
     // A polynomial goes on between the codes and up to the domain's ends.
     let low = if k == 0 { a } else { low };
-    let high = if k + 1 == pieces.len() { b } else { codes.real(piece.high + 1) };
+    let high = if k + 1 == pieces.len() {
+        b
+    } else {
+        codes.real(piece.high + 1)
+    };
     (low, high)
 }
 
@@ -257,7 +265,11 @@ fn run_piece<L: HasKernel>(
         }
         result.checked += 1;
         // The last code is always run.
-        code = if code < piece.high { (code + stride).min(piece.high) } else { code + 1 };
+        code = if code < piece.high {
+            (code + stride).min(piece.high)
+        } else {
+            code + 1
+        };
     }
     result
 }

@@ -21,6 +21,7 @@ use crate::numeric::trace::Trace;
 use crate::numeric::trace::ir::{Interval, Program};
 use piecewise::Piecewise;
 use polynomial::Polynomial;
+use split::Split;
 use table::{Bipartite, Table};
 
 /// The input word and the codes of it that lie in the domain. Others are limited to the nearest of them.
@@ -53,12 +54,7 @@ impl Codes {
     /// The limit that every form begins with.
     #[inline(always)]
     pub fn limit<A: Arithmetic>(self, ar: &A, input: A::Word) -> A::Word {
-        ar.limit(
-            input,
-            self.low,
-            self.high,
-            self.format.fraction_bits as i32,
-        )
+        ar.limit(input, self.low, self.high, self.format.fraction_bits as i32)
     }
 }
 
@@ -114,13 +110,13 @@ impl Piece {
 #[derive(Debug, Clone)]
 pub enum Form {
     /// One polynomial over the whole domain.
-    Polynomial(Polynomial),
+    Polynomial(Box<Polynomial>),
     /// A polynomial for each segment.
-    Piecewise(Piecewise),
+    Piecewise(Box<Piecewise>),
     /// A table, with or without interpolation.
-    Table(Table),
+    Table(Box<Table>),
     /// Two tables, whose entries are added.
-    Bipartite(Bipartite),
+    Bipartite(Box<Bipartite>),
 }
 
 macro_rules! each {
@@ -141,6 +137,16 @@ impl Form {
             Form::Polynomial(_) => "polynomial",
             Form::Piecewise(_) => "piecewise",
             Form::Table(_) | Form::Bipartite(_) => "table",
+        }
+    }
+
+    /// The segments, if it has any.
+    pub fn split(&self) -> Option<&Split> {
+        match self {
+            Form::Polynomial(_) => None,
+            Form::Piecewise(f) => Some(&f.split),
+            Form::Table(f) => Some(&f.split),
+            Form::Bipartite(f) => Some(&f.split),
         }
     }
 

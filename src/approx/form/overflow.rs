@@ -20,7 +20,10 @@ pub fn refuse(settled: &Settled, most_codes: u128) -> Result<()> {
     let mut form = settled.form.clone();
     let casts = form.casts_mut();
     let suspects = casts.iter().filter(|c| settled.unproved.contains(&c.id));
-    let suspects: Vec<Label> = suspects.map(|c| c.label).filter(|l| l.key != OUTPUT).collect();
+    let suspects: Vec<Label> = suspects
+        .map(|c| c.label)
+        .filter(|l| l.key != OUTPUT)
+        .collect();
     let Some(first) = suspects.first() else {
         return Ok(());
     };
@@ -64,7 +67,14 @@ pub fn refuse(settled: &Settled, most_codes: u128) -> Result<()> {
 fn reporting(cast: &Cast) -> Cast {
     let from = cast.shift + cast.gain + cast.target.fraction_bits;
     let overflow = cast.overflow.map(|_| Overflow::Error);
-    let mut made = Cast::new(cast.label, from, cast.gain, cast.target, cast.rounding, overflow);
+    let mut made = Cast::new(
+        cast.label,
+        from,
+        cast.gain,
+        cast.target,
+        cast.rounding,
+        overflow,
+    );
     made.id = cast.id;
     made
 }

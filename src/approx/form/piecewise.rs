@@ -41,7 +41,10 @@ impl Piecewise {
         fraction_bits: u32,
         coefficients: &[Vec<i64>],
     ) -> Self {
-        let orders = coefficients.first().map_or(2, Vec::len).clamp(2, HIGHEST_DEGREE + 1);
+        let orders = coefficients
+            .first()
+            .map_or(2, Vec::len)
+            .clamp(2, HIGHEST_DEGREE + 1);
         let local = split.bits.max(1) as i32 - 1;
         let f = fraction_bits as i32;
         let align = |from| {
@@ -50,7 +53,14 @@ impl Piecewise {
         };
         let inner = |_| {
             let target = Target::signed(127, f);
-            Cast::new(Label::of("step"), f + local, 0, target, Rounding::HalfUp, None)
+            Cast::new(
+                Label::of("step"),
+                f + local,
+                0,
+                target,
+                Rounding::HalfUp,
+                None,
+            )
         };
         let tables = (0..orders).map(|k| Table {
             name: NAMES[k],
@@ -117,7 +127,11 @@ impl Piecewise {
 
     pub(super) fn pieces(&self) -> Vec<Piece> {
         let fraction_bits = self.fraction_bits as i32;
-        let half = if self.split.bits > 1 { pow2(-fraction_bits - 1) } else { 0.0 };
+        let half = if self.split.bits > 1 {
+            pow2(-fraction_bits - 1)
+        } else {
+            0.0
+        };
         // |delta| is at most 1: each step's half LSB counts once.
         let bound = half * self.steps.len() as f64;
         self.split.pieces(|i| {

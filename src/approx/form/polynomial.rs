@@ -122,7 +122,11 @@ impl Polynomial {
             let (half_up, saturate) = (Rounding::HalfUp, Some(Overflow::Saturate));
             Cast::new(label, from, 0, formats.intermediate, half_up, saturate)
         };
-        let variable = if monomials == Monomials::All { input } else { inner };
+        let variable = if monomials == Monomials::All {
+            input
+        } else {
+            inner
+        };
         let own = formats.coefficients.fraction_bits as i32;
         let mut at = own;
         let mut steps = Vec::new();
@@ -143,7 +147,11 @@ impl Polynomial {
             at = inner;
         }
         let squares = monomials != Monomials::All && exponents.len() > 1;
-        let last = if monomials == Monomials::Odd { at + input } else { at };
+        let last = if monomials == Monomials::Odd {
+            at + input
+        } else {
+            at
+        };
         Ok(Polynomial {
             codes: formats.codes,
             output: formats.output,
@@ -197,7 +205,10 @@ impl Polynomial {
     /// The polynomial over sub-intervals of the domain, with the bound of its evaluation on each.
     pub(super) fn pieces(&self) -> Vec<Piece> {
         let fraction_bits = self.formats.coefficients.fraction_bits as i32;
-        let number = |raw: &i128| Number { raw: *raw, fraction_bits };
+        let number = |raw: &i128| Number {
+            raw: *raw,
+            fraction_bits,
+        };
         let terms: Vec<Number> = self.coefficients.iter().map(number).collect();
         split(self.codes.low, self.codes.high, PIECES)
             .map(|(low, high)| Piece {
@@ -234,7 +245,11 @@ impl Polynomial {
             error = error * (v + v_error) + size * v_error + half(&step.cast);
             size = size * v + c.unsigned_abs() as f64 * lsb;
         }
-        let outer = if self.monomials == Monomials::Odd { x } else { 1.0 };
+        let outer = if self.monomials == Monomials::Odd {
+            x
+        } else {
+            1.0
+        };
         error * outer * SLACK
     }
 
@@ -258,7 +273,11 @@ pub(super) fn split(low: i128, high: i128, count: i128) -> impl Iterator<Item = 
 }
 
 fn aligned(raw: i128, shift: u32) -> Result<i128> {
-    let room = if raw < 0 { raw.leading_ones() } else { raw.leading_zeros() };
+    let room = if raw < 0 {
+        raw.leading_ones()
+    } else {
+        raw.leading_zeros()
+    };
     if raw != 0 && shift + 2 > room {
         return Err(InputError::new(format!(
             "coefficient {raw} aligned by {shift} bits needs more than 126 bits"
@@ -290,13 +309,17 @@ pub fn choose_intermediate(
             output,
         };
         let form = Polynomial::new(formats, monomials, coefficients.to_vec()).ok()?;
-        let bound = form.pieces().iter().map(|p| p.evaluation_bound).fold(0.0, f64::max);
+        let bound = form
+            .pieces()
+            .iter()
+            .map(|p| p.evaluation_bound)
+            .fold(0.0, f64::max);
         let labels: Vec<bool> = { form.clone() }
             .casts_mut()
             .iter()
             .map(|c| c.overflow == Some(Overflow::Saturate) && c.label.key != "output")
             .collect();
-        let settled = super::Form::Polynomial(form).settle().ok()?;
+        let settled = super::Form::Polynomial(Box::new(form)).settle().ok()?;
         let ranges = settled.program.cast_ranges.iter().zip(labels);
         let ranges = ranges.filter_map(|(range, counts)| range.filter(|_| counts));
         let range = ranges.reduce(Interval::join).unwrap_or(Interval::point(0));
@@ -313,7 +336,9 @@ pub fn choose_intermediate(
     let degree = coefficients.len().saturating_sub(1);
     let exact = Polynomial::exact_fraction_bits(&formats, monomials, degree).clamp(0, 63);
     let enough = |bound: f64| bound <= output.lsb() / 1000.0;
-    let narrow = (0..=exact).rev().find_map(|n| with(n).filter(|(bits, ..)| *bits <= 64));
+    let narrow = (0..=exact)
+        .rev()
+        .find_map(|n| with(n).filter(|(bits, ..)| *bits <= 64));
     if let Some((_, format, bound)) = narrow
         && enough(bound)
     {

@@ -193,7 +193,11 @@ impl Split {
                 let exponent = self.width as i32 - 1 - e;
                 let ceil = |v: i32| if v >= 0 { 1i128 << v } else { 1 };
                 let first = if lowest { 0 } else { ceil(exponent) };
-                let end = if lowest { ceil(exponent) } else { ceil(exponent + 1) };
+                let end = if lowest {
+                    ceil(exponent)
+                } else {
+                    ceil(exponent + 1)
+                };
                 let middle = Number {
                     raw: if lowest { 1 } else { 3 },
                     fraction_bits: 1 - exponent,

@@ -172,7 +172,11 @@ impl Table {
                 let (a, b, c) = (at(2 * i), at(2 * i + 1), at(2 * i + 2));
                 let bend = number(a - 2 * b + c, f + 1);
                 // The rounding of t, half of it.
-                let bound = if self.split.bits > 1 { pow2(-f - 2) } else { 0.0 };
+                let bound = if self.split.bits > 1 {
+                    pow2(-f - 2)
+                } else {
+                    0.0
+                };
                 (vec![number(b, f), number(c - a, f + 1), bend], bound)
             }
         })

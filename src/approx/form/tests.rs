@@ -23,7 +23,9 @@ impl Reference for Plain {
     }
     fn range(&self, low: f64, high: f64) -> (f64, f64) {
         let values = (0..=64).map(|k| (self.0)(low + (high - low) * f64::from(k) / 64.0));
-        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)))
+        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
+            (l.min(v), h.max(v))
+        })
     }
     fn domain(&self) -> (f64, f64) {
         (self.1, self.2)
@@ -51,7 +53,11 @@ fn report(name: &str, form: Form, reference: &dyn Reference) -> (f64, f64) {
     let cost = crate::approx::cost::Cost::of(&settled, crate::approx::cost::Target::CortexM4);
     println!(
         "{name}: data {:.3} LSB, rounding {:.3}, certified {:.3}, observed {:.3} at {}; {} bits, {cost:?}",
-        m.data_only / lsb, m.rounding / lsb, m.certified / lsb, m.observed / lsb, m.at_input_raw,
+        m.data_only / lsb,
+        m.rounding / lsb,
+        m.certified / lsb,
+        m.observed / lsb,
+        m.at_input_raw,
         settled.bits
     );
     assert!(m.observed <= m.certified);
@@ -74,7 +80,11 @@ fn forms_of_a_sine() {
             }
             for degree in 1..=4 {
                 let form = generate::piecewise(&f, split.clone(), degree, out, 18).unwrap();
-                report(&format!("piecewise {degree} {bits} {}", s.is_some()), form, &f);
+                report(
+                    &format!("piecewise {degree} {bits} {}", s.is_some()),
+                    form,
+                    &f,
+                );
             }
         }
         for steps in 1..=4 {
@@ -107,6 +117,6 @@ fn a_polynomial_of_a_sine() {
             output,
         };
         let p = Polynomial::new(formats, Monomials::Odd, raw.clone()).unwrap();
-        report(&format!("odd 5 {intermediate}"), Form::Polynomial(p), &f);
+        report(&format!("odd 5 {intermediate}"), Form::Polynomial(Box::new(p)), &f);
     }
 }
