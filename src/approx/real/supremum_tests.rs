@@ -105,3 +105,99 @@ fn the_supremum_is_above_every_sample_and_not_by_much() {
         }
     }
 }
+
+#[test]
+fn the_relative_supremum_is_above_every_sample() {
+    for (text, low, high) in CASES {
+        let (f, domain) = case(text, low, high);
+        let enclosure = Enclosure::new(&f, &domain, 1e-15).unwrap();
+        let (a, b) = domain.inner();
+        let (a, b) = (a + 0.31 * (b - a), b - 0.2 * (b - a));
+        let p = interpolated(&|x| f.value(x), a, b, 4);
+        let Ok(found) = enclosure.supremum_relative(&p, a, b) else {
+            // The magnitude and the last function have zeros there.
+            assert!(
+                [
+                    "abs(x-0.3)",
+                    "cos(3*x)*exp(-x^2/2) + x^3/7",
+                    "136.82*x^2 + 242.97*x + 109.60"
+                ]
+                .contains(&text),
+                "{text}"
+            );
+            continue;
+        };
+        let mut seen: f64 = 0.0;
+        for k in 0..=3000 {
+            let x = Interval::from((a + (b - a) * f64::from(k) / 3000.0).clamp(a, b));
+            let q = p
+                .iter()
+                .rev()
+                .fold(Interval::ZERO, |s, c| s * x + c.to_interval());
+            let value = f.enclosed(x);
+            seen = seen.max(((value - q) / value).mignitude());
+        }
+        assert!(
+            found.upper >= seen && found.lower <= found.upper,
+            "{text} {found:?} {seen}"
+        );
+        assert!(
+            found.upper <= seen * 1.001 + 1e-16,
+            "{text} {found:?} {seen}"
+        );
+    }
+    let (f, domain) = case("sin(x)", "0", "1");
+    let enclosure = Enclosure::new(&f, &domain, 1e-15).unwrap();
+    let refused = enclosure.supremum_relative(&[], 0.0, 1.0).unwrap_err();
+    assert!(refused.reason.contains("near x = 0"), "{refused}");
+}
+
+#[test]
+fn parts_of_the_domain_and_places_outside() {
+    let (f, domain) = case("exp(x)", "0", "1");
+    let enclosure = Enclosure::new(&f, &domain, 1e-12).unwrap();
+    let line = [Dyadic::new(1, 0), Dyadic::new(1, 0)];
+    for (low, high, wanted) in [
+        (0.25, 0.5, 0.5f64.exp() - 1.5),
+        (0.5, 0.5, 0.5f64.exp() - 1.5),
+        (-3.0, 9.0, 1f64.exp() - 2.0),
+    ] {
+        let found = enclosure.supremum(&line, low, high);
+        assert!(
+            (found.upper - wanted).abs() < 1e-5 && found.lower <= wanted + 1e-15,
+            "{found:?}"
+        );
+        assert!(found.upper >= wanted - 1e-15);
+    }
+    assert_eq!(enclosure.supremum(&line, 2.0, 3.0).upper, f64::INFINITY);
+    assert_eq!(
+        enclosure.range(2.0, 3.0),
+        (f64::NEG_INFINITY, f64::INFINITY)
+    );
+    // A crude enclosure is refined by itself.
+    let crude = Enclosure::new(&f, &domain, 1e-3).unwrap();
+    let fine = interpolated(&|x| f.value(x), 0.0, 1.0, 9);
+    let (one, other) = (
+        crude.supremum(&fine, 0.0, 1.0),
+        enclosure.supremum(&fine, 0.0, 1.0),
+    );
+    assert!(
+        (one.upper - other.upper).abs() < 1e-4 * other.upper,
+        "{one:?} {other:?}"
+    );
+}
+
+#[test]
+fn a_coefficient_damaged_by_one_lsb_shows() {
+    let (f, domain) = case("atan(x)/(2*pi)", "0", "1");
+    let enclosure = Enclosure::new(&f, &domain, 1e-15).unwrap();
+    let p = interpolated(&|x| f.value(x), 0.0, 1.0, 7);
+    let good = enclosure.supremum(&p, 0.0, 1.0);
+    for k in 0..p.len() {
+        let mut damaged = p.clone();
+        let value = p[k].to_f64() + f64::powi(2.0, -15);
+        damaged[k] = Dyadic::from_f64(value);
+        let bad = enclosure.supremum(&damaged, 0.0, 1.0);
+        assert!(bad.lower > good.upper, "{k}");
+    }
+}
