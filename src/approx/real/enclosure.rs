@@ -121,7 +121,7 @@ impl Enclosure {
         self.segments.iter().map(|s| s.radius).fold(0.0, f64::max)
     }
 
-    /// At least the function's largest magnitude, to a few parts in a hundred.
+    /// At least the function's largest magnitude, usually within a factor of two.
     pub fn size(&self) -> f64 {
         self.size
     }

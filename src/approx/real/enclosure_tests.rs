@@ -323,10 +323,17 @@ fn derivatives_are_bounded_closely() {
     let root = over("sqrt(x)", "0", "1", 1e-12);
     assert_eq!(root.derivative_bound(1, 0.0, 1.0), None);
     assert!(root.derivative_bound(1, 0.01, 1.0).is_some());
-    assert_eq!(
-        over("abs(x)", "-1", "1", 1e-9).derivative_bound(1, -0.5, 0.5),
-        None
-    );
+    // A kink in the middle, where the interval is halved, and between other places.
+    for (low, high) in [(-0.5, 0.5), (-0.25, 0.5), (-0.1, 0.35)] {
+        let kinked = over("abs(x)", "-1", "1", 1e-9);
+        for order in [1, 2, 3] {
+            assert_eq!(kinked.derivative_bound(order, low, high), None);
+        }
+    }
+    // At an end it is none.
+    let smooth = over("abs(x)", "0", "1", 1e-9);
+    assert_eq!(smooth.derivative_bound(1, 0.0, 1.0), Some(1.0));
+    assert_eq!(smooth.derivative_bound(2, 0.0, 1.0), Some(0.0));
 }
 
 #[test]

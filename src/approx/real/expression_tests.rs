@@ -144,3 +144,13 @@ fn bombs_are_refused() {
     assert!(f.to_string().len() > 1900);
     assert!(f.enclosed(Interval::ONE).contains(Wide::from(1901.0)));
 }
+
+#[test]
+fn the_same_operand_twice_is_a_square() {
+    let x = Interval::new(Wide::from(-1.0), Wide::from(1.0));
+    for text in ["x*x", "(x + 0)*(x + 0)", "x^2"] {
+        let f = Expression::parse(text).unwrap();
+        assert!(f.enclosed(x).low >= Wide::ZERO, "{text}");
+    }
+    assert_eq!(value("x - x + x/x*x", 3.0), 3.0);
+}

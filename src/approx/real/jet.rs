@@ -309,9 +309,9 @@ impl Jet {
     /// The magnitude.
     pub fn abs(&self) -> Jet {
         let u = self.terms[0];
-        if u.low > Wide::ZERO {
+        if u.low >= Wide::ZERO {
             self.clone()
-        } else if u.high < Wide::ZERO {
+        } else if u.high <= Wide::ZERO {
             self.neg()
         } else {
             Jet::value_only(u.abs())

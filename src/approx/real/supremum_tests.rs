@@ -146,10 +146,10 @@ fn the_relative_supremum_is_above_every_sample() {
             "{text} {found:?} {seen}"
         );
     }
-    let (f, domain) = case("sin(x)", "0", "1");
+    let (f, domain) = case("cos(x)", "0", "2");
     let enclosure = Enclosure::new(&f, &domain, 1e-15).unwrap();
-    let refused = enclosure.supremum_relative(&[], 0.0, 1.0).unwrap_err();
-    assert!(refused.reason.contains("near x = 0"), "{refused}");
+    let refused = enclosure.supremum_relative(&[], 0.0, 2.0).unwrap_err();
+    assert!(refused.reason.contains("near x = 1.57079"), "{refused}");
 }
 
 #[test]
@@ -199,5 +199,78 @@ fn a_coefficient_damaged_by_one_lsb_shows() {
         damaged[k] = Dyadic::from_f64(value);
         let bad = enclosure.supremum(&damaged, 0.0, 1.0);
         assert!(bad.lower > good.upper, "{k}");
+    }
+}
+
+/// The sine over odd powers: the quotient at 0 is that of the slopes.
+#[test]
+fn relative_errors_across_a_common_zero() {
+    let odd = |a: f64, b: f64, c: f64| [0.0, a, 0.0, b, 0.0, c].map(Dyadic::from_f64);
+    for (text, low, high, p) in [
+        ("sin(x)", "0", "1", odd(1.0, -1.0 / 6.0, 1.0 / 120.0)),
+        ("sin(x)", "-1", "0.5", odd(0.9995, -0.1661, 0.0081)),
+        ("atan(x)/(2*pi)", "0", "1", odd(0.158, -0.047, 0.014)),
+        ("exp(x) - 1", "0", "0.5", odd(1.01, 0.6, 0.1)),
+    ] {
+        let (f, domain) = case(text, low, high);
+        let enclosure = Enclosure::new(&f, &domain, 1e-15).unwrap();
+        let (a, b) = domain.inner();
+        let found = enclosure.supremum_relative(&p, a, b).unwrap();
+        let mut seen: f64 = 0.0;
+        for k in 0..=4000 {
+            let s = f64::from(k) / 4000.0;
+            for x in [a + (b - a) * s, a * s.powi(6), b * s.powi(6)] {
+                let x = Interval::from(x.clamp(a, b));
+                let q = p
+                    .iter()
+                    .rev()
+                    .fold(Interval::ZERO, |s, c| s * x + c.to_interval());
+                let value = f.enclosed(x);
+                if !value.contains_zero() {
+                    seen = seen.max(((value - q) / value).mignitude());
+                }
+            }
+        }
+        println!("{text} {found:?} {seen}");
+        assert!(
+            found.upper >= seen && found.lower <= found.upper,
+            "{text} {found:?} {seen}"
+        );
+        assert!(found.upper <= seen * 1.001, "{text} {found:?} {seen}");
+    }
+    // p does not vanish where f does.
+    let (f, domain) = case("sin(x)", "0", "1");
+    let enclosure = Enclosure::new(&f, &domain, 1e-15).unwrap();
+    let off = [Dyadic::new(1, 20), Dyadic::new(1, 0)];
+    let refused = enclosure.supremum_relative(&off, 0.0, 1.0).unwrap_err();
+    assert!(refused.reason.contains("near x = 0"), "{refused}");
+}
+
+/// Parts are bounded from a polynomial's shape: never inside its true range, and exact for parabolas.
+#[test]
+fn the_range_of_a_short_polynomial_holds_its_values() {
+    let mut state = 12345u64;
+    let mut next = || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        (state >> 33) as f64 / f64::powi(2.0, 30) - 1.0
+    };
+    for round in 0..2000 {
+        let degree = 2 + round % 5;
+        let terms: Vec<f64> = (0..=degree).map(|_| next()).collect();
+        let w = 0.5 + 0.4 * next();
+        let (low, high) = search::range_of(&terms, w);
+        let (mut least, mut largest) = (f64::INFINITY, f64::NEG_INFINITY);
+        for k in 0..=1000 {
+            let s = -w + 2.0 * w * f64::from(k) / 1000.0;
+            let value = terms.iter().rev().fold(0.0, |sum, c| sum * s + c);
+            (least, largest) = (least.min(value), largest.max(value));
+        }
+        let (below, above) = (low - 1e-14, high + 1e-14);
+        assert!(below <= least && largest <= above, "{terms:?} {w}");
+        if degree == 2 {
+            assert!(least - low < 1e-5 && high - largest < 1e-5, "{terms:?} {w}");
+        }
     }
 }
