@@ -116,7 +116,7 @@ fn within(value: &Real, centre: &Real, radius: f64, size: f64) -> bool {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(400))]
+    #![proptest_config(ProptestConfig::with_cases(200))]
 
     #[test]
     fn random_functions_lie_in_their_enclosures(

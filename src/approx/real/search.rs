@@ -136,9 +136,14 @@ impl Aim {
 }
 
 impl Model {
-    /// Over `place`, a part of the segment.
-    pub(super) fn new(segment: &Segment, place: Interval, p: &[Interval], relative: bool) -> Model {
-        let centre = Interval::from(segment.centre);
+    /// Over `place`, a part of the segment; `p` is in powers of `x - about`.
+    pub(super) fn new(
+        segment: &Segment,
+        place: Interval,
+        (p, about): (&[Interval], Interval),
+        relative: bool,
+    ) -> Model {
+        let centre = Interval::from(segment.centre) - about;
         let mut moved = p.to_vec();
         let n = moved.len();
         for i in 0..n {

@@ -29,6 +29,8 @@ pub struct Supremum {
     pub at: f64,
 }
 
+const NO_POLYNOMIAL: (&[Interval], Interval) = (&[], Interval::ZERO);
+
 const NOTHING: Supremum = Supremum {
     upper: f64::INFINITY,
     lower: 0.0,
@@ -36,20 +38,25 @@ const NOTHING: Supremum = Supremum {
 };
 
 impl Enclosure {
-    fn models(&self, p: &[Interval], x: Interval, relative: bool) -> Vec<Model> {
+    fn models(&self, p: (&[Interval], Interval), x: Interval, relative: bool) -> Vec<Model> {
         let parts = self.meeting(x);
-        parts
-            .map(|(s, place)| Model::new(s, place, p, relative))
-            .collect()
+        let model = |(s, place)| Model::new(s, place, p, relative);
+        parts.map(model).collect()
     }
 
     /// Over `x`; relative to the function where its `least` magnitude is given.
-    fn largest(&self, p: &[Dyadic], x: Interval, least: Option<f64>) -> Supremum {
+    fn largest(
+        &self,
+        (p, about): (&[Dyadic], Interval),
+        x: Interval,
+        least: Option<f64>,
+    ) -> Supremum {
         let p: Vec<Interval> = p.iter().map(|c| c.to_interval()).collect();
+        let p = (&p[..], about);
         let relative = least.is_some();
         let floor = if relative { FLOOR } else { FLOOR * self.size() };
         let gap = |best: f64| (GAP * best.abs()).max(floor);
-        let (mut found, mut noisy) = search(&self.models(&p, x, relative), Aim::Magnitude, gap);
+        let (mut found, mut noisy) = search(&self.models(p, x, relative), Aim::Magnitude, gap);
         // The function's own radius is in the way: enclose it better, here only.
         for _ in 0..2 {
             if !noisy {
@@ -63,7 +70,7 @@ impl Enclosure {
             let Ok(better) = Enclosure::new(&self.function, &domain, finer) else {
                 break;
             };
-            let (again, still) = search(&better.models(&p, x, relative), Aim::Magnitude, gap);
+            let (again, still) = search(&better.models(p, x, relative), Aim::Magnitude, gap);
             noisy = still;
             if again.upper < found.upper {
                 let lower = again.lower.max(found.lower);
@@ -77,15 +84,20 @@ impl Enclosure {
     /// The supremum of |f - p| from `low` to `high` (the part of it in the domain), where
     /// `p = p_0 + p_1 x + ...`, lowest order first.
     pub fn supremum(&self, p: &[Dyadic], low: f64, high: f64) -> Supremum {
+        self.supremum_about(p, Dyadic::new(0, 0), low, high)
+    }
+
+    /// As [`Enclosure::supremum`] for `p = p_0 + p_1 (x - about) + p_2 (x - about)^2 + ...`.
+    pub fn supremum_about(&self, p: &[Dyadic], about: Dyadic, low: f64, high: f64) -> Supremum {
         match self.clipped(low, high) {
-            Some(x) => self.largest(p, x, None),
+            Some(x) => self.largest((p, about.to_interval()), x, None),
             None => NOTHING,
         }
     }
 
     /// As [`Enclosure::supremum`], over the whole domain.
     pub fn supremum_over_domain(&self, p: &[Dyadic]) -> Supremum {
-        self.largest(p, self.domain().hull(), None)
+        self.largest((p, Interval::ZERO), self.domain().hull(), None)
     }
 
     /// The supremum of |f - p| / |f|.
@@ -126,9 +138,9 @@ impl Enclosure {
     }
 
     fn largest_relative(&self, p: &[Dyadic], x: Interval) -> Result<Supremum, Undefined> {
-        let (least, at) = search_least(&self.models(&[], x, false), self.size() * FLOOR);
+        let (least, at) = search_least(&self.models(NO_POLYNOMIAL, x, false), self.size() * FLOOR);
         if least > 0.0 {
-            return Ok(self.largest(p, x, Some(least)));
+            return Ok(self.largest((p, Interval::ZERO), x, Some(least)));
         }
         Err(Undefined {
             at,
@@ -189,7 +201,7 @@ impl Enclosure {
         let Some(x) = self.clipped(low, high) else {
             return (f64::NEG_INFINITY, f64::INFINITY);
         };
-        let models = self.models(&[], x, false);
+        let models = self.models(NO_POLYNOMIAL, x, false);
         let gap = |_: f64| RANGE_GAP * self.size();
         let (highest, _) = search(&models, Aim::Highest, gap);
         let (lowest, _) = search(&models, Aim::Lowest, gap);

@@ -274,3 +274,16 @@ fn the_range_of_a_short_polynomial_holds_its_values() {
         }
     }
 }
+
+#[test]
+fn polynomials_about_a_centre_are_those_about_0() {
+    let (f, domain) = case("exp(x)", "0", "1");
+    let enclosure = Enclosure::new(&f, &domain, 1e-15).unwrap();
+    // 1 + t + t^2/2 with t = x - 1/4: 25/32 + 3/4 x + x^2/2.
+    let local = [Dyadic::new(1, 0), Dyadic::new(1, 0), Dyadic::new(1, 1)];
+    let moved = [Dyadic::new(25, 5), Dyadic::new(3, 2), Dyadic::new(1, 1)];
+    let one = enclosure.supremum_about(&local, Dyadic::new(1, 2), 0.0, 1.0);
+    let other = enclosure.supremum(&moved, 0.0, 1.0);
+    assert_eq!(one, other);
+    assert!((one.upper - (1f64.exp() - 2.03125)).abs() < 1e-4, "{one:?}");
+}
