@@ -10,8 +10,13 @@ use super::interval::Interval;
 const BITS: usize = 256;
 
 /// pi.
-pub static PI: LazyLock<Interval> = LazyLock::new(|| pi_times(1));
-/// pi / 2, to one more bit than halving needs.
+pub static PI: LazyLock<Interval> = LazyLock::new(|| {
+    // Machin: pi = 16 atan(1/5) - 4 atan(1/239).
+    let (fifth, error) = inverse_series(5, true);
+    let (rest, more) = inverse_series(239, true);
+    enclosing(&(fifth * 16 - rest * 4), error * 16 + more * 4)
+});
+/// pi / 2.
 pub static HALF_PI: LazyLock<Interval> = LazyLock::new(|| PI.scaled(-1));
 /// log 2.
 pub static LOG_2: LazyLock<Interval> = LazyLock::new(|| {
@@ -38,17 +43,6 @@ pub static INVERSES: LazyLock<Vec<Interval>> = LazyLock::new(|| {
         })
         .collect()
 });
-
-/// Machin: pi = 16 atan(1/5) - 4 atan(1/239).
-fn pi_times(factor: i32) -> Interval {
-    let (fifth, error) = inverse_series(5, true);
-    let (rest, more) = inverse_series(239, true);
-    let sum = (fifth * 16 - rest * 4) * factor;
-    enclosing(
-        &sum,
-        (error * 16 + more * 4) * i64::from(factor.unsigned_abs()),
-    )
-}
 
 /// `atan(1/q)` (alternating) or `atanh(1/q)` in units of 2^-BITS, and the bound of its error.
 ///

@@ -2,7 +2,7 @@
 
 use super::enclosure::Enclosure;
 use super::interval::Interval;
-use super::wide::Toward;
+use super::wide::{Toward, Wide};
 
 /// Highest order.
 pub const HIGHEST: usize = 8;
@@ -25,13 +25,13 @@ impl Enclosure {
         if order > HIGHEST {
             return None;
         }
-        let x = self.clipped(low, high)?;
+        let whole = self.clipped(low, high)?;
         let factorial: f64 = (1..=order).map(|k| k as f64).product();
-        let mut left = vec![(x, DEPTH)];
+        let mut left = vec![(whole, DEPTH)];
         let mut range: Option<Interval> = None;
         let mut met: Option<Interval> = None;
         while let Some((x, depth)) = left.pop() {
-            let (over, at) = self.coefficient(order, x);
+            let (over, at) = self.coefficient(order, reaching_over(x, whole));
             if let Some(at) = at {
                 met = Some(met.map_or(at, |m| m.hull(at)));
             }
@@ -83,4 +83,19 @@ impl Enclosure {
         }
         (direct, at)
     }
+}
+
+/// `x` with a little more on the sides that are not those of `whole`: a kink where it was divided must
+/// not get lost between two smooth halves.
+fn reaching_over(x: Interval, whole: Interval) -> Interval {
+    let more = |end: Wide| Wide::from(end.abs().to_f64() * 1e-20 + 1e-200);
+    let low = match x.low > whole.low {
+        true => x.low.sub(more(x.low), Toward::Down).max(whole.low),
+        false => x.low,
+    };
+    let high = match x.high < whole.high {
+        true => x.high.add(more(x.high), Toward::Up).min(whole.high),
+        false => x.high,
+    };
+    Interval::new(low, high)
 }

@@ -81,7 +81,7 @@ fn small_turn(r: Interval) -> (Interval, Interval) {
 fn turn_at(x: Wide) -> (Interval, Interval) {
     let all = interval(-1.0, 1.0);
     let start = x.to_f64();
-    if !(start.abs() < 1e9) {
+    if start.is_nan() || start.abs() >= 1e9 {
         return (all, all);
     }
     let k = (start / std::f64::consts::FRAC_PI_2).round();
@@ -228,7 +228,7 @@ impl Interval {
     /// The tangent; the whole line if a pole may lie in it.
     pub fn tan(self) -> Interval {
         let width = self.high.sub(self.low, Toward::Up).to_f64();
-        if self.cos().contains_zero() || !(width < 3.0) {
+        if self.cos().contains_zero() || width.is_nan() || width >= 3.0 {
             return Interval::WHOLE;
         }
         rising(self, |x| {

@@ -14,7 +14,7 @@ use super::wide::{Toward, Wide};
 /// Highest degree of a segment's polynomial.
 pub(super) const DEGREE: usize = 11;
 /// Most segments.
-const SEGMENTS: usize = 20_000;
+const SEGMENTS: usize = 6000;
 /// Segments are not halved below this part of their place, nor below [`NARROWEST`].
 const NARROW: f64 = f64::from_bits((1023 - 98) << 52);
 const NARROWEST: f64 = f64::from_bits((1023 - 400) << 52);
@@ -121,7 +121,7 @@ impl Enclosure {
         self.segments.iter().map(|s| s.radius).fold(0.0, f64::max)
     }
 
-    /// At least the function's largest magnitude, to a few parts in a hundred.
+    /// At least the function's largest magnitude, usually within a factor of two.
     pub fn size(&self) -> f64 {
         self.size
     }

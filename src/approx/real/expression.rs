@@ -170,8 +170,12 @@ impl Expression {
         &self.nodes
     }
 
-    /// Appends an operation on operands that are in the list already.
+    /// Appends an operation on operands that are in the list already; one that is there is used again, so
+    /// that `x*x` is seen to be a square.
     pub(super) fn push(&mut self, kind: Kind, column: usize) -> usize {
+        if let Some(same) = self.nodes.iter().position(|node| node.kind == kind) {
+            return same;
+        }
         let mut node = Node {
             kind,
             column,

@@ -177,7 +177,7 @@ impl Jet {
     }
 
     /// The terms of F(u) from its value and `F' = 1 / w` in terms of w: `F'(x) w = u'`.
-    fn from_slope(&self, value: Interval, w: &[Interval]) -> Jet {
+    fn with_slope(&self, value: Interval, w: &[Interval]) -> Jet {
         let mut a = vec![value];
         // j a_j as they come.
         let mut slopes = vec![Interval::ZERO];
@@ -196,7 +196,7 @@ impl Jet {
         if u.low <= Wide::ZERO {
             return Err(blocked(Obstacle::NotPositive, u.high <= Wide::ZERO));
         }
-        Ok(self.from_slope(u.log(), &self.terms))
+        Ok(self.with_slope(u.log(), &self.terms))
     }
 
     /// The square root.
@@ -268,7 +268,7 @@ impl Jet {
     pub fn atan(&self) -> Jet {
         let mut w = self.square();
         w.terms[0] = w.terms[0] + Interval::ONE;
-        self.from_slope(self.terms[0].atan(), &w.terms)
+        self.with_slope(self.terms[0].atan(), &w.terms)
     }
 
     /// The arc sine.
@@ -300,7 +300,7 @@ impl Jet {
         let rest = one.sub(self).mul(&one.add(self));
         match rest.sqrt() {
             Ok(w) if w.terms.len() > 1 || self.terms.len() == 1 => {
-                Ok(self.from_slope(function(u), &w.terms))
+                Ok(self.with_slope(function(u), &w.terms))
             }
             _ => Ok(Jet::value_only(function(u))),
         }
@@ -309,9 +309,9 @@ impl Jet {
     /// The magnitude.
     pub fn abs(&self) -> Jet {
         let u = self.terms[0];
-        if u.low > Wide::ZERO {
+        if u.low >= Wide::ZERO {
             self.clone()
-        } else if u.high < Wide::ZERO {
+        } else if u.high <= Wide::ZERO {
             self.neg()
         } else {
             Jet::value_only(u.abs())

@@ -14,6 +14,7 @@ pub mod expression;
 pub mod interval;
 pub mod jet;
 pub mod parser;
+mod search;
 pub mod segment;
 pub mod supremum;
 pub mod wide;
@@ -41,16 +42,33 @@ impl Target for (Expression, Domain) {
     }
 
     fn value_exactly(&self, x: Wide) -> Wide {
-        let value = self.0.enclosed(Interval::from(x));
-        if value.is_bounded() {
-            value.middle()
-        } else {
-            Wide::INFINITY
-        }
+        known_middle(self.0.enclosed(Interval::from(x)))
     }
 
     fn domain(&self) -> (f64, f64) {
         self.1.inner()
+    }
+}
+
+impl Target for Enclosure {
+    fn value(&self, x: f64) -> f64 {
+        self.function.value(x)
+    }
+
+    fn value_exactly(&self, x: Wide) -> Wide {
+        known_middle(self.function.enclosed(Interval::from(x)))
+    }
+
+    fn domain(&self) -> (f64, f64) {
+        Enclosure::domain(self).inner()
+    }
+}
+
+fn known_middle(value: Interval) -> Wide {
+    if value.is_bounded() {
+        value.middle()
+    } else {
+        Wide::INFINITY
     }
 }
 

@@ -1,19 +1,15 @@
 //! How far a polynomial is from an enclosed function, proved from above and shown from below.
 //!
-//! On every segment the difference is a polynomial in `t = x - centre` with a radius. The segments are
-//! divided, the most promising part first: the quadratic part of the difference is bounded exactly, the
-//! rest by magnitudes, so that the bounds close with the cube of the width (branch and bound; as in
-//! S. Chevillard, J. Harrison, M. Joldes, C. Lauter, "Efficient and accurate computation of upper
-//! bounds of approximation errors", TCS 412 (2011), with plain subdivision in place of sums of squares).
-
-use std::cmp::Ordering;
-use std::collections::BinaryHeap;
+//! On every segment the difference is a polynomial in `t = x - centre` with a radius, whose largest
+//! magnitude branch and bound finds ([`super::search`]; compare S. Chevillard, J. Harrison, M. Joldes, C. Lauter,
+//! "Efficient and accurate computation of upper bounds of approximation errors", TCS 412 (2011), with
+//! plain subdivision in place of sums of squares).
 
 use super::domain::{Domain, Dyadic, Undefined};
 use super::enclosure::Enclosure;
 use super::interval::Interval;
-use super::segment::Segment;
-use super::wide::{Toward, Wide};
+use super::search::{Aim, Model, search, search_least};
+use super::wide::Wide;
 
 /// Upper and lower bound meet within this part.
 const GAP: f64 = 1e-5;
@@ -21,8 +17,6 @@ const GAP: f64 = 1e-5;
 const RANGE_GAP: f64 = 1e-9;
 /// No gap below this part of the function's size is aimed at.
 const FLOOR: f64 = f64::from_bits((1023 - 60) << 52);
-/// Most parts that are looked at.
-const PARTS: usize = 200_000;
 
 /// The largest |f - p| (or |f - p| / |f|) over an interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,277 +29,40 @@ pub struct Supremum {
     pub at: f64,
 }
 
-/// What is made as large as possible.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Aim {
-    Magnitude,
-    Highest,
-    Lowest,
-}
+const NO_POLYNOMIAL: (&[Interval], Interval) = (&[], Interval::ZERO);
 
-/// `value(t)` within `noise` for all t from `low` to `high`, evaluation in double precision included.
-#[derive(Debug, Clone)]
-struct Local {
-    terms: Vec<f64>,
-    noise: f64,
-}
-
-/// A segment's part of the search: the difference, and the function where the error is relative.
-struct Model {
-    centre: Wide,
-    low: f64,
-    high: f64,
-    difference: Local,
-    weight: Option<Local>,
-}
-
-/// A part of a segment, ordered by its upper bound.
-struct Part {
-    upper: f64,
-    model: usize,
-    low: f64,
-    high: f64,
-}
-
-impl PartialEq for Part {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-impl Eq for Part {}
-impl PartialOrd for Part {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Part {
-    fn cmp(&self, other: &Self) -> Ordering {
-        // Ties by place, so that the same input gives the same answer.
-        self.upper
-            .total_cmp(&other.upper)
-            .then(other.model.cmp(&self.model))
-            .then(other.low.total_cmp(&self.low))
-    }
-}
-
-impl Local {
-    /// From enclosed coefficients, for |t| <= `reach`; the function is within `radius` of them.
-    fn new(coefficients: &[Interval], radius: f64, reach: f64) -> Local {
-        let (mut total, mut blur, mut power) = (0.0, 0.0, 1.0);
-        let mut terms = Vec::with_capacity(coefficients.len());
-        for c in coefficients {
-            let middle = c.middle();
-            terms.push(middle.to_f64());
-            total += c.magnitude() * power;
-            blur += (c.radius() + middle.rest().abs()) * power;
-            power *= reach;
-        }
-        // A shift and the bounds after it are below 4 n roundings of terms that sum up to at most twice
-        // `total` (|m| + |s| <= reach, but for their rounding).
-        let n = coefficients.len() as f64 + 4.0;
-        let rounding = 8.0 * n * f64::EPSILON * total;
-        Local {
-            terms,
-            noise: (radius + blur + rounding) * (1.0 + 1e-9) + 1e-290,
-        }
-    }
-
-    /// The coefficients in `s = t - middle`.
-    fn shifted(&self, middle: f64, into: &mut Vec<f64>) {
-        into.clear();
-        into.extend_from_slice(&self.terms);
-        let n = into.len();
-        for i in 0..n {
-            for j in (i..n.saturating_sub(1)).rev() {
-                into[j] += middle * into[j + 1];
-            }
-        }
-    }
-}
-
-/// Least and largest value of `sum of terms_k s^k` over |s| <= w, without noise.
-fn range_of(terms: &[f64], w: f64) -> (f64, f64) {
-    let term = |k: usize| terms.get(k).copied().unwrap_or(0.0);
-    let (a, b, c) = (term(0), term(1), term(2));
-    let (left, right) = (a - w * (b - w * c), a + w * (b + w * c));
-    let (mut low, mut high) = (left.min(right), left.max(right));
-    if b.abs() <= 2.0 * c.abs() * w {
-        // Never beyond w in the quotient: no overflow, no underflow that matters.
-        let vertex = a - b * (b / (4.0 * c));
-        if vertex.is_finite() {
-            (low, high) = (low.min(vertex), high.max(vertex));
-        }
-    }
-    let rest = terms
-        .iter()
-        .skip(3)
-        .rev()
-        .fold(0.0, |sum, c| (sum + c.abs()) * w)
-        * w
-        * w;
-    (low - rest, high + rest)
-}
-
-impl Aim {
-    fn of(self, low: f64, high: f64) -> f64 {
-        match self {
-            Aim::Magnitude => high.max(-low),
-            Aim::Highest => high,
-            Aim::Lowest => -low,
-        }
-    }
-}
-
-impl Model {
-    /// Over `place`, a part of the segment.
-    fn new(segment: &Segment, place: Interval, p: &[Interval], relative: bool) -> Model {
-        let centre = Interval::from(segment.centre);
-        let mut moved = p.to_vec();
-        let n = moved.len();
-        for i in 0..n {
-            for j in (i..n.saturating_sub(1)).rev() {
-                moved[j] = moved[j] + centre * moved[j + 1];
-            }
-        }
-        let length = n.max(segment.coefficients.len());
-        let term = |list: &[Interval], k: usize| list.get(k).copied().unwrap_or(Interval::ZERO);
-        let difference: Vec<Interval> = (0..length)
-            .map(|k| term(&segment.coefficients, k) - term(&moved, k))
-            .collect();
-        // The ends rounded inwards where points are taken, and the bounds reach over by the rounding.
-        let low = place.low.sub(segment.centre, Toward::Down).floor_f64();
-        let high = place.high.sub(segment.centre, Toward::Up).ceil_f64();
-        let reach = low.abs().max(high.abs());
-        Model {
-            centre: segment.centre,
-            low,
-            high,
-            difference: Local::new(&difference, segment.radius, reach),
-            weight: relative.then(|| Local::new(&segment.coefficients, segment.radius, reach)),
-        }
-    }
-
-    /// Upper bound over a part, lower bound at its middle, and the part of the upper bound that no
-    /// division makes smaller.
-    fn bounds(&self, aim: Aim, low: f64, high: f64, room: &mut Vec<f64>) -> (f64, f64, f64) {
-        let middle = 0.5 * (low + high);
-        let w = (high - middle).max(middle - low) * (1.0 + 4.0 * f64::EPSILON);
-        self.difference.shifted(middle, room);
-        let (least, largest) = range_of(room, w);
-        let first = room.first().copied().unwrap_or(0.0);
-        let noise = self.difference.noise;
-        let upper = aim.of(least, largest) + noise;
-        let lower = aim.of(first, first) - noise;
-        let Some(weight) = &self.weight else {
-            return (upper, lower, aim.of(first, first) + noise);
-        };
-        weight.shifted(middle, room);
-        let (least, largest) = range_of(room, w);
-        let nearest = if least > 0.0 { least } else { -largest };
-        let nearest = nearest - weight.noise;
-        let size = room.first().map_or(0.0, |f| f.abs());
-        if nearest <= 0.0 {
-            return (f64::INFINITY, lower.max(0.0) / (size + weight.noise), 0.0);
-        }
-        let up = 1.0 + 4.0 * f64::EPSILON;
-        (
-            upper / nearest * up,
-            lower / (size + weight.noise) / up,
-            (aim.of(first, first) + noise) / (size - weight.noise).max(nearest),
-        )
-    }
-}
-
-/// Best first search over all models; stops where the bounds are within `gap` of each other.
-fn search(models: &[Model], aim: Aim, gap: impl Fn(f64) -> f64) -> (Supremum, bool) {
-    let mut room = Vec::new();
-    let mut heap = BinaryHeap::new();
-    let mut best = (f64::NEG_INFINITY, 0.0);
-    // Parts that are as narrow as they get.
-    let mut settled = f64::NEG_INFINITY;
-    let mut noisy = false;
-    for (model, m) in models.iter().enumerate() {
-        heap.push(Part {
-            upper: f64::INFINITY,
-            model,
-            low: m.low,
-            high: m.high,
-        });
-    }
-    let mut parts = 0;
-    while let Some(part) = heap.pop() {
-        if part.upper <= best.0 + gap(best.0) || parts > PARTS {
-            settled = settled.max(part.upper);
-            break;
-        }
-        parts += 1;
-        let Some(model) = models.get(part.model) else {
-            break;
-        };
-        let (upper, lower, kept) = model.bounds(aim, part.low, part.high, &mut room);
-        let upper = upper.min(part.upper);
-        let middle = 0.5 * (part.low + part.high);
-        // The middle of a part of no width may lie outside by a rounding.
-        let inside = (part.low < middle && middle < part.high) || part.low == part.high;
-        if lower > best.0 && inside {
-            best = (
-                lower,
-                model.centre.to_f64() + (model.centre.rest() + middle),
-            );
-        }
-        let allowed = gap(best.0);
-        if upper <= best.0 + allowed {
-            settled = settled.max(upper);
-            continue;
-        }
-        // Halving only shrinks what is above `kept`.
-        let stuck = upper - kept <= 0.25 * allowed || !(part.low < middle && middle < part.high);
-        if stuck {
-            noisy = true;
-            settled = settled.max(upper);
-            continue;
-        }
-        for (low, high) in [(part.low, middle), (middle, part.high)] {
-            heap.push(Part {
-                upper,
-                model: part.model,
-                low,
-                high,
-            });
-        }
-    }
-    let found = Supremum {
-        upper: if models.is_empty() {
-            f64::INFINITY
-        } else {
-            settled
-        },
-        lower: best.0,
-        at: best.1,
-    };
-    (found, noisy || parts > PARTS)
-}
+const NOTHING: Supremum = Supremum {
+    upper: f64::INFINITY,
+    lower: 0.0,
+    at: f64::NAN,
+};
 
 impl Enclosure {
-    fn models(&self, p: &[Interval], x: Interval, relative: bool) -> Vec<Model> {
+    fn models(&self, p: (&[Interval], Interval), x: Interval, relative: bool) -> Vec<Model> {
         let parts = self.meeting(x);
-        parts
-            .map(|(s, place)| Model::new(s, place, p, relative))
-            .collect()
+        let model = |(s, place)| Model::new(s, place, p, relative);
+        parts.map(model).collect()
     }
 
-    fn largest(&self, p: &[Dyadic], x: Interval, relative: bool) -> Supremum {
+    /// Over `x`; relative to the function where its `least` magnitude is given.
+    fn largest(
+        &self,
+        (p, about): (&[Dyadic], Interval),
+        x: Interval,
+        least: Option<f64>,
+    ) -> Supremum {
         let p: Vec<Interval> = p.iter().map(|c| c.to_interval()).collect();
+        let p = (&p[..], about);
+        let relative = least.is_some();
         let floor = if relative { FLOOR } else { FLOOR * self.size() };
         let gap = |best: f64| (GAP * best.abs()).max(floor);
-        let (mut found, mut noisy) = search(&self.models(&p, x, relative), Aim::Magnitude, gap);
+        let (mut found, mut noisy) = search(&self.models(p, x, relative), Aim::Magnitude, gap);
         // The function's own radius is in the way: enclose it better, here only.
         for _ in 0..2 {
             if !noisy {
                 break;
             }
-            let scale = if relative { self.size() } else { 1.0 };
-            let finer = found.lower.max(floor) * scale * (0.1 * GAP);
+            let finer = found.lower.max(floor) * least.unwrap_or(1.0) * (0.1 * GAP);
             let domain = Domain {
                 low: Interval::from(x.low),
                 high: Interval::from(x.high),
@@ -313,7 +70,7 @@ impl Enclosure {
             let Ok(better) = Enclosure::new(&self.function, &domain, finer) else {
                 break;
             };
-            let (again, still) = search(&better.models(&p, x, relative), Aim::Magnitude, gap);
+            let (again, still) = search(&better.models(p, x, relative), Aim::Magnitude, gap);
             noisy = still;
             if again.upper < found.upper {
                 let lower = again.lower.max(found.lower);
@@ -327,21 +84,29 @@ impl Enclosure {
     /// The supremum of |f - p| from `low` to `high` (the part of it in the domain), where
     /// `p = p_0 + p_1 x + ...`, lowest order first.
     pub fn supremum(&self, p: &[Dyadic], low: f64, high: f64) -> Supremum {
+        self.supremum_about(p, Dyadic::new(0, 0), low, high)
+    }
+
+    /// As [`Enclosure::supremum`] for `p = p_0 + p_1 (x - about) + p_2 (x - about)^2 + ...`.
+    pub fn supremum_about(&self, p: &[Dyadic], about: Dyadic, low: f64, high: f64) -> Supremum {
         match self.clipped(low, high) {
-            Some(x) => self.largest(p, x, false),
+            Some(x) => self.largest((p, about.to_interval()), x, None),
             None => NOTHING,
         }
     }
 
     /// As [`Enclosure::supremum`], over the whole domain.
     pub fn supremum_over_domain(&self, p: &[Dyadic]) -> Supremum {
-        self.largest(p, self.domain().hull(), false)
+        self.largest((p, Interval::ZERO), self.domain().hull(), None)
     }
 
     /// The supremum of |f - p| / |f|.
     ///
+    /// Where both are exactly 0 at x = 0 (the sine and a polynomial of odd powers) the quotient near it
+    /// is bounded by Cauchy's mean value theorem: it is that of the derivatives somewhere between.
+    ///
     /// # Errors
-    /// `f` is 0 somewhere from `low` to `high`, or not seen to differ from 0.
+    /// `f` is 0 somewhere else from `low` to `high`, or not seen to differ from 0.
     pub fn supremum_relative(
         &self,
         p: &[Dyadic],
@@ -351,19 +116,83 @@ impl Enclosure {
         let Some(x) = self.clipped(low, high) else {
             return Ok(NOTHING);
         };
-        let least = self.models(&[], x, false);
-        let (least, _) = search_least(&least, self.size() * FLOOR);
-        if !(least.0 > 0.0) {
-            return Err(Undefined {
-                at: least.1,
-                reason: format!(
-                    "a relative error has no meaning where `{}` is 0: near x = {:.6}",
-                    self.function, least.1
-                ),
-                column_in_text: None,
-            });
+        let Some((part, mut found)) = self.near_common_zero(p, x) else {
+            return self.largest_relative(p, x);
+        };
+        for (low, high) in [(x.low, part.low), (part.high, x.high)] {
+            if low < high {
+                let other = self.largest_relative(p, Interval::new(low, high))?;
+                let at = if other.lower > found.lower {
+                    other.at
+                } else {
+                    found.at
+                };
+                found = Supremum {
+                    upper: found.upper.max(other.upper),
+                    lower: found.lower.max(other.lower),
+                    at,
+                };
+            }
         }
-        Ok(self.largest(p, x, true))
+        Ok(found)
+    }
+
+    fn largest_relative(&self, p: &[Dyadic], x: Interval) -> Result<Supremum, Undefined> {
+        let (least, at) = search_least(&self.models(NO_POLYNOMIAL, x, false), self.size() * FLOOR);
+        if least > 0.0 {
+            return Ok(self.largest((p, Interval::ZERO), x, Some(least)));
+        }
+        Err(Undefined {
+            at,
+            reason: format!(
+                "a relative error has no meaning where `{}` is 0: near x = {at:.6}",
+                self.function
+            ),
+            column_in_text: None,
+        })
+    }
+
+    /// A part of `x` around 0 and the supremum of the relative error there, if f and p are exactly 0 at 0
+    /// and f has a slope.
+    fn near_common_zero(&self, p: &[Dyadic], x: Interval) -> Option<(Interval, Supremum)> {
+        let zero = Interval::ZERO;
+        let vanish = x.contains_zero() && p.first().is_none_or(|c| c.raw == 0);
+        if !vanish || self.function.enclosed(zero) != zero {
+            return None;
+        }
+        // Derivative of p at 0 and its second derivative over a part.
+        let p: Vec<Interval> = p.iter().map(|c| c.to_interval()).collect();
+        let second = |over: Interval| {
+            let terms = p.iter().enumerate().skip(2).rev();
+            terms.fold(zero, |sum, (k, c)| {
+                sum * over + *c * Interval::from((k * (k - 1)) as f64)
+            })
+        };
+        let first = p.get(1).copied().unwrap_or(zero);
+        let slope = *self.function.jet(zero, 2).ok()?.terms().get(1)?;
+        for halvings in 8..40 {
+            let reach = x.radius() * f64::powi(0.5, halvings);
+            let part = x.meet(Interval::symmetric(reach));
+            let Ok(jet) = self.function.jet(part, 3) else {
+                continue;
+            };
+            let Some(bend) = jet.terms().get(2).map(|c| c.scaled(1)) else {
+                continue;
+            };
+            let off = (slope - first) + part * (bend - second(part));
+            let ratio = (off / (slope + part * bend)).abs();
+            let limit = ((slope - first) / slope).abs();
+            let wide = ratio.radius() > GAP * ratio.magnitude().max(FLOOR);
+            if ratio.is_bounded() && (!wide || halvings == 39) {
+                let found = Supremum {
+                    upper: ratio.high.ceil_f64(),
+                    lower: limit.low.max(Wide::ZERO).floor_f64(),
+                    at: 0.0,
+                };
+                return Some((part, found));
+            }
+        }
+        None
     }
 
     /// Bounds of the function's values from `low` to `high` (the part of it in the domain): proved, and
@@ -372,45 +201,10 @@ impl Enclosure {
         let Some(x) = self.clipped(low, high) else {
             return (f64::NEG_INFINITY, f64::INFINITY);
         };
-        let models = self.models(&[], x, false);
+        let models = self.models(NO_POLYNOMIAL, x, false);
         let gap = |_: f64| RANGE_GAP * self.size();
         let (highest, _) = search(&models, Aim::Highest, gap);
         let (lowest, _) = search(&models, Aim::Lowest, gap);
         (-lowest.upper, highest.upper)
     }
-}
-
-const NOTHING: Supremum = Supremum {
-    upper: f64::INFINITY,
-    lower: 0.0,
-    at: f64::NAN,
-};
-
-/// A lower bound of the least magnitude, and where it is met; 0 as soon as it cannot be told from 0.
-fn search_least(models: &[Model], floor: f64) -> ((f64, f64), bool) {
-    let mut room = Vec::new();
-    let mut least = (f64::INFINITY, f64::NAN);
-    for model in models {
-        let mut left = vec![(model.low, model.high)];
-        while let Some((low, high)) = left.pop() {
-            let middle = 0.5 * (low + high);
-            let w = (high - middle).max(middle - low) * (1.0 + 4.0 * f64::EPSILON);
-            model.difference.shifted(middle, &mut room);
-            let (below, above) = range_of(&room, w);
-            let size = below.max(-above) - model.difference.noise;
-            let x = model.centre.to_f64() + (model.centre.rest() + middle);
-            let first = room.first().map_or(0.0, |f| f.abs());
-            if size > 0.0 {
-                if size < least.0 {
-                    least = (size, x);
-                }
-            } else if first <= floor + model.difference.noise || !(low < middle && middle < high) {
-                return ((0.0, x), true);
-            } else {
-                left.push((middle, high));
-                left.push((low, middle));
-            }
-        }
-    }
-    (least, false)
 }
