@@ -8,8 +8,10 @@
 //! ([`super::ellipsoid`]), by Schnorr and Euchner's enumeration. Few points are left, for the
 //! ellipsoid is nearly the smallest one, so that polynomials of ten coefficients take milliseconds.
 
+use super::cuts::Cuts;
 use super::problem::{self, Candidate, Frame, Problem};
 use crate::error::{InputError, Result};
+use std::cell::Cell;
 
 /// How much may be spent. Steps, not seconds: the same result on every machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -127,6 +129,9 @@ impl Problem<'_, '_> {
         let mut limit = limit;
         let mut scratch = vec![0.0; frame.errors.len()];
         let first = square(limit);
+        let mut cuts = Cuts::new(&frame);
+        let at = limit;
+        let mut exclude = |free: usize, z: &[i64], room: f64| cuts.excludes(free, z, at, room);
         let mut leaf = |z: &[i64]| {
             let mut cost = 0;
             if let Some(found) = self.look(&frame, z, limit, &mut scratch) {
@@ -140,7 +145,9 @@ impl Problem<'_, '_> {
             }
             (square(limit), cost)
         };
-        let (nodes, complete) = frame.ball.visit(first, budget.nodes, &mut leaf);
+        let (nodes, complete) = frame
+            .ball
+            .visit(first, budget.nodes, &mut exclude, &mut leaf);
         sort(&mut candidates);
         if candidates.len() > most {
             candidates.truncate(most);
@@ -187,15 +194,21 @@ impl Problem<'_, '_> {
     fn improve(&self, frame: &Frame, best: &mut Candidate, nodes: u64) -> (u64, bool) {
         let mut scratch = vec![0.0; frame.errors.len()];
         let first = square(best.error);
+        let mut cuts = Cuts::new(frame);
+        // The limit of the cuts follows the best error.
+        let current = Cell::new(best.error);
+        let mut exclude =
+            |free: usize, z: &[i64], room: f64| cuts.excludes(free, z, current.get(), room);
         let mut leaf = |z: &[i64]| {
             // Strictly better, so that equal ones keep the first.
             let limit = best.error * (1.0 - 1e-12);
             if let Some(found) = self.look(frame, z, limit, &mut scratch) {
                 *best = found;
+                current.set(best.error);
             }
             (square(best.error), 0)
         };
-        frame.ball.visit(first, nodes, &mut leaf)
+        frame.ball.visit(first, nodes, &mut exclude, &mut leaf)
     }
 
     /// Steps along reduced vectors, and sums and differences of two, while the error falls. `z` is where

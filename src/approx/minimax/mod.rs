@@ -10,6 +10,7 @@
 
 pub mod basis;
 pub mod coefficients;
+mod cuts;
 mod ellipsoid;
 mod exchange;
 pub mod fit;

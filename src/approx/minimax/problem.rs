@@ -315,9 +315,9 @@ pub(super) struct Frame {
     /// Weighted errors of the base at all points.
     pub errors: Vec<f64>,
     /// Weighted values of the reduced basis: `[point][vector]`.
-    rows: Vec<Vec<f64>>,
+    pub rows: Vec<Vec<f64>>,
     /// In which order points are looked at.
-    order: Vec<usize>,
+    pub order: Vec<usize>,
 }
 
 impl Frame {

@@ -90,7 +90,9 @@ pub struct Found {
 /// Total errors within this part of the smallest count as equal; then the ideal error decides.
 pub const NEAR: f64 = 0.005;
 /// Starting points of the local search.
-const STARTS: usize = 4;
+const STARTS: usize = 24;
+/// Choices near the least total error that are kept whatever their ideal error.
+const MOST_NEAR: usize = 64;
 
 /// Searches the coefficients whose whole evaluation has the smallest largest error.
 ///
@@ -254,11 +256,8 @@ impl<'p> Run<'p> {
             .near
             .iter()
             .fold(f64::INFINITY, |m, (c, _)| m.min(c.error));
-        let part = if candidate.error < least {
-            NEAR
-        } else {
-            -1e-12
-        };
+        let wanted = candidate.error < least || self.near.len() < MOST_NEAR;
+        let part = if wanted { NEAR } else { -1e-12 };
         let limit = self.total * (1.0 + part);
         if candidate.error > limit + bound {
             return true; // its total error cannot be near the least one
