@@ -5,7 +5,7 @@
 //! (2007); bounding the optimum's coefficients and searching them all is N. Brisebarre, J.-M. Muller,
 //! A. Tisserand, "Computing machine-efficient polynomial approximations", ACM TOMS 32 (2006). Here: a start by
 //! Babai's nearest plane and descent, then every lattice point of an ellipsoid that must contain the optimum
-//! ([`super::ellipsoid`]), by Schnorr and Euchner's enumeration. Few points are left, for the
+//! (`ellipsoid`, `cuts`), by Schnorr and Euchner's enumeration. Few points are left, for the
 //! ellipsoid is nearly the smallest one, so that polynomials of ten coefficients take milliseconds.
 
 use super::cuts::Cuts;

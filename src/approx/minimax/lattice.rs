@@ -12,6 +12,10 @@ const DELTA: f64 = 0.99;
 /// Swaps at most; the reduction of what this crate makes takes some thousands.
 const MOST_STEPS: usize = 200_000;
 
+/// Says of (number of free coordinates, point, what is left of the squared limit) whether nothing below
+/// is wanted, and what the answer cost in nodes.
+pub type Exclude<'a> = dyn FnMut(usize, &[i64], f64) -> (bool, u64) + 'a;
+
 /// A basis of a lattice with the integer matrix that makes it from the original one.
 #[derive(Debug, Clone)]
 pub struct Reduced {
@@ -252,15 +256,13 @@ impl Ball {
     }
 
     /// Visits every integer point whose squared distance is at most `limit`, near ones first in each
-    /// coordinate. `exclude` may say that nothing below a node is wanted: it gets the number k of free
-    /// coordinates, the point (k and above are fixed) and what is left of the limit, and returns its
-    /// answer and its cost in nodes. `leaf` gets the point and returns the limit from then on and what the look cost, in
+    /// coordinate. `exclude` is asked at every node above the last coordinate. `leaf` gets the point and returns the limit from then on and what the look cost, in
     /// nodes. The result is the number of nodes, and whether all were visited before `most_nodes` were spent.
     pub fn visit(
         &self,
         mut limit: f64,
         most_nodes: u64,
-        exclude: &mut dyn FnMut(usize, &[i64], f64) -> (bool, u64),
+        exclude: &mut Exclude,
         leaf: &mut dyn FnMut(&[i64]) -> (f64, u64),
     ) -> (u64, bool) {
         let n = self.centre.len();

@@ -307,7 +307,7 @@ fn check_order(support: &[usize], weights: &[f64], count: usize) -> Vec<usize> {
     order
 }
 
-/// Lattice coordinates: raw = base + sum of z_k transform[k].
+/// Lattice coordinates: `raw = base + sum of z_k transform[k]`.
 pub(super) struct Frame {
     pub base: Vec<i128>,
     pub transform: Vec<Vec<i128>>,

@@ -2,12 +2,13 @@
 //!
 //! E. Ya. Remez, "Sur la determination des polynomes d'approximation de degre donnee", Comm. Soc. Math.
 //! Kharkov 10 (1934): all alternating extrema enter at once. Where fewer than n + 1 of them alternate (no
-//! Haar condition: an odd basis on both sides of 0, say) one point enters at a time, see [`super::exchange`].
+//! Haar condition: an odd basis on both sides of 0, say) one point enters at a time, see `exchange`.
 //! Systems are solved in Chebyshev functions with some 32 digits.
 
 use super::basis::Chebyshev;
 use super::exchange::{self, Levelled, Place};
-use super::samples::{Extremum, Samples};
+use super::extrema::Extremum;
+use super::samples::Samples;
 use super::wide::{Wide, dot};
 use crate::error::{InputError, Result};
 

@@ -42,7 +42,7 @@ pub struct Effort {
 impl Default for Effort {
     fn default() -> Self {
         Effort {
-            candidates: 2000,
+            candidates: 6000,
             evaluations: 20_000,
             budget: Budget { nodes: 2_000_000 },
         }
@@ -74,7 +74,8 @@ pub struct Found {
     /// Largest error of the datapath over all codes.
     pub total_error: f64,
     /// True if no coefficients in these formats can have a total error smaller by more than
-    /// [`NEAR`]. Needs a problem on codes ([`super::Samples::on_codes`]).
+    /// [`NEAR`], given that [`Datapath::evaluation_bound`] is nowhere above the largest value met.
+    /// Needs a problem on codes ([`super::Samples::on_codes`]).
     pub proved: bool,
     /// Every choice with an ideal error below this was looked at.
     pub complete_below: f64,
