@@ -37,7 +37,8 @@ pub struct Best {
     pub error: f64,
     /// No coefficients in these formats have a smaller error (to 1e-9 of it).
     pub lower_bound: f64,
-    /// True if the enumeration was complete: `error` is `lower_bound`.
+    /// True if the enumeration was complete, or `error` cannot be less ([`Problem::lattice_bound`], the
+    /// real minimax error): `error` is `lower_bound`. Never where the points miss a kink.
     pub proved: bool,
     /// Nodes visited.
     pub nodes: u64,
@@ -81,8 +82,13 @@ impl Problem<'_, '_> {
         } else {
             self.descend(&frame, &self.rounded, vec![0; self.formats.len()])
         };
-        let floor = self.minimax.lower_bound * (1.0 + SLACK);
-        let (mut nodes, mut proved) = (0, best.error <= floor);
+        let least = self.minimax.lower_bound.max(self.lattice_bound());
+        // With the function evaluated at the peaks: between points a kink is higher than it seems.
+        let at_floor = |c: &Candidate| {
+            let floor = least * (1.0 + SLACK);
+            c.error <= floor && self.exact_error(&c.raw) <= floor
+        };
+        let (mut nodes, mut proved) = (0, at_floor(&best));
         let mut share = 20_000;
         while !proved && nodes < budget.nodes {
             let transform = Some(frame.transform.clone());
@@ -93,26 +99,33 @@ impl Problem<'_, '_> {
             let (spent, complete) =
                 self.improve(&frame, &mut best, share.min(budget.nodes - nodes));
             nodes += spent;
-            proved = complete || best.error <= floor;
+            proved = complete || at_floor(&best);
             if best.error > 0.98 * before {
                 share *= 10;
             }
         }
-        let error = self.exact_error(&best.raw).max(best.error);
+        let rounded = self.exactly(&self.rounded);
+        let babai = self.exactly(&babai);
+        let seen = best.error;
+        best = self.exactly(&best);
+        // Points that miss a kink inside the interval prove nothing about the maximum.
+        proved &= best.error <= seen * (1.0 + 1e-6);
+        for other in [&rounded, &babai] {
+            if other.error < best.error {
+                best = other.clone();
+            }
+        }
+        let error = best.error;
         Ok(Best {
             values: self.values(&best.raw).iter().map(|v| v.to_f64()).collect(),
-            lower_bound: if proved {
-                error
-            } else {
-                self.minimax.lower_bound.min(error)
-            },
+            lower_bound: if proved { error } else { least.min(error) },
             raw: best.raw,
             error,
             proved,
             nodes,
             minimax_error: self.minimax.error,
-            rounded: self.exactly(&self.rounded),
-            babai: self.exactly(&babai),
+            rounded,
+            babai,
         })
     }
 

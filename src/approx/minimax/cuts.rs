@@ -13,10 +13,10 @@ use super::samples::Point;
 use super::wide::{Wide, dot};
 use std::f64::consts::PI;
 
-/// What a linear programme costs, in nodes.
-const PROGRAMME_COST: u64 = 1000;
-/// Expected nodes below a node from which a programme pays.
-const PAYS: f64 = 1000.0;
+/// Steps of a linear programme at most.
+const MOST_STEPS: u64 = 40;
+/// Steps that one commonly takes.
+const COMMON_STEPS: u64 = 5;
 /// Cuts kept a level.
 const MOST_CUTS: usize = 48;
 /// Slack against rounding, relative.
@@ -77,22 +77,30 @@ impl<'f> Cuts<'f> {
             return (true, 0);
         }
         let below = self.density[free] * room.max(0.0).powf(0.5 * free as f64);
-        if below < PAYS {
+        let step = self.step_cost(free);
+        if below < (step * COMMON_STEPS) as f64 {
             return (false, 0);
         }
-        match self.programme(free, z, bound) {
+        let mut cost = step;
+        match self.programme(free, z, bound, &mut cost) {
             Some(cut) => {
                 let list = &mut self.cuts[free];
                 list.insert(0, cut);
                 list.truncate(MOST_CUTS);
-                (true, PROGRAMME_COST)
+                (true, cost)
             }
-            None => (false, PROGRAMME_COST),
+            None => (false, cost),
         }
     }
 
+    /// What a step of a programme costs, in nodes: it solves three systems and looks at all points.
+    fn step_cost(&self, free: usize) -> u64 {
+        let n = free as u64 + 1;
+        2 * n * n * n + self.points.len() as u64 * n / 2
+    }
+
     /// A cut that excludes these coordinates, if there is one.
-    fn programme(&self, free: usize, z: &[i64], bound: f64) -> Option<Cut> {
+    fn programme(&self, free: usize, z: &[i64], bound: f64, cost: &mut u64) -> Option<Cut> {
         let places: Vec<Place> = self
             .points
             .iter()
@@ -102,7 +110,8 @@ impl<'f> Cuts<'f> {
         let mut chosen: Vec<usize> = (0..=free).map(|k| k * last / free.max(1)).collect();
         let mut reference: Vec<Place> = chosen.iter().map(|&k| places[k].clone()).collect();
         let mut solved = exchange::levelled(&reference)?;
-        for _ in 0..40 {
+        for _ in 0..MOST_STEPS {
+            *cost += self.step_cost(free);
             if solved.error > bound {
                 return self.cut(&chosen, &solved.weights(), free);
             }

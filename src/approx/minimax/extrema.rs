@@ -74,10 +74,14 @@ impl Samples<'_> {
         }
         let last = self.points.len().saturating_sub(1);
         for index in 0..errors.len() {
-            if errors[index].abs() < 0.999 * largest {
+            if errors[index].abs() < 0.95 * largest {
                 continue;
             }
             let (from, to) = (index.saturating_sub(1), (index + 1).min(last));
+            let here = errors[index].abs();
+            if errors[from].abs() > here || errors[to].abs() > here {
+                continue;
+            }
             let ends = (self.points[from].x, self.points[to].x);
             let (x, e) = self.climb(coefficients, ends, self.peak(&errors, index).0);
             if e > best.0 {
@@ -87,33 +91,36 @@ impl Samples<'_> {
         best
     }
 
-    /// Climbs to the maximum of |error| by parabolas through three points, keeping the best seen.
+    /// Golden-section search of the maximum of |error| between the neighbours of a point, which works for
+    /// kinks as well, and the place where the quartic has it.
     fn climb(&self, coefficients: &[Wide], ends: (f64, f64), start: f64) -> (f64, f64) {
+        const GOLDEN: f64 = 0.618_033_988_749_894_9;
         let at = |x: f64| {
             self.point_at(x)
                 .map_or(0.0, |p| self.error_at(coefficients, &p).abs())
         };
-        let (mut x, mut e) = (start, at(start));
-        let mut step = (ends.1 - ends.0) * 0.125;
-        for _ in 0..4 {
-            let (left, right) = ((x - step).max(ends.0), (x + step).min(ends.1));
-            let (el, er) = (at(left), at(right));
-            let (dl, dr) = (x - left, right - x);
-            let curvature = (er - e) * dl + (el - e) * dr;
-            let mut trials = vec![(left, el), (right, er)];
-            if curvature < 0.0 {
-                let slope = (er - e) * dl * dl - (el - e) * dr * dr;
-                let vertex = (x - 0.5 * slope / curvature).clamp(ends.0, ends.1);
-                trials.push((vertex, at(vertex)));
+        let mut best = (start, at(start));
+        let (mut low, mut high) = ends;
+        let mut left = high - GOLDEN * (high - low);
+        let mut right = low + GOLDEN * (high - low);
+        let (mut el, mut er) = (at(left), at(right));
+        for _ in 0..30 {
+            if el > er {
+                (high, right, er) = (right, left, el);
+                left = high - GOLDEN * (high - low);
+                el = at(left);
+            } else {
+                (low, left, el) = (left, right, er);
+                right = low + GOLDEN * (high - low);
+                er = at(right);
             }
-            for (place, value) in trials {
-                if value > e {
-                    (x, e) = (place, value);
+            for (x, e) in [(left, el), (right, er)] {
+                if e > best.1 {
+                    best = (x, e);
                 }
             }
-            step *= 0.2;
         }
-        (x, e)
+        best
     }
 
     /// Place and signed value of the peak near a point, from the quartic through it and two

@@ -25,8 +25,8 @@ pub struct Minimax {
     pub reference: Vec<f64>,
     /// Steps taken.
     pub iterations: usize,
-    /// True if `error` is within 1e-8 of `lower_bound`, or below 4e-15 of the function, where one known
-    /// to double precision is noise.
+    /// True if `error` is within 1e-8 of `lower_bound`, plus 4e-15 of the function: one known to double
+    /// precision is noise there.
     pub converged: bool,
 }
 
@@ -69,7 +69,7 @@ pub fn minimax(samples: &Samples) -> Result<Minimax> {
         } else {
             stalled + 1
         };
-        if stalled > 40 || (stalled > 5 && largest <= NOISE * scale) {
+        if stalled > 40 || (stalled > 5 && largest <= lower + NOISE * scale) {
             break;
         }
         solved = next;
@@ -80,7 +80,7 @@ pub fn minimax(samples: &Samples) -> Result<Minimax> {
     let mut reference: Vec<f64> = places.iter().map(|p| p.point.x).collect();
     reference.sort_by(f64::total_cmp);
     Ok(Minimax {
-        converged: converged || error <= lower * (1.0 + 1e-8) || error <= NOISE * scale,
+        converged: converged || error <= lower * (1.0 + 1e-8) + NOISE * scale,
         coefficients,
         lower_bound: lower.min(error),
         error,
