@@ -5,11 +5,13 @@
 //! (2007); bounding the optimum's coefficients and searching them all is N. Brisebarre, J.-M. Muller,
 //! A. Tisserand, "Computing machine-efficient polynomial approximations", ACM TOMS 32 (2006). Here: a start by
 //! Babai's nearest plane and descent, then every lattice point of an ellipsoid that must contain the optimum
-//! ([`super::ellipsoid`]), by Schnorr and Euchner's enumeration. Few points are left, for the
+//! (`ellipsoid`, `cuts`), by Schnorr and Euchner's enumeration. Few points are left, for the
 //! ellipsoid is nearly the smallest one, so that polynomials of ten coefficients take milliseconds.
 
+use super::cuts::Cuts;
 use super::problem::{self, Candidate, Frame, Problem};
 use crate::error::{InputError, Result};
+use std::cell::Cell;
 
 /// How much may be spent. Steps, not seconds: the same result on every machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,7 +37,8 @@ pub struct Best {
     pub error: f64,
     /// No coefficients in these formats have a smaller error (to 1e-9 of it).
     pub lower_bound: f64,
-    /// True if the enumeration was complete: `error` is `lower_bound`.
+    /// True if the enumeration was complete, or `error` cannot be less ([`Problem::lattice_bound`], the
+    /// real minimax error): `error` is `lower_bound`. Never where the points miss a kink.
     pub proved: bool,
     /// Nodes visited.
     pub nodes: u64,
@@ -79,8 +82,13 @@ impl Problem<'_, '_> {
         } else {
             self.descend(&frame, &self.rounded, vec![0; self.formats.len()])
         };
-        let floor = self.minimax.lower_bound * (1.0 + SLACK);
-        let (mut nodes, mut proved) = (0, best.error <= floor);
+        let least = self.minimax.lower_bound.max(self.lattice_bound());
+        // With the function evaluated at the peaks: between points a kink is higher than it seems.
+        let at_floor = |c: &Candidate| {
+            let floor = least * (1.0 + SLACK);
+            c.error <= floor && self.exact_error(&c.raw) <= floor
+        };
+        let (mut nodes, mut proved) = (0, at_floor(&best));
         let mut share = 20_000;
         while !proved && nodes < budget.nodes {
             let transform = Some(frame.transform.clone());
@@ -91,26 +99,33 @@ impl Problem<'_, '_> {
             let (spent, complete) =
                 self.improve(&frame, &mut best, share.min(budget.nodes - nodes));
             nodes += spent;
-            proved = complete || best.error <= floor;
+            proved = complete || at_floor(&best);
             if best.error > 0.98 * before {
                 share *= 10;
             }
         }
-        let error = self.exact_error(&best.raw).max(best.error);
+        let rounded = self.exactly(&self.rounded);
+        let babai = self.exactly(&babai);
+        let seen = best.error;
+        best = self.exactly(&best);
+        // Points that miss a kink inside the interval prove nothing about the maximum.
+        proved &= best.error <= seen * (1.0 + 1e-6);
+        for other in [&rounded, &babai] {
+            if other.error < best.error {
+                best = other.clone();
+            }
+        }
+        let error = best.error;
         Ok(Best {
             values: self.values(&best.raw).iter().map(|v| v.to_f64()).collect(),
-            lower_bound: if proved {
-                error
-            } else {
-                self.minimax.lower_bound.min(error)
-            },
+            lower_bound: if proved { error } else { least.min(error) },
             raw: best.raw,
             error,
             proved,
             nodes,
             minimax_error: self.minimax.error,
-            rounded: self.exactly(&self.rounded),
-            babai: self.exactly(&babai),
+            rounded,
+            babai,
         })
     }
 
@@ -127,6 +142,9 @@ impl Problem<'_, '_> {
         let mut limit = limit;
         let mut scratch = vec![0.0; frame.errors.len()];
         let first = square(limit);
+        let mut cuts = Cuts::new(&frame);
+        let at = limit;
+        let mut exclude = |free: usize, z: &[i64], room: f64| cuts.excludes(free, z, at, room);
         let mut leaf = |z: &[i64]| {
             let mut cost = 0;
             if let Some(found) = self.look(&frame, z, limit, &mut scratch) {
@@ -140,7 +158,9 @@ impl Problem<'_, '_> {
             }
             (square(limit), cost)
         };
-        let (nodes, complete) = frame.ball.visit(first, budget.nodes, &mut leaf);
+        let (nodes, complete) = frame
+            .ball
+            .visit(first, budget.nodes, &mut exclude, &mut leaf);
         sort(&mut candidates);
         if candidates.len() > most {
             candidates.truncate(most);
@@ -187,15 +207,21 @@ impl Problem<'_, '_> {
     fn improve(&self, frame: &Frame, best: &mut Candidate, nodes: u64) -> (u64, bool) {
         let mut scratch = vec![0.0; frame.errors.len()];
         let first = square(best.error);
+        let mut cuts = Cuts::new(frame);
+        // The limit of the cuts follows the best error.
+        let current = Cell::new(best.error);
+        let mut exclude =
+            |free: usize, z: &[i64], room: f64| cuts.excludes(free, z, current.get(), room);
         let mut leaf = |z: &[i64]| {
             // Strictly better, so that equal ones keep the first.
             let limit = best.error * (1.0 - 1e-12);
             if let Some(found) = self.look(frame, z, limit, &mut scratch) {
                 *best = found;
+                current.set(best.error);
             }
             (square(best.error), 0)
         };
-        frame.ball.visit(first, nodes, &mut leaf)
+        frame.ball.visit(first, nodes, &mut exclude, &mut leaf)
     }
 
     /// Steps along reduced vectors, and sums and differences of two, while the error falls. `z` is where

@@ -61,9 +61,9 @@ pub(super) fn solve(mut matrix: Vec<Vec<Wide>>, mut right: Vec<Wide>) -> Option<
             if factor.hi == 0.0 {
                 continue;
             }
-            for j in k..n {
-                let v = factor * matrix[k][j];
-                matrix[i][j] -= v;
+            let (done, open) = matrix.split_at_mut(i);
+            for (to, from) in open[0][k..].iter_mut().zip(&done[k][k..]) {
+                *to -= factor * *from;
             }
             let v = factor * right[k];
             right[i] -= v;
@@ -177,6 +177,16 @@ pub(super) fn exchange(
     entering: Place,
     sign: f64,
 ) -> Option<Levelled> {
+    exchange_at(places, solved, entering, sign).map(|(next, _)| next)
+}
+
+/// The same with the index of the place that left.
+pub(super) fn exchange_at(
+    places: &mut [Place],
+    solved: &Levelled,
+    entering: Place,
+    sign: f64,
+) -> Option<(Levelled, usize)> {
     let basis = columns(places, &solved.signs);
     let direction = solve(transposed(&basis), column(&entering, sign))?;
     let mut leaving: Option<(usize, Wide)> = None;
@@ -193,5 +203,14 @@ pub(super) fn exchange(
     let mut signs = solved.signs.clone();
     *places.get_mut(k)? = entering;
     *signs.get_mut(k)? = sign;
-    with_signs(places, signs)
+    Some((with_signs(places, signs)?, k))
+}
+
+impl Levelled {
+    /// Signed multipliers: orthogonal to the basis, and the levelled error is their inner product with
+    /// the function. Their magnitudes over the points' weights add up to 1.
+    pub(super) fn weights(&self) -> Vec<f64> {
+        let both = self.multipliers.iter().zip(&self.signs);
+        both.map(|(l, s)| l.hi * s).collect()
+    }
 }

@@ -12,6 +12,10 @@ const DELTA: f64 = 0.99;
 /// Swaps at most; the reduction of what this crate makes takes some thousands.
 const MOST_STEPS: usize = 200_000;
 
+/// Says of (number of free coordinates, point, what is left of the squared limit) whether nothing below
+/// is wanted, and what the answer cost in nodes.
+pub type Exclude<'a> = dyn FnMut(usize, &[i64], f64) -> (bool, u64) + 'a;
+
 /// A basis of a lattice with the integer matrix that makes it from the original one.
 #[derive(Debug, Clone)]
 pub struct Reduced {
@@ -128,9 +132,8 @@ impl Pass {
                 }
                 again = true;
                 let factor = Wide::from_integer(q);
-                for i in 0..j {
-                    let v = factor * self.mu[j][i];
-                    mu[i] -= v;
+                for (to, from) in mu.iter_mut().zip(&self.mu[j]) {
+                    *to -= factor * *from;
                 }
                 self.subtract(k, j, q)?;
             }
@@ -229,6 +232,11 @@ impl Ball {
         }
     }
 
+    /// Length of basis vector k beyond the span of the earlier ones.
+    pub fn side(&self, k: usize) -> f64 {
+        self.triangle[k][k]
+    }
+
     fn middle(&self, k: usize, z: &[i64]) -> f64 {
         let row = &self.triangle[k];
         let mut sum = self.centre[k];
@@ -248,12 +256,13 @@ impl Ball {
     }
 
     /// Visits every integer point whose squared distance is at most `limit`, near ones first in each
-    /// coordinate. `leaf` gets the point and returns the limit from then on and what the look cost, in
+    /// coordinate. `exclude` is asked at every node above the last coordinate. `leaf` gets the point and returns the limit from then on and what the look cost, in
     /// nodes. The result is the number of nodes, and whether all were visited before `most_nodes` were spent.
     pub fn visit(
         &self,
         mut limit: f64,
         most_nodes: u64,
+        exclude: &mut Exclude,
         leaf: &mut dyn FnMut(&[i64]) -> (f64, u64),
     ) -> (u64, bool) {
         let n = self.centre.len();
@@ -286,6 +295,13 @@ impl Ball {
             enter = false;
             if d <= limit {
                 if k > 0 {
+                    let (excluded, cost) = exclude(k, &z, limit - d);
+                    nodes += cost;
+                    if excluded {
+                        z[k] += step[k];
+                        step[k] = outward(step[k]);
+                        continue;
+                    }
                     distance[k] = d;
                     k -= 1;
                     enter = true;
@@ -302,13 +318,14 @@ impl Ball {
             }
             // The next one outward, alternating sides.
             z[k] += step[k];
-            step[k] = if step[k] > 0 {
-                -step[k] - 1
-            } else {
-                -step[k] + 1
-            };
+            step[k] = outward(step[k]);
         }
     }
+}
+
+/// The step after this one: alternating sides, one longer each time.
+fn outward(step: i64) -> i64 {
+    if step > 0 { -step - 1 } else { -step + 1 }
 }
 
 #[cfg(test)]
@@ -372,7 +389,7 @@ mod tests {
             }}}
             let ball = Ball::new(&rows, &offset);
             let mut found = Vec::new();
-            let (_, complete) = ball.visit(radius, 1_000_000, &mut |z| { found.push(z.to_vec()); (radius, 0) });
+            let (_, complete) = ball.visit(radius, 1_000_000, &mut |_, _, _| (false, 0), &mut |z| { found.push(z.to_vec()); (radius, 0) });
             found.sort();
             prop_assert!(complete);
             prop_assert_eq!(found, brute);

@@ -1,17 +1,19 @@
 //! Minimax polynomials, and the best coefficients that their formats allow.
 //!
 //! In reading order: [`wide`] (arithmetic of some 32 digits), [`basis`] (which monomials), [`samples`]
-//! (function, interval and weight at points), [`remez`] (real coefficients), [`fit`] (measured data),
-//! [`lattice`] (reduction and enumeration), [`coefficients`] (the best integers under ideal
-//! evaluation), [`search`] (the best integers under the evaluation that will run).
+//! (function, interval and weight at points), [`extrema`], [`remez`] (real coefficients), [`fit`] (measured data),
+//! [`lattice`] (reduction and enumeration), [`problem`] (formats), [`coefficients`] (the best integers under ideal
+//! evaluation), [`mod@search`] (the best integers under the evaluation that will run).
 //!
 //! Everything here is deterministic: budgets count steps, never seconds. Maxima are found on dense points
 //! with refinement, to about 1e-9 of their size; they are not proofs.
 
 pub mod basis;
 pub mod coefficients;
+mod cuts;
 mod ellipsoid;
 mod exchange;
+pub mod extrema;
 pub mod fit;
 pub mod lattice;
 pub mod problem;
@@ -22,6 +24,7 @@ pub mod wide;
 
 pub use basis::{Basis, Monomials};
 pub use coefficients::{Best, Budget, Enumeration};
+pub use extrema::Extremum;
 pub use fit::{PointFit, fit_points};
 pub use problem::{Candidate, CoefficientFormat, Problem};
 pub use remez::{Minimax, minimax};

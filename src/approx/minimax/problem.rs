@@ -204,6 +204,37 @@ impl<'s, 'a> Problem<'s, 'a> {
         self.samples.supremum_of(&self.values(raw)).0
     }
 
+    /// An error that no integers avoid, because at some place every polynomial of these formats is a multiple
+    /// of one number: at 0, +-1, +-1/2 and so on the finest unit among lsb_i x^i.
+    pub fn lattice_bound(&self) -> f64 {
+        let samples = self.samples;
+        let mut places = vec![0.0];
+        for k in 0..4 {
+            places.extend([pow2(-k), -pow2(-k)]);
+        }
+        let mut bound = 0.0f64;
+        for x in places {
+            if !(samples.low..=samples.high).contains(&x) {
+                continue;
+            }
+            let known = samples.points.iter().find(|p| p.x == x).copied();
+            let Some(point) = known.or_else(|| samples.point_at(x)) else {
+                continue;
+            };
+            let units = self.formats.iter().zip(&samples.basis.exponents);
+            let unit = units
+                .map(|(f, &e)| f.lsb() * x.abs().powi(e as i32))
+                .filter(|&u| u > 0.0)
+                .fold(f64::INFINITY, f64::min);
+            let parts = point.value.scaled(1.0 / unit);
+            if let Some(nearest) = parts.round().filter(|_| unit.is_finite()) {
+                let rest = (parts - Wide::from_integer(nearest)).abs().hi * unit;
+                bound = bound.max(rest * point.weight);
+            }
+        }
+        bound
+    }
+
     /// True if every coefficient is in its format.
     pub fn admits(&self, raw: &[i128]) -> bool {
         raw.len() == self.formats.len()
@@ -307,7 +338,7 @@ fn check_order(support: &[usize], weights: &[f64], count: usize) -> Vec<usize> {
     order
 }
 
-/// Lattice coordinates: raw = base + sum of z_k transform[k].
+/// Lattice coordinates: `raw = base + sum of z_k transform[k]`.
 pub(super) struct Frame {
     pub base: Vec<i128>,
     pub transform: Vec<Vec<i128>>,
@@ -315,9 +346,9 @@ pub(super) struct Frame {
     /// Weighted errors of the base at all points.
     pub errors: Vec<f64>,
     /// Weighted values of the reduced basis: `[point][vector]`.
-    rows: Vec<Vec<f64>>,
+    pub rows: Vec<Vec<f64>>,
     /// In which order points are looked at.
-    order: Vec<usize>,
+    pub order: Vec<usize>,
 }
 
 impl Frame {

@@ -2,12 +2,13 @@
 //!
 //! E. Ya. Remez, "Sur la determination des polynomes d'approximation de degre donnee", Comm. Soc. Math.
 //! Kharkov 10 (1934): all alternating extrema enter at once. Where fewer than n + 1 of them alternate (no
-//! Haar condition: an odd basis on both sides of 0, say) one point enters at a time, see [`super::exchange`].
+//! Haar condition: an odd basis on both sides of 0, say) one point enters at a time, see `exchange`.
 //! Systems are solved in Chebyshev functions with some 32 digits.
 
 use super::basis::Chebyshev;
 use super::exchange::{self, Levelled, Place};
-use super::samples::{Extremum, Samples};
+use super::extrema::Extremum;
+use super::samples::Samples;
 use super::wide::{Wide, dot};
 use crate::error::{InputError, Result};
 
@@ -24,8 +25,8 @@ pub struct Minimax {
     pub reference: Vec<f64>,
     /// Steps taken.
     pub iterations: usize,
-    /// True if `error` is within 1e-8 of `lower_bound`, or below 4e-15 of the function, where one known
-    /// to double precision is noise.
+    /// True if `error` is within 1e-8 of `lower_bound`, plus 4e-15 of the function: one known to double
+    /// precision is noise there.
     pub converged: bool,
 }
 
@@ -68,7 +69,7 @@ pub fn minimax(samples: &Samples) -> Result<Minimax> {
         } else {
             stalled + 1
         };
-        if stalled > 40 || (stalled > 5 && largest <= NOISE * scale) {
+        if stalled > 40 || (stalled > 5 && largest <= lower + NOISE * scale) {
             break;
         }
         solved = next;
@@ -79,7 +80,7 @@ pub fn minimax(samples: &Samples) -> Result<Minimax> {
     let mut reference: Vec<f64> = places.iter().map(|p| p.point.x).collect();
     reference.sort_by(f64::total_cmp);
     Ok(Minimax {
-        converged: converged || error <= lower * (1.0 + 1e-8) || error <= NOISE * scale,
+        converged: converged || error <= lower * (1.0 + 1e-8) + NOISE * scale,
         coefficients,
         lower_bound: lower.min(error),
         error,

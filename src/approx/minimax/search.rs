@@ -42,7 +42,7 @@ pub struct Effort {
 impl Default for Effort {
     fn default() -> Self {
         Effort {
-            candidates: 2000,
+            candidates: 6000,
             evaluations: 20_000,
             budget: Budget { nodes: 2_000_000 },
         }
@@ -74,7 +74,8 @@ pub struct Found {
     /// Largest error of the datapath over all codes.
     pub total_error: f64,
     /// True if no coefficients in these formats can have a total error smaller by more than
-    /// [`NEAR`]. Needs a problem on codes ([`super::Samples::on_codes`]).
+    /// [`NEAR`], given that [`Datapath::evaluation_bound`] is nowhere above the largest value met.
+    /// Needs a problem on codes ([`super::Samples::on_codes`]).
     pub proved: bool,
     /// Every choice with an ideal error below this was looked at.
     pub complete_below: f64,
@@ -90,7 +91,9 @@ pub struct Found {
 /// Total errors within this part of the smallest count as equal; then the ideal error decides.
 pub const NEAR: f64 = 0.005;
 /// Starting points of the local search.
-const STARTS: usize = 4;
+const STARTS: usize = 24;
+/// Choices near the least total error that are kept whatever their ideal error.
+const MOST_NEAR: usize = 64;
 
 /// Searches the coefficients whose whole evaluation has the smallest largest error.
 ///
@@ -254,11 +257,8 @@ impl<'p> Run<'p> {
             .near
             .iter()
             .fold(f64::INFINITY, |m, (c, _)| m.min(c.error));
-        let part = if candidate.error < least {
-            NEAR
-        } else {
-            -1e-12
-        };
+        let wanted = candidate.error < least || self.near.len() < MOST_NEAR;
+        let part = if wanted { NEAR } else { -1e-12 };
         let limit = self.total * (1.0 + part);
         if candidate.error > limit + bound {
             return true; // its total error cannot be near the least one
