@@ -5,6 +5,7 @@
 //! [`record`] (what was measured), [`closure`] (what a record says), [`job`] (the main job), [`emit`] and [`verify`]
 //! (C and Rust, and that they are the model), [`report`].
 
+pub mod approx;
 pub mod circuit;
 pub mod cli;
 pub mod closure;

@@ -12,6 +12,7 @@ macro_rules! say {
     }};
 }
 
+mod approx;
 mod emit;
 mod equiv;
 mod init;
@@ -35,6 +36,7 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Approx(approx::Arguments),
     Emit(emit::Arguments),
     Equiv(equiv::Arguments),
     Init(init::Arguments),
@@ -58,6 +60,7 @@ pub enum OutputFormat {
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
     let result = match &cli.command {
+        Command::Approx(arguments) => approx::run(arguments),
         Command::Emit(arguments) => emit::run(arguments),
         Command::Equiv(arguments) => equiv::run(arguments),
         Command::Init(arguments) => init::run(arguments),

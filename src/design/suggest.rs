@@ -207,7 +207,7 @@ fn unit_confusion(known: &[&str], unknown: &str) -> Option<String> {
 }
 
 /// The known word within two edits of `word`, the nearest first.
-pub(super) fn nearest<'a>(word: &str, known: &[&'a str]) -> Option<&'a str> {
+pub(crate) fn nearest<'a>(word: &str, known: &[&'a str]) -> Option<&'a str> {
     known
         .iter()
         .map(|key| (edits(word, key), *key))

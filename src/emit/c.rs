@@ -286,6 +286,10 @@ impl Printer<'_> {
                 constant(p, *high, ty)
             ),
             Expr::Sine(k, index) => cast(format!("{p}_sine_{k}[{}]", v(index))),
+            Expr::Lookup(k, index) => {
+                let name = self.bundle.program.tables[*k].name;
+                cast(format!("{p}_{name}[{}]", v(index)))
+            }
             Expr::Entry(k) => {
                 let name = self.bundle.program.index_tables[*k].name;
                 cast(format!("{p}_{name}[i]"))

@@ -2,7 +2,7 @@
 
 use super::bundle::{Bundle, Part};
 use super::machine::{Type, Width};
-use super::manifest::{self, Manifest};
+use super::manifest::{self, Header, Manifest};
 use super::views::{self, FunctionView, Language, StateView, StructView, TableView, mix};
 use super::{c, rust};
 use crate::circuit::engine::{self, ArithmeticKind, Rows};
@@ -61,8 +61,8 @@ pub struct View {
     facts: Vec<String>,
     states: Vec<StateView>,
     structs: Vec<StructView>,
-    functions: Vec<FunctionView>,
-    tables: Vec<TableView>,
+    pub(super) functions: Vec<FunctionView>,
+    pub(super) tables: Vec<TableView>,
     checks: Vec<&'static str>,
     wide: bool,
     chain: bool,
@@ -107,22 +107,24 @@ pub fn emit(
     }
     let bundle = Bundle::new(design, part);
     let models = model::models(design, &bundle.program);
-    let view = View::new(design, &bundle, &models, language, command);
+    let banner = manifest::banner(&design.source.sha256, command);
+    let facts = manifest::facts(design, &bundle);
+    let view =
+        View::new(&bundle, &models, language, banner, facts).with_chain(design, &bundle, language);
     let mut files = sources(&view, part, language)?;
     if part != Part::Tables {
         files.extend(vectors(design, &bundle, &models));
     }
     files.push(table_vectors(&view.tables));
-    let manifest = Manifest::new(
-        design,
-        &bundle,
-        &view.tables,
-        &view.functions,
-        part,
-        language,
+    let header = Header {
+        design_sha256: &design.source.sha256,
         command,
-        &files,
-    );
+        language,
+        part: &format!("{part:?}").to_lowercase(),
+        has_code: part != Part::Tables,
+        columns: &engine::columns(design),
+    };
+    let manifest = Manifest::new(&header, &bundle, &view.tables, &view.functions, &files);
     files.push(EmittedFile {
         path: manifest::NAME.into(),
         text: manifest.to_json(),
@@ -145,7 +147,7 @@ pub fn write(files: &[EmittedFile], folder: &Path) -> Result<()> {
     Ok(())
 }
 
-fn sources(view: &View, part: Part, language: Language) -> Result<Vec<EmittedFile>> {
+pub(super) fn sources(view: &View, part: Part, language: Language) -> Result<Vec<EmittedFile>> {
     let p = &view.p;
     let v = view;
     let mut pages: Vec<(String, askama::Result<String>)> = Vec::new();
@@ -181,12 +183,13 @@ fn sources(view: &View, part: Part, language: Language) -> Result<Vec<EmittedFil
 }
 
 impl View {
-    fn new(
-        design: &Design,
+    /// What every bundle shows: its functions and tables with the checksums of the self-test.
+    pub(super) fn new(
         bundle: &Bundle,
         models: &[Model],
         language: Language,
-        command: &str,
+        banner: String,
+        facts: Vec<String>,
     ) -> Self {
         let tables = views::tables(bundle, language);
         let mut functions = views::functions(bundle, language);
@@ -205,14 +208,11 @@ impl View {
             let k = bundle.program.functions.iter().position(|f| f.name == name);
             k.is_some_and(|k| bundle.lowered[k].may_fault)
         };
-        let code = design.circuit.adc.format;
-        let code = Interval::new(code.min_raw(), code.max_raw());
-        let low = Type::Signed(Width::W64);
         View {
             p: bundle.prefix.clone(),
-            banner: manifest::banner(design, command),
+            banner,
             guard: bundle.prefix.to_uppercase(),
-            facts: manifest::facts(design, bundle),
+            facts,
             states: views::states(bundle, language),
             structs: views::structs(bundle, language),
             checks: checks(bundle),
@@ -225,20 +225,34 @@ impl View {
             stimulated: bundle.has_chain || functions.iter().any(|f| f.tested),
             seed: SEED,
             chain_count: PERIODS * bundle.ratio as usize,
-            code_low: match language {
-                Language::C => c::constant("", code.low, low),
-                Language::Rust => rust::constant(code.low, low),
-            },
-            code_span: match language {
-                Language::C => format!("UINT64_C({})", (code.high - code.low) as u64),
-                Language::Rust => ((code.high - code.low) as u64).to_string(),
-            },
-            row: row(design, bundle, language),
-            chain_checksum: format!("{:#x}", chain_checksum(design, bundle)),
+            code_low: String::new(),
+            code_span: String::new(),
+            row: Vec::new(),
+            chain_checksum: String::new(),
             chain_number: number + 1,
             functions,
             tables,
         }
+    }
+
+    /// Adds what the chain's parts of the pages show.
+    fn with_chain(mut self, design: &Design, bundle: &Bundle, language: Language) -> Self {
+        let code = design.circuit.adc.format;
+        let code = Interval::new(code.min_raw(), code.max_raw());
+        let low = Type::Signed(Width::W64);
+        (self.code_low, self.code_span) = match language {
+            Language::C => (
+                c::constant("", code.low, low),
+                format!("UINT64_C({})", (code.high - code.low) as u64),
+            ),
+            Language::Rust => (
+                rust::constant(code.low, low),
+                ((code.high - code.low) as u64).to_string(),
+            ),
+        };
+        self.row = row(design, bundle, language);
+        self.chain_checksum = format!("{:#x}", chain_checksum(design, bundle));
+        self
     }
 
     /// Functions that the self-test and the harness call.
@@ -364,7 +378,7 @@ pub fn saturating_rows(design: &Design, drive: &[i32], sense: &[i32]) -> Vec<i12
     }
 }
 
-fn csv_line(words: &[i128]) -> String {
+pub(super) fn csv_line(words: &[i128]) -> String {
     let words: Vec<String> = words.iter().map(i128::to_string).collect();
     words.join(",") + "\n"
 }
@@ -439,7 +453,7 @@ fn chain_vectors(design: &Design, bundle: &Bundle) -> [EmittedFile; 2] {
     ]
 }
 
-fn table_vectors(tables: &[TableView]) -> EmittedFile {
+pub(super) fn table_vectors(tables: &[TableView]) -> EmittedFile {
     let mut text = String::from("table,entry,value\n");
     for table in tables {
         for (k, v) in table.entries.iter().enumerate() {

@@ -314,6 +314,11 @@ impl<'a> Lowering<'a> {
                 self.sign_extend(v, bits, ty, range)
             }
             Op::Sine(phase, table) => self.sine(phase, table, ty, range),
+            Op::Lookup(address, table) => {
+                let index = self.value(address);
+                let index = self.low(index, Width::W32);
+                self.bind(ty, Expr::Lookup(table, index), comment)
+            }
             Op::ShiftByIndex(a) => {
                 let before = word_type(self.function.nodes[a].range);
                 let a = self.value(a);

@@ -108,6 +108,8 @@ pub enum Expr {
     Check(Typed, i128, i128, u32),
     /// Entry of a sine table at an unsigned 32-bit index that is in range.
     Sine(usize, Typed),
+    /// Entry of a table at an unsigned 32-bit index that is in range.
+    Lookup(usize, Typed),
     /// Entry of a table at the loop's index.
     Entry(usize),
     /// State: slot, element.
@@ -200,7 +202,8 @@ impl Expr {
             | Expr::IsNegative(a)
             | Expr::Clamp(a, _, _)
             | Expr::Check(a, _, _, _)
-            | Expr::Sine(_, a) => vec![a],
+            | Expr::Sine(_, a)
+            | Expr::Lookup(_, a) => vec![a],
             Expr::Add(a, b) | Expr::Sub(a, b) | Expr::Mul(a, b) => vec![a, b],
             Expr::Select(t, a, b) => vec![t, a, b],
             Expr::Entry(_) | Expr::Load(_, _) => Vec::new(),

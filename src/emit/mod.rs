@@ -5,6 +5,7 @@
 pub mod bundle;
 pub mod c;
 pub mod files;
+pub mod function;
 pub mod lower;
 mod lower_cast;
 pub mod machine;

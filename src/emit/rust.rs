@@ -246,6 +246,11 @@ impl Printer<'_> {
                     v(index)
                 )
             }
+            Expr::Lookup(k, index) => {
+                let table = self.bundle.program.tables[*k].name.to_uppercase();
+                let index = v(index);
+                format!("{table}.get({index} as usize).copied().unwrap_or(0) as {name}")
+            }
             Expr::Entry(k) => {
                 let table = self.bundle.program.index_tables[*k].name.to_uppercase();
                 format!("{table}.get(i as usize).copied().unwrap_or(0) as {name}")

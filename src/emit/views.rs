@@ -121,23 +121,58 @@ pub fn tables(bundle: &Bundle, language: Language) -> Vec<TableView> {
         );
         tables.push((table.name.to_owned(), note, table.entries.to_vec()));
     }
+    let fixed = tables.len();
+    for table in &bundle.program.tables {
+        tables.push((
+            table.name.to_owned(),
+            table.note.clone(),
+            table.entries.to_vec(),
+        ));
+    }
     tables
         .into_iter()
         .enumerate()
-        .map(|(k, (name, note, entries))| table(k, name, note, entries, language))
+        .map(|(k, (name, note, entries))| table(k, name, note, entries, language, k >= fixed))
         .collect()
 }
 
-fn table(k: usize, name: String, note: String, entries: Vec<i64>, language: Language) -> TableView {
+/// Bytes of an entry in the narrowest signed or unsigned type that holds all, and whether it is signed.
+pub fn entry_type(entries: &[i64]) -> (usize, bool) {
+    let low = entries.iter().copied().min().unwrap_or(0);
+    let high = entries.iter().copied().max().unwrap_or(0);
+    let signed = low < 0;
+    let fits = |bytes: &usize| {
+        let bits = 8 * *bytes as u32 - u32::from(signed);
+        bits >= 63 || (low >= -(1i64 << bits) && high < 1i64 << bits)
+    };
+    let bytes = [1, 2, 4].into_iter().find(fits).unwrap_or(8);
+    (bytes, signed)
+}
+
+/// `narrow`: in the narrowest type that holds all entries, else in 16 bits at least and signed.
+fn table(
+    k: usize,
+    name: String,
+    note: String,
+    entries: Vec<i64>,
+    language: Language,
+    narrow: bool,
+) -> TableView {
     let largest = entries.iter().map(|v| v.unsigned_abs()).max().unwrap_or(0);
-    let (c_type, rust_type) = match largest {
-        0..=0x7fff => ("int16_t", "i16"),
-        0x8000..=0x7fff_ffff => ("int32_t", "i32"),
+    let (c_type, rust_type) = match (narrow, entry_type(&entries), largest) {
+        (true, (1, true), _) => ("int8_t", "i8"),
+        (true, (1, false), _) => ("uint8_t", "u8"),
+        (true, (2, false), _) => ("uint16_t", "u16"),
+        (true, (4, false), _) => ("uint32_t", "u32"),
+        (_, _, 0..=0x7fff) | (true, (2, true), _) => ("int16_t", "i16"),
+        (_, _, 0x8000..=0x7fff_ffff) | (true, (4, true), _) => ("int32_t", "i32"),
         _ => ("int64_t", "i64"),
     };
     let entry = |v: &i64| match (language, c_type) {
+        (Language::C, "int64_t") if *v == i64::MIN => "INT64_MIN".to_owned(),
         (Language::C, "int64_t") => format!("INT64_C({v})"),
         (Language::C, "int32_t") => format!("INT32_C({v})"),
+        (Language::C, "uint32_t") => format!("UINT32_C({v})"),
         _ => v.to_string(),
     };
     let line = |chunk: &[i64]| {

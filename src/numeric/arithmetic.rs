@@ -58,6 +58,19 @@ pub struct IndexTable {
     pub fraction_bits: u32,
 }
 
+/// A table of a function, addressed by a word.
+#[derive(Debug, Clone)]
+pub struct Table {
+    /// The name in emitted code.
+    pub name: &'static str,
+    /// What it holds, for emitted code.
+    pub note: String,
+    /// Raw entries.
+    pub entries: std::sync::Arc<[i64]>,
+    /// Fraction bits of an entry.
+    pub fraction_bits: i32,
+}
+
 /// One arithmetic. Methods take `&self` (an arithmetic that records uses interior mutability), so
 /// that expressions nest.
 pub trait Arithmetic: Sized {
@@ -109,6 +122,11 @@ pub trait Arithmetic: Sized {
     fn centered(&self, a: Self::Residue, ring: &Ring) -> Self::Word;
     /// The table's entry at a phase; without quantisation: the sine of that phase, exactly.
     fn sine(&self, phase: Self::Residue, table: &SineTable) -> Self::Word;
+
+    /// The table's entry at an address: a word without fraction bits, never below 0 nor beyond the last
+    /// entry. No arithmetic knows the function behind the entries, so the one without quantisation
+    /// takes the entry too, at the floor of its address.
+    fn lookup(&self, address: Self::Word, table: &Table) -> Self::Word;
 
     /// `floor(a / 2^index)`.
     fn shift_right_by(&self, a: Self::Word, index: Self::Index) -> Self::Word;

@@ -1,7 +1,7 @@
 //! The bit-accurate arithmetic: a word is its raw two's-complement integer in a lane that the
 //! chain's ranges fit into.
 
-use super::arithmetic::{Arithmetic, IndexTable, LoopBody, Ring, SineTable};
+use super::arithmetic::{Arithmetic, IndexTable, LoopBody, Ring, SineTable, Table};
 use super::cast::{Cast, HasKernel, Label};
 use super::lane::Lane;
 use std::cell::Cell;
@@ -190,6 +190,11 @@ impl<W: HasKernel, R: Lane, const IDLE: bool> Arithmetic for Fixed<W, R, IDLE> {
         ))
     }
 
+    #[inline(always)]
+    fn lookup(&self, address: W, table: &Table) -> W {
+        // The address is proved to be inside when the block is traced.
+        W::low(i128::from(table.entries[address.wide() as usize]))
+    }
     #[inline(always)]
     fn shift_right_by(&self, a: W, index: u32) -> W {
         a.shr(index)

@@ -5,7 +5,7 @@
 //! 128-bit integer, so that an integrator wraps exactly and its only error is the rounding of what
 //! goes in, at most 2^-129 of the circle.
 
-use super::arithmetic::{Arithmetic, IndexTable, LoopBody, Ring, SineTable};
+use super::arithmetic::{Arithmetic, IndexTable, LoopBody, Ring, SineTable, Table};
 use super::cast::Cast;
 use super::format::pow2;
 
@@ -117,6 +117,12 @@ impl Arithmetic for Float {
         value * table.amplitude
     }
 
+    fn lookup(&self, address: f64, table: &Table) -> f64 {
+        // A conversion to an integer saturates at 0.
+        let last = table.entries.len().saturating_sub(1);
+        let entry = table.entries[(address.floor() as usize).min(last)];
+        entry as f64 * pow2(-table.fraction_bits)
+    }
     fn shift_right_by(&self, a: f64, index: u32) -> f64 {
         a * pow2(-(index as i32))
     }

@@ -23,7 +23,7 @@
 
 pub use super::paired_word::{Pair, PairResidue, exp2i};
 
-use super::arithmetic::{Arithmetic, IndexTable, LoopBody, Ring, SineTable};
+use super::arithmetic::{Arithmetic, IndexTable, LoopBody, Ring, SineTable, Table};
 use super::cast::{Cast, HasKernel};
 use super::fixed::Fixed;
 use super::float::Float;
@@ -351,6 +351,19 @@ impl<W: HasKernel, R: Lane, P: Watch> Arithmetic for Paired<'_, W, R, P> {
         word
     }
 
+    /// The raw address and the real one may fall on different entries: then the bound is the distance
+    /// between the two entries, which is known exactly.
+    fn lookup(&self, address: Pair<W>, table: &Table) -> Pair<W> {
+        let word = Pair::exact(
+            self.fixed.lookup(address.raw, table),
+            Float.lookup(address.real, table),
+            table.fraction_bits,
+        );
+        Pair {
+            bound: (word.value() - word.real).abs(),
+            ..word
+        }
+    }
     fn shift_right_by(&self, a: Pair<W>, index: u32) -> Pair<W> {
         let factor = exp2i(-(index as i32));
         Pair {

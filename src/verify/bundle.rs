@@ -89,6 +89,13 @@ pub fn verify(folder: &Path, command: &str) -> Result<Verification> {
                 &split.0,
                 &split.1,
             )?);
+            if let Some(path) = &function.every_input {
+                let blocks = read_words(&folder.join(path), 3)?;
+                let words = function.outputs + 1;
+                let every =
+                    compare::every_input(language, &harness, &function.name, words, &blocks)?;
+                functions.push(every);
+            }
         }
         if let Some(chain) = &manifest.chain {
             let codes = read_words(&folder.join("vectors/chain_input.csv"), 2)?;

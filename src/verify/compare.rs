@@ -219,6 +219,54 @@ pub fn calls(
     Ok(tally.finish(expected.len() as u64))
 }
 
+/// Compares a function of one input over every input there is, block by block with checksums: rows of
+/// first input, number of inputs, FNV-1a of all `words` words of their records.
+///
+/// # Errors
+/// A test driver that cannot be run.
+pub fn every_input(
+    language: Language,
+    harness: &Harness,
+    name: &str,
+    words: usize,
+    blocks: &[Vec<i128>],
+) -> Result<Compared> {
+    let mut tally = Tally::new(language, name);
+    tally.outcome.exhaustive = true;
+    let (Some(first), Some(last)) = (blocks.first(), blocks.last()) else {
+        return Ok(tally.finish(0));
+    };
+    let count = last[0] + last[1] - first[0];
+    let arguments = ["range", name, &first[0].to_string(), &count.to_string()];
+    let mut due = blocks.iter();
+    let (mut input, mut h) = (first[0], views::BASIS);
+    let mut block = due.next();
+    harness.run(
+        &arguments.map(str::to_owned),
+        Vec::new(),
+        words,
+        &mut |record| {
+            h = record.iter().fold(h, |h, word| views::mix(h, *word));
+            input += 1;
+            let Some([low, size, checksum]) = block.map(Vec::as_slice) else {
+                return;
+            };
+            if input == low + size {
+                tally.outcome.inputs += *size as u64;
+                tally.outcome.compared += *size as u64 * (words as u64 - 1);
+                if h != *checksum as u64 {
+                    tally.outcome.mismatches += 1;
+                    let place = format!("inputs {low} .. {}: another checksum", low + size - 1);
+                    tally.outcome.first.get_or_insert(place);
+                }
+                h = views::BASIS;
+                block = due.next();
+            }
+        },
+    )?;
+    Ok(tally.finish(count as u64))
+}
+
 /// Compares the chain row by row on captured codes.
 ///
 /// # Errors

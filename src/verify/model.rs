@@ -61,7 +61,12 @@ impl Model {
         edges.collect()
     }
 
-    fn new<const I: usize, const O: usize, B>(function: &Function, block: B, narrow: bool) -> Self
+    /// The model of a function without state. `narrow`: 64-bit lanes hold every word.
+    pub fn new<const I: usize, const O: usize, B>(
+        function: &Function,
+        block: B,
+        narrow: bool,
+    ) -> Self
     where
         B: Block<Fixed<i64, i64>, I, O, State = ()> + Block<Fixed<i128, i128>, I, O, State = ()>,
         B: 'static,
@@ -75,7 +80,8 @@ impl Model {
         }
     }
 
-    fn with_damage<const I: usize, const O: usize, B>(
+    /// The model with damaged copies of its block, each of which vectors have to tell from it.
+    pub fn with_damage<const I: usize, const O: usize, B>(
         mut self,
         blocks: impl IntoIterator<Item = B>,
         narrow: bool,

@@ -1,6 +1,6 @@
 //! The recorded program: functions of integer operations with the interval of every value.
 
-use crate::numeric::arithmetic::{IndexTable, Port, SineTable};
+use crate::numeric::arithmetic::{IndexTable, Port, SineTable, Table};
 use crate::numeric::cast::Cast;
 
 /// A value inside one function: the position of the node that makes it.
@@ -100,6 +100,8 @@ pub enum Op {
     Centered(Id, u32),
     /// Entry of a sine table at the phase: table number.
     Sine(Id, usize),
+    /// Entry of a table at a word: table number.
+    Lookup(Id, usize),
     /// floor(a / 2^index) by the loop's index.
     ShiftByIndex(Id),
     /// Entry of a table at the loop's index: table number.
@@ -207,6 +209,8 @@ pub struct Program {
     pub sine_tables: Vec<SineTable>,
     /// Tables by loop index.
     pub index_tables: Vec<IndexTable>,
+    /// Tables by a word.
+    pub tables: Vec<Table>,
 }
 
 impl Function {
@@ -223,6 +227,7 @@ impl Function {
             | Op::Residue(a, _)
             | Op::Centered(a, _)
             | Op::Sine(a, _)
+            | Op::Lookup(a, _)
             | Op::ShiftByIndex(a) => vec![*a],
             Op::Select(t, a, b) => vec![*t, *a, *b],
             Op::Call(c) => self.calls[*c].arguments.clone(),

@@ -9,7 +9,7 @@ pub mod ir;
 pub mod lanes;
 mod state;
 
-use super::arithmetic::{Arithmetic, Block, IndexTable, LoopBody, Port, Ring, SineTable};
+use super::arithmetic::{Arithmetic, Block, IndexTable, LoopBody, Port, Ring, SineTable, Table};
 use super::cast::{Cast, round_shift};
 use super::format::Overflow;
 use ir::{CallSite, Function, Id, Interval, Loop, Node, Op, Program};
@@ -309,6 +309,27 @@ impl Arithmetic for Trace {
         };
         let range = hull(&table.entries);
         self.push(Op::Sine(phase, number), range)
+    }
+
+    fn lookup(&self, address: Id, table: &Table) -> Id {
+        let number = {
+            let tables = &mut self.recorder.borrow_mut().program.tables;
+            match tables.iter().position(|t| t.name == table.name) {
+                Some(k) => k,
+                None => {
+                    tables.push(table.clone());
+                    tables.len() - 1
+                }
+            }
+        };
+        let inside = self.range(address);
+        assert!(
+            inside.is_within(0, table.entries.len() as i128 - 1),
+            "an address leaves the table {}",
+            table.name
+        );
+        let range = hull(&table.entries[inside.low as usize..=inside.high as usize]);
+        self.push(Op::Lookup(address, number), range)
     }
 
     fn shift_right_by(&self, a: Id, index: TraceIndex) -> Id {

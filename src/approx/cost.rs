@@ -1,0 +1,149 @@
+//! What a form costs: read-only memory, operations, and an estimate of cycles.
+
+use super::form::{Form, Settled};
+use crate::emit::machine::Width;
+use crate::emit::views::entry_type;
+use crate::numeric::trace::ir::{Function, Op};
+use serde::Serialize;
+
+/// A processor to estimate cycles for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Target {
+    /// A 64-bit processor.
+    #[default]
+    Host,
+    /// 32 bits with a single-cycle 32 x 32 -> 64 bit multiplier.
+    CortexM4,
+    /// 32 bits with a 32 x 32 -> 32 bit multiplier of many cycles and none for the upper half.
+    CortexM0,
+    /// RV32IM.
+    Riscv32,
+}
+
+/// Estimated cycles of an operation on words of 32, 64 and 128 bits.
+struct Weights {
+    multiply: [u32; 3],
+    add: [u32; 3],
+    shift: [u32; 3],
+    load: u32,
+    select: u32,
+}
+
+impl Target {
+    fn weights(self) -> Weights {
+        match self {
+            Target::Host => Weights {
+                multiply: [3, 3, 12],
+                add: [1, 1, 3],
+                shift: [1, 1, 4],
+                load: 4,
+                select: 1,
+            },
+            Target::CortexM4 => Weights {
+                multiply: [1, 6, 60],
+                add: [1, 2, 10],
+                shift: [1, 4, 16],
+                load: 2,
+                select: 2,
+            },
+            Target::CortexM0 => Weights {
+                multiply: [32, 90, 500],
+                add: [1, 2, 12],
+                shift: [1, 6, 24],
+                load: 2,
+                select: 3,
+            },
+            Target::Riscv32 => Weights {
+                multiply: [4, 18, 120],
+                add: [1, 4, 20],
+                shift: [1, 6, 24],
+                load: 2,
+                select: 3,
+            },
+        }
+    }
+}
+
+/// What a form costs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Cost {
+    /// Tables and coefficients at the widths of their types.
+    pub rom_bytes: u64,
+    /// Multiplications of words.
+    pub multiplies: u32,
+    /// Additions and subtractions of words; those inside a rounding do not count.
+    pub adds: u32,
+    /// Estimated cycles on the target: the operations above, table reads, shifts and selections, each with a
+    /// weight. Good for a comparison of forms, not for a schedule.
+    pub cycles: u32,
+}
+
+impl Cost {
+    /// Of a form on a target.
+    pub fn of(settled: &Settled, target: Target) -> Self {
+        let mut cost = Cost {
+            rom_bytes: rom_bytes(settled),
+            multiplies: 0,
+            adds: 0,
+            cycles: 0,
+        };
+        for function in &settled.program.functions {
+            count(function, &target.weights(), &mut cost);
+        }
+        cost
+    }
+}
+
+fn rom_bytes(settled: &Settled) -> u64 {
+    let tables: usize = settled
+        .program
+        .tables
+        .iter()
+        .map(|t| t.entries.len() * entry_type(&t.entries).0)
+        .sum();
+    let constants = match &settled.form {
+        Form::Polynomial(p) => {
+            let count = p.monomials.exponents(p.coefficients.len() - 1).len();
+            let bytes = match p.formats.coefficients.bits() {
+                0..=8 => 1,
+                9..=16 => 2,
+                17..=32 => 4,
+                _ => 8,
+            };
+            count * bytes
+        }
+        _ => 0,
+    };
+    (tables + constants) as u64
+}
+
+fn count(function: &Function, weights: &Weights, cost: &mut Cost) {
+    for (id, node) in function.nodes.iter().enumerate() {
+        let operands = function.operands(id);
+        let widest = operands.iter().map(|a| function.nodes[*a].range);
+        let range = widest.fold(node.range, |r, other| r.join(other));
+        let width = match Width::of_range(range) {
+            Width::W32 => 0,
+            Width::W64 => 1,
+            Width::W128 => 2,
+        };
+        match node.op {
+            Op::Mul(..) => {
+                cost.multiplies += 1;
+                cost.cycles += weights.multiply[width];
+            }
+            Op::Add(..) | Op::Sub(..) => {
+                cost.adds += 1;
+                cost.cycles += weights.add[width];
+            }
+            Op::Neg(_) => cost.cycles += weights.add[width],
+            // A rounding: an addition and a shift.
+            Op::Cast(..) => cost.cycles += weights.add[width] + weights.shift[width],
+            Op::Wrap(..) => cost.cycles += weights.shift[width],
+            Op::Select(..) | Op::Limit(..) => cost.cycles += weights.select << width.min(1),
+            Op::Lookup(..) => cost.cycles += weights.load,
+            _ => {}
+        }
+    }
+}

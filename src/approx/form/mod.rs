@@ -1,0 +1,289 @@
+//! A function in fixed point: one input word, one output word.
+//!
+//! Every form is a [`Block`], written once over [`Arithmetic`]: exhaustive checks run it in integers, emission
+//! prints its trace. A form also says which exact piecewise polynomial its data stand for ([`Piece`]): what
+//! is left between the two is rounding.
+
+pub mod generate;
+pub mod measure;
+pub mod overflow;
+pub mod piecewise;
+pub mod polynomial;
+pub mod split;
+pub mod table;
+
+use crate::error::{InputError, Result};
+use crate::numeric::arithmetic::{Arithmetic, Block, Port};
+use crate::numeric::cast::{Cast, HasKernel};
+use crate::numeric::fixed::Fixed;
+use crate::numeric::format::{Format, pow2};
+use crate::numeric::trace::Trace;
+use crate::numeric::trace::ir::{Interval, Program};
+use piecewise::Piecewise;
+use polynomial::Polynomial;
+use split::Split;
+use table::{Bipartite, Table};
+
+/// The input word and the codes of it that lie in the domain. Others are limited to the nearest of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Codes {
+    /// The input's format.
+    pub format: Format,
+    /// The first code in the domain, raw.
+    pub low: i128,
+    /// The last code in the domain, raw.
+    pub high: i128,
+}
+
+impl Codes {
+    /// Number of codes in the domain.
+    pub fn count(self) -> u128 {
+        (self.high - self.low + 1) as u128
+    }
+
+    /// The value of a code; exact for codes of up to 53 bits.
+    pub fn real(self, code: i128) -> f64 {
+        code as f64 * self.format.lsb()
+    }
+
+    /// Every word that can come in.
+    pub fn all(self) -> Interval {
+        Interval::new(self.format.min_raw(), self.format.max_raw())
+    }
+
+    /// The limit that every form begins with.
+    #[inline(always)]
+    pub fn limit<A: Arithmetic>(self, ar: &A, input: A::Word) -> A::Word {
+        ar.limit(input, self.low, self.high, self.format.fraction_bits as i32)
+    }
+}
+
+/// An exact dyadic number, raw * 2^-fraction_bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Number {
+    /// The integer.
+    pub raw: i128,
+    /// Its scale.
+    pub fraction_bits: i32,
+}
+
+impl Number {
+    /// The nearest `f64`.
+    pub fn real(self) -> f64 {
+        self.raw as f64 * pow2(-self.fraction_bits)
+    }
+}
+
+/// What a form's data stand for between two codes: an exact polynomial.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Piece {
+    /// First code.
+    pub low: i128,
+    /// Last code.
+    pub high: i128,
+    /// The polynomial is one in x - centre, x in the input's unit.
+    pub centre: Number,
+    /// Coefficients, lowest order first.
+    pub terms: Vec<Number>,
+    /// The result is at most this far from the polynomial's value before the last rounding's and the
+    /// output limits' share, by analysis; in the function's unit.
+    pub evaluation_bound: f64,
+}
+
+impl Piece {
+    /// The polynomial's value at x and a bound on the rounding of this computation (Horner's rule; Higham,
+    /// Accuracy and Stability of Numerical Algorithms, 2nd ed., eq. 5.3).
+    pub fn value(&self, x: f64) -> (f64, f64) {
+        let d = x - self.centre.real();
+        let (mut value, mut size) = (0.0, 0.0);
+        for term in self.terms.iter().rev() {
+            let c = term.real();
+            value = value * d + c;
+            size = size * d.abs() + c.abs();
+        }
+        let operations = 2.0 * self.terms.len() as f64 + 4.0;
+        (value, size * operations * f64::EPSILON)
+    }
+}
+
+/// A function in fixed point.
+#[derive(Debug, Clone)]
+pub enum Form {
+    /// One polynomial over the whole domain.
+    Polynomial(Box<Polynomial>),
+    /// A polynomial for each segment.
+    Piecewise(Box<Piecewise>),
+    /// A table, with or without interpolation.
+    Table(Box<Table>),
+    /// Two tables, whose entries are added.
+    Bipartite(Box<Bipartite>),
+}
+
+macro_rules! each {
+    ($form:expr, $inner:ident => $body:expr) => {
+        match $form {
+            Form::Polynomial($inner) => $body,
+            Form::Piecewise($inner) => $body,
+            Form::Table($inner) => $body,
+            Form::Bipartite($inner) => $body,
+        }
+    };
+}
+
+impl Form {
+    /// The name of the kind, as the command line spells it.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Form::Polynomial(_) => "polynomial",
+            Form::Piecewise(_) => "piecewise",
+            Form::Table(_) | Form::Bipartite(_) => "table",
+        }
+    }
+
+    /// The segments, if it has any.
+    pub fn split(&self) -> Option<&Split> {
+        match self {
+            Form::Polynomial(_) => None,
+            Form::Piecewise(f) => Some(&f.split),
+            Form::Table(f) => Some(&f.split),
+            Form::Bipartite(f) => Some(&f.split),
+        }
+    }
+
+    /// The input's codes.
+    pub fn codes(&self) -> Codes {
+        each!(self, f => f.codes)
+    }
+
+    /// The output's format.
+    pub fn output(&self) -> Format {
+        each!(self, f => f.output)
+    }
+
+    /// What the data stand for, from the first code of the domain to the last.
+    pub fn pieces(&self) -> Vec<Piece> {
+        each!(self, f => f.pieces())
+    }
+
+    fn casts_mut(&mut self) -> Vec<&mut Cast> {
+        each!(self, f => f.casts_mut())
+    }
+
+    /// Copies in which one rounding constant is off by one.
+    pub fn with_nudged_casts(&self) -> Vec<Form> {
+        let mut all = Vec::new();
+        let count = self.clone().casts_mut().len();
+        for k in 0..count {
+            for step in [-1, 1] {
+                let mut copy = self.clone();
+                let mut casts = copy.casts_mut();
+                let cast = casts.get_mut(k);
+                if let Some((cast, moved)) = cast.and_then(|c| c.nudged(step).map(|m| (c, m))) {
+                    **cast = moved;
+                    all.push(copy);
+                }
+            }
+        }
+        all
+    }
+
+    /// Numbers the casts, records the program, and lets go of the casts' limits where ranges prove that they
+    /// never act.
+    ///
+    /// # Errors
+    /// An intermediate of more than 127 bits.
+    pub fn settle(mut self) -> Result<Settled> {
+        for (id, cast) in self.casts_mut().into_iter().enumerate() {
+            cast.id = id;
+        }
+        let trace = Trace::new();
+        trace.record(&self, &(), [self.codes().all()]);
+        let program = trace.finish();
+        let bits = program.functions.iter().map(|f| program.word_bits(f)).max();
+        let bits = bits.unwrap_or(1);
+        if bits > 127 {
+            return Err(InputError::new(format!(
+                "the evaluation needs an exact intermediate of {bits} bits; 127 is the most"
+            ))
+            .help("give input, coefficients or intermediate fewer fraction bits")
+            .into());
+        }
+        let mut unproved = Vec::new();
+        for (id, cast) in self.casts_mut().into_iter().enumerate() {
+            if program.is_proved_in_range(id) {
+                cast.prove_in_range();
+            } else {
+                unproved.push(id);
+            }
+        }
+        Ok(Settled {
+            form: self,
+            program,
+            bits,
+            unproved,
+        })
+    }
+}
+
+impl<A: Arithmetic> Block<A, 1, 1> for Form {
+    type State = ();
+    const NAME: &'static str = "evaluate";
+
+    fn inputs(&self) -> [Port; 1] {
+        let codes = self.codes();
+        let meaning = format!(
+            "{}, limited to {} .. {}",
+            codes.format, codes.low, codes.high
+        );
+        [Port::new("x", meaning)]
+    }
+
+    fn outputs(&self) -> [Port; 1] {
+        [Port::new("y", self.output().to_string())]
+    }
+
+    #[inline(always)]
+    fn step(&self, ar: &A, _state: &mut (), [input]: [A::Word; 1]) -> [A::Word; 1] {
+        [each!(self, f => f.evaluate(ar, input))]
+    }
+}
+
+/// A form with its recorded program.
+#[derive(Debug, Clone)]
+pub struct Settled {
+    /// The form, its casts numbered.
+    pub form: Form,
+    /// One function, `evaluate`.
+    pub program: Program,
+    /// The widest word of the evaluation.
+    pub bits: u32,
+    /// Numbers of the casts whose limits may act, as far as intervals can tell.
+    pub unproved: Vec<usize>,
+}
+
+impl Settled {
+    /// The output for an input word, raw.
+    pub fn run(&self, input: i128) -> i128 {
+        if self.bits <= 64 {
+            i128::from(run_in::<i64>(&self.form, input as i64))
+        } else {
+            run_in::<i128>(&self.form, input)
+        }
+    }
+}
+
+/// The output for an input word in lanes `L`, which hold every word.
+#[inline]
+pub fn run_in<L: HasKernel>(form: &Form, input: L) -> L {
+    let ar = Fixed::<L, L>::new();
+    let [output] = Block::<_, 1, 1>::step(form, &ar, &mut (), [input]);
+    output
+}
+
+/// Integer bits, the sign among them, of a word of `bits` bits in all.
+pub(crate) fn integer_bits_of(range: Interval, fraction_bits: i32) -> i32 {
+    range.bits() as i32 - fraction_bits
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,354 @@
+//! One polynomial over the whole domain, by Horner's rule.
+//!
+//! With x the limited input, c_k the coefficients, `cast_i` and `cast_o` the quantisers to the intermediate and
+//! the output format (half up, saturating):
+//!
+//! | monomials | evaluation |
+//! |---|---|
+//! | all | t = c_n; t = cast_i(t x + c_k) for k = n-1 .. 0; y = cast_o(t) |
+//! | even | u = cast_i(x x); the same in u with c_n, c_(n-2), .. c_0 |
+//! | odd | u = cast_i(x x); the same in u with c_n, c_(n-2), .. c_1; y = cast_o(t x) |
+//!
+//! One cast a step, after the multiplication and the addition, which are exact. With all monomials the last step's
+//! cast and the output's both happen.
+
+use super::{Codes, Number, Piece, integer_bits_of};
+use crate::error::{InputError, Result};
+use crate::numeric::arithmetic::Arithmetic;
+use crate::numeric::cast::{Cast, Label, Target};
+use crate::numeric::format::{Format, Overflow, Quantizer, Rounding, pow2};
+use crate::numeric::trace::ir::Interval;
+
+/// The highest degree.
+pub const HIGHEST_DEGREE: usize = 24;
+/// Sub-intervals on which bounds are taken.
+const PIECES: i128 = 128;
+/// Covers the rounding of bounds that are computed in `f64`.
+pub(super) const SLACK: f64 = 1.0 + 1e-9;
+
+/// Names of the Horner steps, by the coefficient that they add.
+const STEPS: [&str; HIGHEST_DEGREE + 1] = [
+    "c0", "c1", "c2", "c3", "c4", "c5", "c6", "c7", "c8", "c9", "c10", "c11", "c12", "c13", "c14",
+    "c15", "c16", "c17", "c18", "c19", "c20", "c21", "c22", "c23", "c24",
+];
+
+/// Which monomials a polynomial has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, clap::ValueEnum)]
+#[serde(rename_all = "snake_case")]
+pub enum Monomials {
+    /// 1, x, x^2, ..
+    #[default]
+    All,
+    /// x, x^3, x^5, ..
+    Odd,
+    /// 1, x^2, x^4, ..
+    Even,
+}
+
+impl Monomials {
+    /// The exponents up to `degree`, lowest first.
+    pub fn exponents(self, degree: usize) -> Vec<usize> {
+        match self {
+            Monomials::All => (0..=degree).collect(),
+            Monomials::Odd => (1..=degree).step_by(2).collect(),
+            Monomials::Even => (0..=degree).step_by(2).collect(),
+        }
+    }
+}
+
+/// The formats of a polynomial's evaluation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Formats {
+    /// The input's codes.
+    pub codes: Codes,
+    /// Of every coefficient.
+    pub coefficients: Format,
+    /// Of the cast after each step.
+    pub intermediate: Target,
+    /// Of the result.
+    pub output: Format,
+}
+
+/// A Horner step.
+#[derive(Debug, Clone)]
+struct Step {
+    /// The coefficient, aligned to `fraction_bits`.
+    coefficient: i128,
+    /// Fraction bits of the sum.
+    fraction_bits: i32,
+    /// Appends zeros to a product with fewer fraction bits than the coefficients.
+    align: Option<Cast>,
+    cast: Cast,
+}
+
+/// The polynomial.
+#[derive(Debug, Clone)]
+pub struct Polynomial {
+    /// The input's codes.
+    pub codes: Codes,
+    /// The output's format.
+    pub output: Format,
+    /// Formats, as given or chosen.
+    pub formats: Formats,
+    /// Which monomials.
+    pub monomials: Monomials,
+    /// Raw coefficients from order 0 to the degree; 0 where the monomials have none.
+    pub coefficients: Vec<i128>,
+    square: Option<Cast>,
+    leading: i128,
+    steps: Vec<Step>,
+    last: Cast,
+}
+
+impl Polynomial {
+    /// Compiles the evaluation. `coefficients` go from order 0 to the degree.
+    ///
+    /// # Errors
+    /// A degree above [`HIGHEST_DEGREE`]; an alignment that needs more than 126 bits.
+    pub fn new(formats: Formats, monomials: Monomials, coefficients: Vec<i128>) -> Result<Self> {
+        let degree = coefficients.len().saturating_sub(1);
+        if degree > HIGHEST_DEGREE {
+            return Err(InputError::new(format!(
+                "degree {degree} is above {HIGHEST_DEGREE}, the highest"
+            ))
+            .help("use `--form piecewise`: segments of a low degree reach the same error")
+            .into());
+        }
+        let exponents = monomials.exponents(degree);
+        let q = Quantizer::default_of(formats.output);
+        let input = formats.codes.format.fraction_bits as i32;
+        let inner = formats.intermediate.fraction_bits;
+        let quantise = |label, from| {
+            let (half_up, saturate) = (Rounding::HalfUp, Some(Overflow::Saturate));
+            Cast::new(label, from, 0, formats.intermediate, half_up, saturate)
+        };
+        let variable = if monomials == Monomials::All {
+            input
+        } else {
+            inner
+        };
+        let own = formats.coefficients.fraction_bits as i32;
+        let mut at = own;
+        let mut steps = Vec::new();
+        for order in exponents.iter().rev().skip(1) {
+            let product = at + variable;
+            let sum = product.max(own);
+            let label = Label::on("polynomial step", STEPS[*order]);
+            let align = (sum > product).then(|| {
+                let target = Target::signed(127, sum);
+                Cast::new(label, product, 0, target, Rounding::Floor, None)
+            });
+            steps.push(Step {
+                coefficient: aligned(coefficients[*order], (sum - own) as u32)?,
+                fraction_bits: sum,
+                align,
+                cast: quantise(label, sum),
+            });
+            at = inner;
+        }
+        let squares = monomials != Monomials::All && exponents.len() > 1;
+        let last = if monomials == Monomials::Odd {
+            at + input
+        } else {
+            at
+        };
+        Ok(Polynomial {
+            codes: formats.codes,
+            output: formats.output,
+            formats,
+            monomials,
+            square: squares.then(|| quantise(Label::of("square"), 2 * input)),
+            leading: exponents.last().map_or(0, |order| coefficients[*order]),
+            steps,
+            last: Cast::to(Label::of("output"), last, 0, q),
+            coefficients,
+        })
+    }
+
+    pub(super) fn casts_mut(&mut self) -> Vec<&mut Cast> {
+        let steps = self.steps.iter_mut();
+        let steps = steps.flat_map(|s| s.align.iter_mut().chain([&mut s.cast]));
+        let casts = self.square.iter_mut().chain(steps);
+        casts.chain([&mut self.last]).collect()
+    }
+
+    /// The output for an input word.
+    #[inline(always)]
+    pub fn evaluate<A: Arithmetic>(&self, ar: &A, input: A::Word) -> A::Word {
+        let x = self.codes.limit(ar, input);
+        let variable = match &self.square {
+            Some(cast) => ar.cast(ar.mul(x, x), cast, &[x, x]),
+            None => x,
+        };
+        let own = self.formats.coefficients.fraction_bits as i32;
+        let mut t = ar.constant(self.leading, own);
+        for step in &self.steps {
+            let product = ar.mul(t, variable);
+            let product = match &step.align {
+                Some(cast) => ar.cast(product, cast, &[t, variable]),
+                None => product,
+            };
+            let c = ar.constant(step.coefficient, step.fraction_bits);
+            let sum = match step.coefficient {
+                0 => product,
+                _ => ar.add(product, c),
+            };
+            t = ar.cast(sum, &step.cast, &[product, c]);
+        }
+        let last = match self.monomials {
+            Monomials::Odd => ar.mul(t, x),
+            _ => t,
+        };
+        ar.cast(last, &self.last, &[last])
+    }
+
+    /// The polynomial over sub-intervals of the domain, with the bound of its evaluation on each.
+    pub(super) fn pieces(&self) -> Vec<Piece> {
+        let fraction_bits = self.formats.coefficients.fraction_bits as i32;
+        let number = |raw: &i128| Number {
+            raw: *raw,
+            fraction_bits,
+        };
+        let terms: Vec<Number> = self.coefficients.iter().map(number).collect();
+        split(self.codes.low, self.codes.high, PIECES)
+            .map(|(low, high)| Piece {
+                low,
+                high,
+                centre: Number {
+                    raw: 0,
+                    fraction_bits: 0,
+                },
+                terms: terms.clone(),
+                evaluation_bound: self.evaluation_bound(low, high),
+            })
+            .collect()
+    }
+
+    /// A bound on what the casts of the steps add between two codes: each cast's half LSB times what
+    /// follows it.
+    pub(crate) fn evaluation_bound(&self, low: i128, high: i128) -> f64 {
+        let x = self.codes.real(low).abs().max(self.codes.real(high).abs());
+        let half = |cast: &Cast| match cast.shift > 0 {
+            true => pow2(-cast.target.fraction_bits - 1),
+            false => 0.0,
+        };
+        let (v, v_error) = match &self.square {
+            Some(cast) => (x * x, half(cast)),
+            None => (x, 0.0),
+        };
+        let lsb = pow2(-(self.formats.coefficients.fraction_bits as i32));
+        let exponents = self.monomials.exponents(self.coefficients.len() - 1);
+        let mut orders = exponents.iter().rev().map(|k| &self.coefficients[*k]);
+        let mut size = orders.next().map_or(0.0, |c| c.unsigned_abs() as f64 * lsb);
+        let mut error = 0.0;
+        for (c, step) in orders.zip(&self.steps) {
+            error = error * (v + v_error) + size * v_error + half(&step.cast);
+            size = size * v + c.unsigned_abs() as f64 * lsb;
+        }
+        let outer = if self.monomials == Monomials::Odd {
+            x
+        } else {
+            1.0
+        };
+        error * outer * SLACK
+    }
+
+    /// Fraction bits with which no step rounds at all.
+    pub fn exact_fraction_bits(formats: &Formats, monomials: Monomials, degree: usize) -> i32 {
+        let input = formats.codes.format.fraction_bits as i32;
+        let own = formats.coefficients.fraction_bits as i32;
+        let factors = match monomials {
+            Monomials::All => degree,
+            _ => degree.saturating_sub(1),
+        };
+        (own + factors as i32 * input).max(2 * input)
+    }
+}
+
+/// `low ..= high` in at most `count` parts of nearly equal length.
+pub(super) fn split(low: i128, high: i128, count: i128) -> impl Iterator<Item = (i128, i128)> {
+    let size = high - low + 1;
+    let count = count.min(size);
+    (0..count).map(move |k| (low + size * k / count, low + size * (k + 1) / count - 1))
+}
+
+fn aligned(raw: i128, shift: u32) -> Result<i128> {
+    let room = if raw < 0 {
+        raw.leading_ones()
+    } else {
+        raw.leading_zeros()
+    };
+    if raw != 0 && shift + 2 > room {
+        return Err(InputError::new(format!(
+            "coefficient {raw} aligned by {shift} bits needs more than 126 bits"
+        ))
+        .help("give input or intermediate fewer fraction bits")
+        .into());
+    }
+    Ok(if raw == 0 { 0 } else { raw << shift })
+}
+
+/// The widest intermediate whose products fit 64-bit words; 128-bit words only if nothing narrower keeps the
+/// evaluation's rounding below a thousandth of the output's LSB. Integer bits are those that the
+/// ranges need.
+///
+/// # Errors
+/// No intermediate of up to 64 bits does.
+pub fn choose_intermediate(
+    codes: Codes,
+    coefficient_format: Format,
+    output: Format,
+    monomials: Monomials,
+    coefficients: &[i128],
+) -> Result<Format> {
+    let with = |fraction_bits: i32| -> Option<(u32, Format, f64)> {
+        let formats = Formats {
+            codes,
+            coefficients: coefficient_format,
+            intermediate: Target::signed(127, fraction_bits),
+            output,
+        };
+        let form = Polynomial::new(formats, monomials, coefficients.to_vec()).ok()?;
+        let bound = form
+            .pieces()
+            .iter()
+            .map(|p| p.evaluation_bound)
+            .fold(0.0, f64::max);
+        let labels: Vec<bool> = { form.clone() }
+            .casts_mut()
+            .iter()
+            .map(|c| c.overflow == Some(Overflow::Saturate) && c.label.key != "output")
+            .collect();
+        let settled = super::Form::Polynomial(Box::new(form)).settle().ok()?;
+        let ranges = settled.program.cast_ranges.iter().zip(labels);
+        let ranges = ranges.filter_map(|(range, counts)| range.filter(|_| counts));
+        let range = ranges.reduce(Interval::join).unwrap_or(Interval::point(0));
+        let integer_bits = integer_bits_of(range, fraction_bits).max(1) as u32;
+        let format = Format::q(integer_bits, fraction_bits as u32);
+        (format.bits() <= 64).then_some((settled.bits, format, bound))
+    };
+    let formats = Formats {
+        codes,
+        coefficients: coefficient_format,
+        intermediate: Target::signed(127, 0),
+        output,
+    };
+    let degree = coefficients.len().saturating_sub(1);
+    let exact = Polynomial::exact_fraction_bits(&formats, monomials, degree).clamp(0, 63);
+    let enough = |bound: f64| bound <= output.lsb() / 1000.0;
+    let narrow = (0..=exact)
+        .rev()
+        .find_map(|n| with(n).filter(|(bits, ..)| *bits <= 64));
+    if let Some((_, format, bound)) = narrow
+        && enough(bound)
+    {
+        return Ok(format);
+    }
+    let wide = (0..=exact).find_map(|n| with(n).filter(|(.., bound)| enough(*bound)));
+    let found = wide.or(narrow).map(|(_, format, _)| format);
+    found.ok_or_else(|| {
+        InputError::new("no intermediate format of up to 64 bits holds the evaluation's words")
+            .help("give input or coefficients fewer bits, or say `--intermediate`")
+            .into()
+    })
+}

@@ -1,0 +1,19 @@
+//! Functions in fixed point: approximations with a proved error.
+//!
+//! [`real`] encloses the function that is wanted, [`minimax`] finds coefficients, [`form`] has the fixed-point
+//! forms; [`coefficients`] puts them together for a polynomial, [`choice`] among all forms; [`job`] does what
+//! `gyrogen approx` is asked, [`bundle`] emits it.
+
+pub mod bundle;
+mod check;
+pub mod choice;
+pub mod coefficients;
+pub mod cost;
+mod datapath;
+mod describe;
+pub mod form;
+pub mod job;
+pub mod minimax;
+pub mod outcome;
+pub mod real;
+pub mod reference;

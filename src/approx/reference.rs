@@ -1,0 +1,81 @@
+//! The function that a form stands for: expression, domain and enclosure in one, for the search of coefficients
+//! and for proofs.
+
+use super::form::measure::Reference;
+use super::form::{Number, Piece};
+use super::minimax;
+use super::real::{Domain, Dyadic, Enclosure, Expression, Target as _};
+use crate::error::Result;
+
+/// A function on a domain, enclosed.
+#[derive(Debug, Clone)]
+pub struct Function {
+    /// As it was written.
+    pub text: String,
+    target: (Expression, Domain),
+    enclosure: Enclosure,
+}
+
+impl Function {
+    /// Encloses the expression, aiming at a radius of `tolerance` in its unit.
+    ///
+    /// # Errors
+    /// A place in the domain where the function has no value, or none that can be bounded.
+    pub fn new(
+        text: &str,
+        expression: Expression,
+        domain: Domain,
+        tolerance: f64,
+    ) -> Result<Function> {
+        let enclosure = Enclosure::new(&expression, &domain, tolerance);
+        let enclosure = enclosure.map_err(|undefined| undefined.in_text(text))?;
+        Ok(Function {
+            text: text.to_owned(),
+            target: (expression, domain),
+            enclosure,
+        })
+    }
+}
+
+impl Reference for Function {
+    fn at(&self, x: f64) -> (f64, f64) {
+        self.enclosure.at(x)
+    }
+
+    fn supremum(&self, piece: &Piece, low: f64, high: f64) -> f64 {
+        if low >= high {
+            let (value, radius) = self.enclosure.at(low);
+            let (ideal, slack) = piece.value(low);
+            return (value - ideal).abs() + radius + slack;
+        }
+        let dyadic = |n: &Number| Dyadic::new(n.raw, n.fraction_bits);
+        let terms: Vec<Dyadic> = piece.terms.iter().map(dyadic).collect();
+        let about = dyadic(&piece.centre);
+        self.enclosure
+            .supremum_about(&terms, about, low, high)
+            .upper
+    }
+
+    fn range(&self, low: f64, high: f64) -> (f64, f64) {
+        self.enclosure.range(low, high)
+    }
+
+    fn domain(&self) -> (f64, f64) {
+        self.target.domain()
+    }
+}
+
+impl minimax::Target for Function {
+    fn value(&self, x: f64) -> f64 {
+        self.target.value(x)
+    }
+
+    fn value_wide(&self, x: minimax::Wide) -> minimax::Wide {
+        let high = x.to_f64();
+        let low = (x - minimax::Wide::from(high)).to_f64();
+        let value = self
+            .target
+            .value_exactly(super::real::Wide::of_sum(high, low));
+        minimax::Wide::sum(value.to_f64(), value.rest())
+    }
+}

@@ -1,0 +1,329 @@
+//! `gyrogen approx`: a function in fixed point, with its certified error.
+
+use super::OutputFormat;
+use crate::approx::bundle;
+use crate::approx::cost::Target;
+use crate::approx::form::polynomial::Monomials;
+use crate::approx::job::{self, Asked, Request, Weight};
+use crate::approx::outcome::Outcome;
+use crate::emit::files;
+use crate::emit::views::Language;
+use crate::error::{Error, InputError, Result};
+use crate::numeric::format::Format;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+/// A function in fixed point: polynomial, table or piecewise, with proved error, in C and Rust.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// The function of x: numbers, + - * / ^, pi, sin cos tan asin acos atan sqrt exp log abs.
+    #[arg(long)]
+    function: String,
+    /// Where it is wanted: two numbers or constants (`0,pi/4`).
+    #[arg(long, value_name = "A,B", allow_hyphen_values = true)]
+    domain: String,
+    /// Degree of the polynomial or of the segments; of a table 0 plain, 1 linear, 2 quadratic.
+    #[arg(long)]
+    degree: Option<usize>,
+    /// Which monomials; all if left out, and with `--bound` whatever is cheapest.
+    #[arg(long, value_enum)]
+    monomials: Option<Monomials>,
+    /// Format of the input, Qm.n or UQm.n.
+    #[arg(long)]
+    input: Format,
+    /// Format of the output.
+    #[arg(long)]
+    output: Format,
+    /// Format of the coefficients; with `--bound` chosen if left out.
+    #[arg(long)]
+    coefficients: Option<Format>,
+    /// Format of the cast after each Horner step; wide if left out.
+    #[arg(long)]
+    intermediate: Option<Format>,
+    /// The form.
+    #[arg(long, value_enum, default_value = "polynomial")]
+    form: Asked,
+    /// The most that the certified error may be, in the function's unit.
+    #[arg(long)]
+    bound: Option<f64>,
+    /// What the coefficients' error is weighed with.
+    #[arg(long, value_enum, default_value = "absolute")]
+    weight: Weight,
+    /// A named value in the function.
+    #[arg(
+        long = "parameter",
+        value_name = "NAME=VALUE",
+        allow_hyphen_values = true
+    )]
+    parameters: Vec<String>,
+    /// Run every input code up to 2^32 of them, not only up to 2^24.
+    #[arg(long)]
+    exhaustive: bool,
+    /// The processor whose cycles are estimated.
+    #[arg(long, value_enum, default_value = "host")]
+    target: Target,
+    /// Prefix of the emitted names.
+    #[arg(long, default_value = "approx")]
+    name: String,
+    /// Threads; as many as the machine has if left out. The result does not depend on it.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=256))]
+    threads: Option<u16>,
+    /// Folder for the results; made if it does not exist.
+    #[arg(long)]
+    out: PathBuf,
+    /// How the result is printed.
+    #[arg(long, value_enum, default_value = "text")]
+    format: OutputFormat,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A request that cannot be used (exit 2); a bound that is not met (exit 1).
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let request = request(arguments)?;
+    let command = command(arguments);
+    let bar = Progress::new();
+    let made = job::approximate(
+        &request,
+        &command,
+        super::threads(arguments.threads),
+        &|total, count| bar.add(total, count),
+    );
+    bar.done();
+    let made = made?;
+    let model = bundle::model(&made.settled)?;
+    let emit = |language| {
+        bundle::emit(
+            &made.settled,
+            &model,
+            &made.outcome,
+            &request.name,
+            language,
+        )
+    };
+    let (c, rust) = (emit(Language::C)?, emit(Language::Rust)?);
+    let json = super::json(&made.outcome);
+    super::make_folder(&arguments.out)?;
+    files::write(&c, &arguments.out.join("c"))?;
+    files::write(&rust, &arguments.out.join("rust"))?;
+    crate::output::write_whole(&arguments.out.join("approx.json"), json.as_bytes())?;
+    match arguments.format {
+        OutputFormat::Json => say!("{}", json.trim_end()),
+        OutputFormat::Text => print(&made.outcome, &arguments.out),
+    }
+    if made.outcome.holds {
+        return Ok(());
+    }
+    Err(Error::Check(format!(
+        "the certified error {:e} is above the bound",
+        made.outcome.error.certified_max_abs
+    )))
+}
+
+fn request(arguments: &Arguments) -> Result<Request> {
+    let Some((low, high)) = arguments.domain.split_once(',') else {
+        return Err(InputError::new(format!(
+            "`{}` is no domain: two numbers with a comma between them are wanted",
+            arguments.domain
+        ))
+        .help("such as `--domain=-0.9,0.2` or `--domain=0,pi/4`")
+        .into());
+    };
+    let mut parameters = BTreeMap::new();
+    for text in &arguments.parameters {
+        let parsed = text.split_once('=').and_then(|(name, value)| {
+            let value: f64 = value.trim().parse().ok()?;
+            value.is_finite().then_some((name.trim().to_owned(), value))
+        });
+        let Some((name, value)) = parsed else {
+            return Err(InputError::new(format!("`{text}` is no parameter"))
+                .help("such as `--parameter gain=1.25`")
+                .into());
+        };
+        parameters.insert(name, value);
+    }
+    Ok(Request {
+        function: arguments.function.clone(),
+        parameters,
+        domain: [low.trim().to_owned(), high.trim().to_owned()],
+        degree: arguments.degree,
+        monomials: arguments.monomials,
+        input: arguments.input,
+        output: arguments.output,
+        coefficients: arguments.coefficients,
+        intermediate: arguments.intermediate,
+        form: arguments.form,
+        bound: arguments.bound,
+        weight: arguments.weight,
+        exhaustive: arguments.exhaustive,
+        target: arguments.target,
+        name: arguments.name.clone(),
+    })
+}
+
+/// The spelling of a choice on the command line.
+fn spelled<T: clap::ValueEnum>(value: &T) -> String {
+    value
+        .to_possible_value()
+        .map_or(String::new(), |v| v.get_name().to_owned())
+}
+
+/// The command that makes the same result again; where it is written does not matter.
+fn command(a: &Arguments) -> String {
+    let mut command = format!(
+        "gyrogen approx --function '{}' --domain={}",
+        a.function, a.domain
+    );
+    let mut push = |name: &str, value: Option<String>| {
+        if let Some(value) = value {
+            command += &format!(" --{name} {value}");
+        }
+    };
+    push("degree", a.degree.map(|d| d.to_string()));
+    push("monomials", a.monomials.as_ref().map(spelled));
+    push("input", Some(a.input.to_string()));
+    push("output", Some(a.output.to_string()));
+    push("coefficients", a.coefficients.map(|f| f.to_string()));
+    push("intermediate", a.intermediate.map(|f| f.to_string()));
+    let form = (a.form != Asked::default()).then(|| spelled(&a.form));
+    push("form", form);
+    push("bound", a.bound.map(|b| b.to_string()));
+    push(
+        "weight",
+        (a.weight != Weight::default()).then(|| spelled(&a.weight)),
+    );
+    for parameter in &a.parameters {
+        push("parameter", Some(parameter.clone()));
+    }
+    push(
+        "target",
+        (a.target != Target::default()).then(|| spelled(&a.target)),
+    );
+    push("name", (a.name != "approx").then(|| a.name.clone()));
+    if a.exhaustive {
+        command += " --exhaustive";
+    }
+    command
+}
+
+fn print(o: &Outcome, out: &std::path::Path) {
+    if let Some(alternatives) = &o.alternatives {
+        let mut table = super::table(&[
+            "form",
+            "ROM, bytes",
+            "multiplies",
+            "adds",
+            "cycles (estimate)",
+            "certified error",
+            "",
+        ]);
+        for a in alternatives {
+            let mark = match (a.chosen, a.undominated) {
+                (true, _) => "chosen",
+                (false, true) => "undominated",
+                (false, false) => "",
+            };
+            table.add_row([
+                a.detail.clone(),
+                a.cost.rom_bytes.to_string(),
+                a.cost.multiplies.to_string(),
+                a.cost.adds.to_string(),
+                a.cost.cycles.to_string(),
+                format!("{:.4e}", a.certified_max_abs),
+                mark.to_owned(),
+            ]);
+        }
+        for column in table.column_iter_mut().skip(1).take(5) {
+            column.set_cell_alignment(comfy_table::CellAlignment::Right);
+        }
+        say!("{table}");
+    }
+    if let Some(search) = &o.search {
+        let mut table = super::table(&["coefficients", "ideal evaluation", "whole evaluation"]);
+        for c in &search.compared {
+            let total = c.total_max_abs.map_or("-".into(), |v| format!("{v:.5e}"));
+            table.add_row([c.name.to_owned(), format!("{:.5e}", c.ideal_max_abs), total]);
+        }
+        say!("{table}");
+    }
+    say!("{} on {}: {}", o.function, o.domain, o.detail);
+    let f = &o.formats;
+    say!(
+        "input {}, output {}, coefficients {}, intermediate {}",
+        f.input,
+        f.output,
+        f.coefficients,
+        f.intermediate.as_deref().unwrap_or("none")
+    );
+    let lsb = f.output.parse::<Format>().map_or(1.0, Format::lsb);
+    let shown = |v: f64| format!("{v:.5e} ({:.3} LSB)", v / lsb);
+    say!(
+        "certified error at most {}",
+        shown(o.error.certified_max_abs)
+    );
+    match (o.error.exhaustive_max_abs, o.error.sampled_max_abs) {
+        (Some(v), _) => say!(
+            "observed over all {} input codes {}, at input {}",
+            o.inputs_checked,
+            shown(v),
+            o.error.at_input_raw
+        ),
+        (None, Some(v)) => say!(
+            "observed over {} of the input codes {}, at input {} (`--exhaustive` runs all up to 2^32)",
+            o.inputs_checked,
+            shown(v),
+            o.error.at_input_raw
+        ),
+        (None, None) => {}
+    }
+    say!("data alone {}", shown(o.error.coefficients_only_max_abs));
+    say!(
+        "{} bytes, {} multiplications, {} additions, about {} cycles on {}",
+        o.cost.rom_bytes,
+        o.cost.multiplies,
+        o.cost.adds,
+        o.cost.cycles,
+        spelled(&o.target)
+    );
+    say!("wrote {}", out.display());
+}
+
+/// A bar on a terminal for what takes over two seconds.
+struct Progress {
+    started: Instant,
+    bar: Mutex<(u64, Option<indicatif::ProgressBar>)>,
+}
+
+impl Progress {
+    fn new() -> Self {
+        Progress {
+            started: Instant::now(),
+            bar: Mutex::new((0, None)),
+        }
+    }
+
+    fn add(&self, total: u128, count: u64) {
+        let Ok(mut state) = self.bar.lock() else {
+            return;
+        };
+        state.0 += count;
+        if state.1.is_none() && self.started.elapsed() > Duration::from_secs(2) {
+            // Draws to stderr, and only on a terminal.
+            state.1 = Some(indicatif::ProgressBar::new(total as u64));
+        }
+        if let Some(bar) = &state.1 {
+            bar.set_position(state.0);
+        }
+    }
+
+    fn done(&self) {
+        if let Ok(state) = self.bar.lock()
+            && let Some(bar) = &state.1
+        {
+            bar.finish_and_clear();
+        }
+    }
+}
