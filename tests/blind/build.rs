@@ -43,14 +43,23 @@ fn cast(s: &Scenario, rng: &mut Rng) -> Cast {
     needs.extend(outsider.iter().flat_map(|o| o.needs));
     let protocol = match s.class {
         Class::Confounded | Class::Unexcited => {
-            let f = if s.class == Class::Confounded { traps::confounded } else { traps::unexcited };
+            let f = if s.class == Class::Confounded {
+                traps::confounded
+            } else {
+                traps::unexcited
+            };
             let (id, protocol) = f(rng);
             known = vec![catalogue::of(id)];
             protocol
         }
         _ => catalogue::protocol(&needs, rng),
     };
-    Cast { known, outsider, covariate: s.class == Class::Covariate, protocol }
+    Cast {
+        known,
+        outsider,
+        covariate: s.class == Class::Covariate,
+        protocol,
+    }
 }
 
 /// Noise of a class, in units of its white part.
@@ -58,7 +67,7 @@ fn flavour(class: Class, rng: &mut Rng) -> Flavour {
     match class {
         Class::None if rng.odds(0.5) => Flavour::Pink(rng.between(0.3, 1.2)),
         Class::NoiseOnly if rng.odds(0.5) => Flavour::Pink(rng.spread(2.0, 12.0)),
-        Class::NoiseOnly => Flavour::Walk(rng.spread(4.0, 40.0)),
+        Class::NoiseOnly => Flavour::Walk(rng.spread(8.0, 50.0)),
         Class::None => Flavour::White,
         _ if rng.odds(0.4) => Flavour::Pink(rng.between(0.2, 0.6)),
         _ => Flavour::White,
@@ -85,7 +94,11 @@ fn noise_of(w: &World, flavour: Flavour, rng: &mut Rng) -> (Vec<f64>, f64) {
         .map(|k| {
             let again = *k == last;
             last = *k;
-            if again { noise.slow[*k] + w.sigma_dps * rng.gauss() } else { noise.values[*k] }
+            if again {
+                noise.slow[*k] + w.sigma_dps * rng.gauss()
+            } else {
+                noise.values[*k]
+            }
         })
         .collect();
     (values, noise.short_term)
@@ -174,15 +187,30 @@ pub fn attempt(s: &Scenario, attempt: u64) -> Option<BlindRecord> {
         reading: w.reading(),
         thermometer: w.protocol.thermometer,
         clean_dps: clean(&w, &planted),
-        noise_rms: rms(&noise.iter().zip(&outlier).filter(|(_, o)| !**o).map(|(n, _)| *n).collect::<Vec<_>>()),
+        noise_rms: rms(&noise
+            .iter()
+            .zip(&outlier)
+            .filter(|(_, o)| !**o)
+            .map(|(n, _)| *n)
+            .collect::<Vec<_>>()),
         noise_dps: noise,
         outlier,
         short_term,
-        ratios: planted.iter().map(|p| p.orthogonal_rms / short_term).collect(),
+        ratios: planted
+            .iter()
+            .map(|p| p.orthogonal_rms / short_term)
+            .collect(),
         hidden,
-        outside_channel: c.outsider.and_then(|o| o.channel).filter(|n| channels.contains(n)),
+        outside_channel: c
+            .outsider
+            .and_then(|o| o.channel)
+            .filter(|n| channels.contains(n)),
         nearest: c.outsider.map_or(Vec::new(), |o| o.nearest.to_vec()),
-        decoys: auxiliaries.iter().map(|a| a.name).filter(|n| !planted.iter().any(|p| p.id.ends_with(n))).collect(),
+        decoys: auxiliaries
+            .iter()
+            .map(|a| a.name)
+            .filter(|n| !planted.iter().any(|p| p.id.ends_with(n)))
+            .collect(),
         attempts: attempt,
         protocol: format!("{:?} {flavour:?}", w.protocol),
         planted,
@@ -201,7 +229,12 @@ fn named(class: Class, planted: &[Planted]) -> Vec<String> {
 }
 
 /// The cause, if it is a column, among decoys; a few decoys in a quarter of all other records.
-fn auxiliary_columns(class: Class, w: &World, cause: Option<Auxiliary>, rng: &mut Rng) -> Vec<Auxiliary> {
+fn auxiliary_columns(
+    class: Class,
+    w: &World,
+    cause: Option<Auxiliary>,
+    rng: &mut Rng,
+) -> Vec<Auxiliary> {
     let count = match class {
         Class::Covariate => rng.range(1, 5),
         _ if rng.odds(0.25) => rng.range(1, 3),
@@ -214,7 +247,12 @@ fn auxiliary_columns(class: Class, w: &World, cause: Option<Auxiliary>, rng: &mu
 }
 
 /// The record's channels, and the one that is withheld.
-fn channels(class: Class, c: &Cast, w: &World, rng: &mut Rng) -> (Vec<&'static str>, Option<&'static str>) {
+fn channels(
+    class: Class,
+    c: &Cast,
+    w: &World,
+    rng: &mut Rng,
+) -> (Vec<&'static str>, Option<&'static str>) {
     let mut wanted: Vec<&'static str> = c.known.iter().filter_map(|e| e.channel).collect();
     wanted.extend(c.outsider.and_then(|o| o.channel));
     if class == Class::Confounded {
@@ -234,7 +272,14 @@ fn channels(class: Class, c: &Cast, w: &World, rng: &mut Rng) -> (Vec<&'static s
 type Likeness = Vec<(String, String, f64)>;
 
 /// Alternatives and closest others; None where the draw is not what its class promises.
-fn judge(class: Class, c: &Cast, w: &World, planted: &[Planted], channels: &[&str], aux: &[Auxiliary]) -> Option<(Likeness, Likeness)> {
+fn judge(
+    class: Class,
+    c: &Cast,
+    w: &World,
+    planted: &[Planted],
+    channels: &[&str],
+    aux: &[Auxiliary],
+) -> Option<(Likeness, Likeness)> {
     let (mut alternatives, mut closest) = (Vec::new(), Vec::new());
     for (k, p) in planted.iter().enumerate() {
         if class == Class::Unexcited {
@@ -274,7 +319,13 @@ fn judge(class: Class, c: &Cast, w: &World, planted: &[Planted], channels: &[&st
 
 /// `rate_out_dps`, the noise in it, and which rows are outliers. Where the output clips, half of the devices clip
 /// their noise as well.
-fn output(w: &World, planted: &[Planted], noise: Vec<f64>, short_term: f64, rng: &mut Rng) -> (Vec<f64>, Vec<f64>, Vec<bool>) {
+fn output(
+    w: &World,
+    planted: &[Planted],
+    noise: Vec<f64>,
+    short_term: f64,
+    rng: &mut Rng,
+) -> (Vec<f64>, Vec<f64>, Vec<bool>) {
     let total = sum(&clean(w, planted), &w.rate_dps);
     let clip = planted.iter().find(|p| p.id == "output_saturation");
     let mut noisy = sum(&total, &noise);
@@ -282,11 +333,21 @@ fn output(w: &World, planted: &[Planted], noise: Vec<f64>, short_term: f64, rng:
         && rng.odds(0.5)
     {
         let get = |name: &str| p.parameters.iter().find(|q| q.0 == name).map(|q| q.1);
-        let (low, high) = (get("lower_dps").unwrap_or(f64::NEG_INFINITY), get("upper_dps").unwrap_or(f64::INFINITY));
-        let before = sum(&sum(&total, &noise), &p.contribution.iter().map(|c| -c).collect::<Vec<_>>());
+        let (low, high) = (
+            get("lower_dps").unwrap_or(f64::NEG_INFINITY),
+            get("upper_dps").unwrap_or(f64::INFINITY),
+        );
+        let before = sum(
+            &sum(&total, &noise),
+            &p.contribution.iter().map(|c| -c).collect::<Vec<_>>(),
+        );
         noisy = before.iter().map(|x| x.clamp(low, high)).collect();
     }
-    let share = if rng.odds(0.3) { rng.between(0.002, 0.02) } else { 0.0 };
+    let share = if rng.odds(0.3) {
+        rng.between(0.002, 0.02)
+    } else {
+        0.0
+    };
     let outlier = noise::outliers(&mut noisy, short_term, share, rng);
     let added = noisy.iter().zip(&total).map(|(a, b)| a - b).collect();
     (noisy, added, outlier)

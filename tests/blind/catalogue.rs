@@ -44,36 +44,139 @@ const fn entry(
     needs: &'static [Need],
     channel: Option<&'static str>,
 ) -> Entry {
-    Entry { id, draw, needs, channel }
+    Entry {
+        id,
+        draw,
+        needs,
+        channel,
+    }
 }
 
 /// All thermal ids but `covariate:NAME`.
 pub const CATALOGUE: [Entry; 20] = [
-    entry("thermal_lag", heat_effects::thermal_lag, &[Need::Heat], None),
-    entry("temperature_rate", heat_effects::temperature_rate, &[Need::Heat], None),
-    entry("warmup_transient", heat_effects::warmup_transient, &[Need::Cycles], Some("time_since_power_on_s")),
-    entry("ageing_drift", heat_effects::ageing_drift, &[Need::Heat], None),
-    entry("bias_third_order", heat_effects::bias_third_order, &[Need::Heat], None),
-    entry("mode_crossing", heat_effects::mode_crossing, &[Need::Heat], None),
-    entry("stress_jump", heat_effects::stress_jump, &[Need::Heat], None),
-    entry("damping_bias", loop_effects::damping_bias, &[Need::Damping], Some("agc")),
-    entry("quadrature_leakage", loop_effects::quadrature_leakage, &[Need::Quadrature], Some("quad_dps")),
-    entry("demod_phase_drift", loop_effects::demod_phase_drift, &[Need::Quadrature, Need::Heat], Some("quad_dps")),
-    entry("scale_factor_temperature", rate_effects::scale_factor_temperature, &[Need::Rate, Need::Heat], Some("rate_dps")),
-    entry("scale_factor_nonlinearity", rate_effects::scale_factor_nonlinearity, &[Need::Rate], Some("rate_dps")),
-    entry("scale_factor_asymmetry", rate_effects::scale_factor_asymmetry, &[Need::Rate], Some("rate_dps")),
-    entry("output_deadband", rate_effects::output_deadband, &[Need::Rate], Some("rate_dps")),
-    entry("output_saturation", rate_effects::output_saturation, &[Need::Rate], Some("rate_dps")),
-    entry("supply_sensitivity", field_effects::supply_sensitivity, &[Need::Supply], Some("supply_v")),
-    entry("g_sensitivity", field_effects::g_sensitivity, &[Need::Accel], Some("accel_g")),
-    entry("g_squared_sensitivity", field_effects::g_squared_sensitivity, &[Need::Accel], Some("accel_g")),
+    entry(
+        "thermal_lag",
+        heat_effects::thermal_lag,
+        &[Need::Heat],
+        None,
+    ),
+    entry(
+        "temperature_rate",
+        heat_effects::temperature_rate,
+        &[Need::Heat],
+        None,
+    ),
+    entry(
+        "warmup_transient",
+        heat_effects::warmup_transient,
+        &[Need::Cycles],
+        Some("time_since_power_on_s"),
+    ),
+    entry(
+        "ageing_drift",
+        heat_effects::ageing_drift,
+        &[Need::Heat],
+        None,
+    ),
+    entry(
+        "bias_third_order",
+        heat_effects::bias_third_order,
+        &[Need::Heat],
+        None,
+    ),
+    entry(
+        "mode_crossing",
+        heat_effects::mode_crossing,
+        &[Need::Heat],
+        None,
+    ),
+    entry(
+        "stress_jump",
+        heat_effects::stress_jump,
+        &[Need::Heat],
+        None,
+    ),
+    entry(
+        "damping_bias",
+        loop_effects::damping_bias,
+        &[Need::Damping],
+        Some("agc"),
+    ),
+    entry(
+        "quadrature_leakage",
+        loop_effects::quadrature_leakage,
+        &[Need::Quadrature],
+        Some("quad_dps"),
+    ),
+    entry(
+        "demod_phase_drift",
+        loop_effects::demod_phase_drift,
+        &[Need::Quadrature, Need::Heat],
+        Some("quad_dps"),
+    ),
+    entry(
+        "scale_factor_temperature",
+        rate_effects::scale_factor_temperature,
+        &[Need::Rate, Need::Heat],
+        Some("rate_dps"),
+    ),
+    entry(
+        "scale_factor_nonlinearity",
+        rate_effects::scale_factor_nonlinearity,
+        &[Need::Rate],
+        Some("rate_dps"),
+    ),
+    entry(
+        "scale_factor_asymmetry",
+        rate_effects::scale_factor_asymmetry,
+        &[Need::Rate],
+        Some("rate_dps"),
+    ),
+    entry(
+        "output_deadband",
+        rate_effects::output_deadband,
+        &[Need::Rate],
+        Some("rate_dps"),
+    ),
+    entry(
+        "output_saturation",
+        rate_effects::output_saturation,
+        &[Need::Rate],
+        Some("rate_dps"),
+    ),
+    entry(
+        "supply_sensitivity",
+        field_effects::supply_sensitivity,
+        &[Need::Supply],
+        Some("supply_v"),
+    ),
+    entry(
+        "g_sensitivity",
+        field_effects::g_sensitivity,
+        &[Need::Accel],
+        Some("accel_g"),
+    ),
+    entry(
+        "g_squared_sensitivity",
+        field_effects::g_squared_sensitivity,
+        &[Need::Accel],
+        Some("accel_g"),
+    ),
     entry("periodic_pickup", field_effects::periodic_pickup, &[], None),
-    entry("amplitude_phase_coupling", loop_effects::amplitude_phase_coupling, &[Need::Amplitude, Need::Phase, Need::Heat], Some("agc")),
+    entry(
+        "amplitude_phase_coupling",
+        loop_effects::amplitude_phase_coupling,
+        &[Need::Amplitude, Need::Phase, Need::Heat],
+        Some("agc"),
+    ),
 ];
 
 /// The entry of an id.
 pub fn of(id: &str) -> &'static Entry {
-    CATALOGUE.iter().find(|e| e.id == id).unwrap_or_else(|| panic!("no id {id}"))
+    CATALOGUE
+        .iter()
+        .find(|e| e.id == id)
+        .unwrap_or_else(|| panic!("no id {id}"))
 }
 
 /// A protocol that excites all `needs`; the rest is by chance.
@@ -81,17 +184,33 @@ pub fn protocol(needs: &[Need], rng: &mut Rng) -> Protocol {
     let has = |n: Need| needs.contains(&n);
     let by_chance = |rng: &mut Rng, n: Need, p: f64| has(n) || rng.odds(p);
     let long = rng.odds(0.08);
-    let rows = if long { rng.range(1500, 4000) } else { rng.range(150, 600) } as usize;
+    let rows = if long {
+        rng.range(1500, 4000)
+    } else {
+        rng.range(150, 600)
+    } as usize;
     let row_s = if long {
         rng.pick(&[1.0, 2.0, 5.0, 10.0])
     } else {
         rng.pick(&[1.0, 5.0, 10.0, 15.0, 20.0, 30.0, 30.0, 60.0, 60.0, 120.0])
     };
-    let chamber = if !has(Need::Heat) && rng.odds(0.15) { Chamber::Static } else { rng.pick(&CYCLING) };
+    let chamber = if !has(Need::Heat) && rng.odds(0.15) {
+        Chamber::Static
+    } else {
+        rng.pick(&CYCLING)
+    };
     let thermometer = if has(Need::Phase) {
         "phase_rad"
     } else {
-        rng.pick(&["phase_rad", "phase_rad", "freq_hz", "freq_hz", "die_degc", "die_degc", "chamber_degc"])
+        rng.pick(&[
+            "phase_rad",
+            "phase_rad",
+            "freq_hz",
+            "freq_hz",
+            "die_degc",
+            "die_degc",
+            "chamber_degc",
+        ])
     };
     let cycles = by_chance(rng, Need::Cycles, 0.1);
     let inner = [Inner::Steps, Inner::Wander, Inner::Slow];
@@ -107,22 +226,43 @@ pub fn protocol(needs: &[Need], rng: &mut Rng) -> Protocol {
         row_s,
         power_cycles: if cycles { rng.range(2, 4) as usize } else { 1 },
         rate: if rate {
-            rng.pick(&[RateProgram::Sequence, RateProgram::Sequence, RateProgram::Random, RateProgram::Sine])
+            rng.pick(&[
+                RateProgram::Sequence,
+                RateProgram::Sequence,
+                RateProgram::Random,
+                RateProgram::Sine,
+            ])
         } else {
             RateProgram::Rest
         },
         supply: if supply {
-            rng.pick(&[SupplyProgram::Steps, SupplyProgram::Sweep, SupplyProgram::Wander])
+            rng.pick(&[
+                SupplyProgram::Steps,
+                SupplyProgram::Sweep,
+                SupplyProgram::Wander,
+            ])
         } else {
             SupplyProgram::Constant
         },
         accel: if accel {
-            rng.pick(&[AccelProgram::Tumble, AccelProgram::Shaker, AccelProgram::Tilt])
+            rng.pick(&[
+                AccelProgram::Tumble,
+                AccelProgram::Shaker,
+                AccelProgram::Tilt,
+            ])
         } else {
             AccelProgram::Level
         },
-        amplitude: if amplitude { rng.pick(&inner) } else { Inner::Constant },
-        damping: if damping { rng.pick(&inner) } else { Inner::Constant },
+        amplitude: if amplitude {
+            rng.pick(&inner)
+        } else {
+            Inner::Constant
+        },
+        damping: if damping {
+            rng.pick(&inner)
+        } else {
+            Inner::Constant
+        },
         quadrature: if quadrature {
             rng.pick(&inner)
         } else {

@@ -72,7 +72,10 @@ fn legs(kind: Chamber, rng: &mut Rng) -> Vec<(f64, f64)> {
             for _ in 0..rng.range(2, 4) {
                 let d = rng.spread(1.0, 6.0);
                 out.extend([(d, 1.0), (rng.between(0.0, 0.5), 1.0)]);
-                out.extend([(d * rng.between(0.7, 1.4), 0.0), (rng.between(0.0, 0.5), 0.0)]);
+                out.extend([
+                    (d * rng.between(0.7, 1.4), 0.0),
+                    (rng.between(0.0, 0.5), 0.0),
+                ]);
             }
         }
         Chamber::Sawtooth => {
@@ -99,7 +102,11 @@ fn legs(kind: Chamber, rng: &mut Rng) -> Vec<(f64, f64)> {
             let bend = rng.between(0.0, 2.5);
             for k in 1..=40 {
                 let x = f64::from(k) / 40.0;
-                let to = if bend < 0.3 { x } else { (1.0 - (-bend * x).exp()) / (1.0 - (-bend).exp()) };
+                let to = if bend < 0.3 {
+                    x
+                } else {
+                    (1.0 - (-bend * x).exp()) / (1.0 - (-bend).exp())
+                };
                 out.push((1.0, to));
             }
         }
@@ -126,10 +133,20 @@ pub fn clock(kind: Chamber, n: usize, row_s: f64, cycles: usize, rng: &mut Rng) 
     let program = legs(kind, rng);
     let length: f64 = program.iter().map(|l| l.0).sum();
     let unit = sampled(&program, length, fine);
-    let steepest = unit.windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f64::max) / fine_s;
+    let steepest = unit
+        .windows(2)
+        .map(|w| (w[1] - w[0]).abs())
+        .fold(0.0, f64::max)
+        / fine_s;
     // Chambers manage 10 K/min; small boxes with a Peltier element somewhat more.
-    let wanted = if kind == Chamber::Static { rng.between(0.2, 1.5) } else { rng.between(25.0, 95.0) };
-    let span = wanted.min(rng.between(5.0, 12.0) / 60.0 / steepest).max(if kind == Chamber::Static { 0.1 } else { 10.0 });
+    let wanted = if kind == Chamber::Static {
+        rng.between(0.2, 1.5)
+    } else {
+        rng.between(25.0, 95.0)
+    };
+    let span = wanted
+        .min(rng.between(5.0, 12.0) / 60.0 / steepest)
+        .max(if kind == Chamber::Static { 0.1 } else { 10.0 });
     let low = rng.between(-40.0, 85.0 - span.min(100.0));
     let falls = kind == Chamber::CoolOnly || (CYCLING.contains(&kind) && rng.odds(0.3));
     let set: Vec<f64> = unit
@@ -164,7 +181,11 @@ fn sampled(program: &[(f64, f64)], length: f64, n: usize) -> Vec<f64> {
                 leg += 1;
             }
             let (duration, to) = program[leg];
-            let x = if duration > 0.0 { ((t - start) / duration).clamp(0.0, 1.0) } else { 1.0 };
+            let x = if duration > 0.0 {
+                ((t - start) / duration).clamp(0.0, 1.0)
+            } else {
+                1.0
+            };
             from + (to - from) * x
         })
         .collect()
@@ -191,7 +212,11 @@ fn power(n: usize, step_s: f64, cycles: usize, rng: &mut Rng) -> (Vec<f64>, Vec<
             rested = off as f64 * step_s;
         }
         let off_now = off_at != usize::MAX && k >= off_at && k < off_at + off;
-        on[k] = if off_now { f64::NAN } else { (k - origin) as f64 * step_s };
+        on[k] = if off_now {
+            f64::NAN
+        } else {
+            (k - origin) as f64 * step_s
+        };
         before[k] = rested;
     }
     (on, before)

@@ -96,7 +96,10 @@ fn mix(a: &[f64], b: &[f64], share: f64) -> Vec<f64> {
 /// The named column with its middle, range and read noise.
 fn dressed(k: usize, unit: &[f64], noise: f64, r: &mut Rng) -> Auxiliary {
     let (name, middle, half) = NAMES[k];
-    let values = unit.iter().map(|u| middle + half * (u + noise * r.gauss())).collect();
+    let values = unit
+        .iter()
+        .map(|u| middle + half * (u + noise * r.gauss()))
+        .collect();
     Auxiliary { name, values }
 }
 
@@ -106,9 +109,21 @@ pub fn cause(w: &World, r: &mut Rng) -> (Auxiliary, Plan) {
     let n = w.protocol.rows;
     let unit = movement(n, r);
     let shape = r.range(0, 4);
-    let delay_rows = if shape == 4 { r.between(1.0, 0.02 * n as f64) } else { 0.0 };
-    let felt = if delay_rows > 0.0 { lag_stepwise(&unit, 1.0, delay_rows) } else { unit.clone() };
-    let (vertex, waves, steep) = (r.between(-0.5, 0.5), r.between(0.5, 1.5), r.between(1.5, 4.0));
+    let delay_rows = if shape == 4 {
+        r.between(1.0, 0.02 * n as f64)
+    } else {
+        0.0
+    };
+    let felt = if delay_rows > 0.0 {
+        lag_stepwise(&unit, 1.0, delay_rows)
+    } else {
+        unit.clone()
+    };
+    let (vertex, waves, steep) = (
+        r.between(-0.5, 0.5),
+        r.between(0.5, 1.5),
+        r.between(1.5, 4.0),
+    );
     let law = |x: f64| match shape {
         0 | 4 => x,
         1 => (x - vertex).powi(2),
@@ -116,7 +131,12 @@ pub fn cause(w: &World, r: &mut Rng) -> (Auxiliary, Plan) {
         _ => (PI * waves * x + vertex).sin(),
     };
     let pick = |v: &[f64]| w.grid.iter().map(|k| v[*k]).collect::<Vec<f64>>();
-    let column = dressed(r.range(0, NAMES.len() as i64 - 1) as usize, &pick(&unit), 0.002, r);
+    let column = dressed(
+        r.range(0, NAMES.len() as i64 - 1) as usize,
+        &pick(&unit),
+        0.002,
+        r,
+    );
     let contribution = pick(&felt).iter().map(|x| law(*x)).collect();
     let plan = Plan::with(
         &format!("covariate:{}", column.name),

@@ -16,8 +16,11 @@ pub fn truth_json(t: &Truth) -> Value {
         .iter()
         .zip(&t.ratios)
         .map(|(p, ratio)| {
-            let parameters: serde_json::Map<String, Value> =
-                p.parameters.iter().map(|(k, v)| ((*k).to_owned(), json!(v))).collect();
+            let parameters: serde_json::Map<String, Value> = p
+                .parameters
+                .iter()
+                .map(|(k, v)| ((*k).to_owned(), json!(v)))
+                .collect();
             json!({"id": p.id, "ratio": ratio, "surviving": p.surviving, "parameters": parameters})
         })
         .collect();

@@ -35,8 +35,16 @@ pub fn periodic_pickup(w: &World, r: &mut Rng) -> Option<Plan> {
     let period_s = r.spread(shortest, longest);
     let spacing = super::chamber::PER_ROW;
     let even = w.clock.rows.windows(2).all(|p| p[1] - p[0] == spacing);
-    let order = if even { r.pick(&[0.0, 0.0, 1.0, 7.0]) } else { 0.0 };
+    let order = if even {
+        r.pick(&[0.0, 0.0, 1.0, 7.0])
+    } else {
+        0.0
+    };
     let f_hz = 1.0 / period_s + order / w.clock.row_s;
     let unit = w.sine(1.0 / f_hz, r.unit());
-    Some(Plan::with("periodic_pickup", Form::Linear(unit), &[("frequency_hz", f_hz), ("seen_period_s", period_s)]))
+    Some(Plan::with(
+        "periodic_pickup",
+        Form::Linear(unit),
+        &[("frequency_hz", f_hz), ("seen_period_s", period_s)],
+    ))
 }

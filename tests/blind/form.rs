@@ -94,7 +94,13 @@ fn clipped(sides: Sides, total: &[f64], s: f64) -> Vec<f64> {
 /// Puts a plan into the world with its orthogonal part at `target_rms` deg/s; `before` is the total
 /// output so far (a clip acts on it). `sign` is the sign of a linear effect. None where the effect
 /// cannot be that large.
-pub fn plant(w: &mut World, plan: Plan, target_rms: f64, sign: f64, before: &[f64]) -> Option<Planted> {
+pub fn plant(
+    w: &mut World,
+    plan: Plan,
+    target_rms: f64,
+    sign: f64,
+    before: &[f64],
+) -> Option<Planted> {
     let measure = |w: &World, c: &[f64], extra: Option<(&[f64], f64)>| {
         let mut p = w.reading();
         if let Some((unit, k)) = extra {
@@ -122,9 +128,10 @@ pub fn plant(w: &mut World, plan: Plan, target_rms: f64, sign: f64, before: &[f6
                     .collect()
             };
             let largest = sign * 0.3 / unit.iter().map(|u| u.abs()).fold(1e-12, f64::max);
-            let k = largest * reach(target_rms, |s| {
-                measure(w, &shift(s * largest), Some((&unit, s * largest)))
-            })?;
+            let k = largest
+                * reach(target_rms, |s| {
+                    measure(w, &shift(s * largest), Some((&unit, s * largest)))
+                })?;
             let c = shift(k);
             w.pull.iter_mut().zip(&unit).for_each(|(a, b)| *a += k * b);
             parameters.push(("pull_rad", k));

@@ -9,7 +9,11 @@ use super::world::World;
 
 /// A temperature that lags the thermometer's by `tau_s`, on the rows, degC.
 pub fn lagged(w: &World, tau_s: f64, smooth: bool) -> Vec<f64> {
-    let f = if smooth { lag_runge_kutta } else { lag_stepwise };
+    let f = if smooth {
+        lag_runge_kutta
+    } else {
+        lag_stepwise
+    };
     w.rows_of(&f(&w.heat_degc, w.clock.fine_s, tau_s))
 }
 
@@ -30,9 +34,16 @@ pub fn thermal_lag(w: &World, r: &mut Rng) -> Option<Plan> {
         let (mid, half) = (0.5 * (low + high), 0.5 * (high - low));
         let [_, b, c] = w.bias_dps;
         let curve = |t: f64| (b + c * (t - mid) / half) * (t - mid) / half;
-        late.iter().zip(&w.temp_degc).map(|(l, t)| curve(*l) - curve(*t)).collect()
+        late.iter()
+            .zip(&w.temp_degc)
+            .map(|(l, t)| curve(*l) - curve(*t))
+            .collect()
     };
-    Some(Plan::with("thermal_lag", Form::Linear(unit), &[("tau_s", tau_s)]))
+    Some(Plan::with(
+        "thermal_lag",
+        Form::Linear(unit),
+        &[("tau_s", tau_s)],
+    ))
 }
 
 /// k dT/dt: a gradient across the die bends it. K/s.
@@ -54,11 +65,19 @@ pub fn warmup_transient(w: &World, r: &mut Rng) -> Option<Plan> {
     let unit = (0..w.len())
         .map(|k| {
             let rest = w.clock.off_before_s[w.at[k]];
-            let start = if partly { 1.0 - (-4.0 * rest / tau_s).exp() } else { 1.0 };
+            let start = if partly {
+                1.0 - (-4.0 * rest / tau_s).exp()
+            } else {
+                1.0
+            };
             start * (-w.on_s[k] / tau_s).exp()
         })
         .collect();
-    Some(Plan::with("warmup_transient", Form::Linear(unit), &[("tau_s", tau_s)]))
+    Some(Plan::with(
+        "warmup_transient",
+        Form::Linear(unit),
+        &[("tau_s", tau_s)],
+    ))
 }
 
 /// t, or ln(1 + t / t0): creep and settling of stress.
@@ -70,14 +89,25 @@ pub fn ageing_drift(w: &World, r: &mut Rng) -> Option<Plan> {
         let t0 = all * r.spread(0.02, 1.0);
         (w.time_s.iter().map(|t| (t / t0).ln_1p()).collect(), t0)
     };
-    Some(Plan::with("ageing_drift", Form::Linear(unit), &[("t0_s", t0)]))
+    Some(Plan::with(
+        "ageing_drift",
+        Form::Linear(unit),
+        &[("t0_s", t0)],
+    ))
 }
 
 /// (u - u0)^3 in the thermometer reading u, scaled to -1..1.
 pub fn bias_third_order(w: &World, r: &mut Rng) -> Option<Plan> {
     let from = r.between(-0.3, 0.3);
-    let unit = centred(&w.reading()).iter().map(|u| (u - from).powi(3)).collect();
-    Some(Plan::with("bias_third_order", Form::Linear(unit), &[("centre", from)]))
+    let unit = centred(&w.reading())
+        .iter()
+        .map(|u| (u - from).powi(3))
+        .collect();
+    Some(Plan::with(
+        "bias_third_order",
+        Form::Linear(unit),
+        &[("centre", from)],
+    ))
 }
 
 /// Where a parasitic mode's frequency crosses the drive's: energy goes to it as 1 / (1 + x^2), or the drive is
@@ -88,9 +118,17 @@ pub fn mode_crossing(w: &World, r: &mut Rng) -> Option<Plan> {
     let width = (high - low) * r.between(0.02, 0.12);
     let turn = r.pick(&[0.0, 0.0, 1.0, 0.5]);
     let unit: Vec<f64> = crossing(&w.temp_degc, centre, width, turn);
-    let touched = w.temp_degc.iter().filter(|t| (*t - centre).abs() < width).count();
+    let touched = w
+        .temp_degc
+        .iter()
+        .filter(|t| (*t - centre).abs() < width)
+        .count();
     // Fewer rows are outliers to anybody.
-    let parameters = [("centre_degc", centre), ("width_k", width), ("dispersive", turn)];
+    let parameters = [
+        ("centre_degc", centre),
+        ("width_k", width),
+        ("dispersive", turn),
+    ];
     (touched >= 12).then(|| Plan::with("mode_crossing", Form::Linear(unit), &parameters))
 }
 
@@ -124,11 +162,19 @@ pub fn step(heat: &[f64], centre: f64, gap: f64, once: bool) -> Vec<f64> {
 pub fn stress_jump(w: &World, r: &mut Rng) -> Option<Plan> {
     let (low, high) = range(&w.temp_degc);
     let centre = low + (high - low) * r.between(0.2, 0.8);
-    let gap = if r.odds(0.5) { 0.0 } else { r.between(0.03, 0.25) * (high - low) };
+    let gap = if r.odds(0.5) {
+        0.0
+    } else {
+        r.between(0.03, 0.25) * (high - low)
+    };
     let once = r.odds(0.12);
     let unit = w.rows_of(&step(&w.heat_degc, centre, gap, once));
     let above = unit.iter().sum::<f64>() / unit.len() as f64;
-    let parameters = [("centre_degc", centre), ("gap_k", gap), ("once", f64::from(u8::from(once)))];
+    let parameters = [
+        ("centre_degc", centre),
+        ("gap_k", gap),
+        ("once", f64::from(u8::from(once))),
+    ];
     (0.08..=0.92)
         .contains(&above)
         .then(|| Plan::with("stress_jump", Form::Linear(unit), &parameters))

@@ -94,12 +94,22 @@ pub struct Scenario {
 impl Scenario {
     /// Effects and sizes as the seed will have it.
     pub fn drawn(class: Class, seed: u64) -> Self {
-        Self { seed, class, effects: Vec::new(), ratio: None }
+        Self {
+            seed,
+            class,
+            effects: Vec::new(),
+            ratio: None,
+        }
     }
 
     /// One given effect.
     pub fn single(id: &'static str, seed: u64) -> Self {
-        Self { seed, class: Class::Single, effects: vec![id], ratio: None }
+        Self {
+            seed,
+            class: Class::Single,
+            effects: vec![id],
+            ratio: None,
+        }
     }
 }
 

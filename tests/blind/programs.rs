@@ -109,7 +109,11 @@ pub fn rate(program: RateProgram, n: usize, rng: &mut Rng) -> Vec<f64> {
         }
         RateProgram::Random => random_levels(n, rng, |r| {
             // Many small rates: a dead band shows only there.
-            if r.odds(0.2) { 0.0 } else { top * r.signed_unit().powi(3) }
+            if r.odds(0.2) {
+                0.0
+            } else {
+                top * r.signed_unit().powi(3)
+            }
         }),
         RateProgram::Sine => {
             let (turns, lead) = (rng.between(5.3, 20.0), rng.unit());
@@ -128,7 +132,11 @@ pub fn supply(program: SupplyProgram, n: usize, rng: &mut Rng) -> Vec<f64> {
     let unit: Vec<f64> = match program {
         SupplyProgram::Constant => vec![0.0; n],
         SupplyProgram::Steps => {
-            let levels = rng.pick(&[&[-1.0, 0.0, 1.0][..], &[0.0, 1.0][..], &[-1.0, -0.5, 0.0, 0.5, 1.0, 0.0][..]]);
+            let levels = rng.pick(&[
+                &[-1.0, 0.0, 1.0][..],
+                &[0.0, 1.0][..],
+                &[-1.0, -0.5, 0.0, 0.5, 1.0, 0.0][..],
+            ]);
             let rounds = rng.range(2, 6) as usize;
             held(levels, n / (rounds * levels.len()), n, rng)
         }
@@ -151,7 +159,9 @@ pub fn accel(program: AccelProgram, n: usize, rng: &mut Rng) -> Vec<f64> {
         AccelProgram::Tumble => {
             let levels = rng.pick(&[
                 &[1.0, 0.0, -1.0, 0.0][..],
-                &[0.0, 0.5, 0.866, 1.0, 0.866, 0.5, 0.0, -0.5, -0.866, -1.0, -0.866, -0.5][..],
+                &[
+                    0.0, 0.5, 0.866, 1.0, 0.866, 0.5, 0.0, -0.5, -0.866, -1.0, -0.866, -0.5,
+                ][..],
                 &[1.0, -1.0, 0.0][..],
             ]);
             let rounds = rng.range(2, 8) as usize;
@@ -159,7 +169,13 @@ pub fn accel(program: AccelProgram, n: usize, rng: &mut Rng) -> Vec<f64> {
         }
         AccelProgram::Shaker => {
             let top = rng.between(1.5, 12.0);
-            random_levels(n, rng, |r| if r.odds(0.3) { 0.0 } else { top * r.signed_unit() })
+            random_levels(n, rng, |r| {
+                if r.odds(0.3) {
+                    0.0
+                } else {
+                    top * r.signed_unit()
+                }
+            })
         }
         AccelProgram::TwoLevels => held(&[0.0, 1.0], n.div_ceil(9), n, rng),
         AccelProgram::Tilt => {
@@ -177,7 +193,9 @@ pub fn inner(program: Inner, n: usize, warmth: &[f64], rng: &mut Rng) -> Vec<f64
         Inner::Constant => vec![0.0; n],
         Inner::Steps => {
             let m = rng.range(2, 5) as usize;
-            let levels: Vec<f64> = (0..m).map(|k| 2.0 * k as f64 / (m - 1) as f64 - 1.0).collect();
+            let levels: Vec<f64> = (0..m)
+                .map(|k| 2.0 * k as f64 / (m - 1) as f64 - 1.0)
+                .collect();
             let rounds = rng.range(2, 7) as usize;
             held(&levels, n / (rounds * m), n, rng)
         }

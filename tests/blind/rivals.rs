@@ -4,9 +4,9 @@
 
 use super::catalogue::CATALOGUE;
 use super::covariates::Auxiliary;
+use super::form::{Sides, limits};
 use super::heat::slope;
 use super::heat_effects::{crossing, lagged, step};
-use super::form::{Sides, limits};
 use super::linear::{Span, centred, correlation, range};
 use super::rate_effects::dead_zone;
 use super::world::{T0_DEGC, World};
@@ -17,26 +17,35 @@ type Shape = Vec<Vec<f64>>;
 /// Log-spaced numbers.
 fn spaced(low: f64, high: f64, n: usize) -> Vec<f64> {
     let ratio = (high / low).max(1.0);
-    (0..n).map(|k| low * ratio.powf(k as f64 / (n - 1) as f64)).collect()
+    (0..n)
+        .map(|k| low * ratio.powf(k as f64 / (n - 1) as f64))
+        .collect()
 }
 
 /// All shapes of an id; empty where the record has not its channel.
 fn shapes(id: &str, w: &World, channels: &[&str]) -> Vec<Shape> {
     let entry = super::catalogue::of(id);
     let has_clock = id == "warmup_transient";
-    if entry.channel.is_some_and(|c| !has_clock && !channels.contains(&c)) {
+    if entry
+        .channel
+        .is_some_and(|c| !has_clock && !channels.contains(&c))
+    {
         return Vec::new();
     }
     let one = |v: Vec<f64>| vec![vec![v]];
     let row_s = w.clock.row_s;
     match id {
-        "thermal_lag" => spaced(row_s.max(30.0), (w.length_s() / 3.0).min(2000.0).max(2.0 * row_s), 14)
-            .into_iter()
-            .map(|tau| {
-                let late = lagged(w, tau, false);
-                vec![late.iter().zip(&w.temp_degc).map(|(l, t)| l - t).collect()]
-            })
-            .collect(),
+        "thermal_lag" => spaced(
+            row_s.max(30.0),
+            (w.length_s() / 3.0).min(2000.0).max(2.0 * row_s),
+            14,
+        )
+        .into_iter()
+        .map(|tau| {
+            let late = lagged(w, tau, false);
+            vec![late.iter().zip(&w.temp_degc).map(|(l, t)| l - t).collect()]
+        })
+        .collect(),
         "temperature_rate" => one(w.rows_of(&slope(&w.heat_degc, w.clock.fine_s))),
         "warmup_transient" => warmups(w, channels.contains(&"time_since_power_on_s")),
         "ageing_drift" => {
@@ -69,10 +78,14 @@ fn product(a: &[f64], b: &[f64], b0: f64) -> Vec<f64> {
 /// Exponentials since power-on, or since the start where the record does not know of power-ons.
 fn warmups(w: &World, known: bool) -> Vec<Shape> {
     let since = if known { &w.on_s } else { &w.time_s };
-    spaced((2.0 * w.clock.row_s).max(30.0), (w.length_s() / 2.0).min(4000.0), 14)
-        .into_iter()
-        .map(|tau| vec![since.iter().map(|t| (-t / tau).exp()).collect()])
-        .collect()
+    spaced(
+        (2.0 * w.clock.row_s).max(30.0),
+        (w.length_s() / 2.0).min(4000.0),
+        14,
+    )
+    .into_iter()
+    .map(|tau| vec![since.iter().map(|t| (-t / tau).exp()).collect()])
+    .collect()
 }
 
 /// Absorptive and dispersive resonances over the range of temperature.
@@ -81,8 +94,14 @@ fn crossings(w: &World) -> Vec<Shape> {
     let mut all = Vec::new();
     for k in 1..16 {
         for width in [0.02, 0.04, 0.08, 0.12] {
-            let (c, s) = (low + (high - low) * f64::from(k) / 16.0, width * (high - low));
-            all.push(vec![crossing(&w.temp_degc, c, s, 0.0), crossing(&w.temp_degc, c, s, 1.0)]);
+            let (c, s) = (
+                low + (high - low) * f64::from(k) / 16.0,
+                width * (high - low),
+            );
+            all.push(vec![
+                crossing(&w.temp_degc, c, s, 0.0),
+                crossing(&w.temp_degc, c, s, 1.0),
+            ]);
         }
     }
     all
@@ -95,7 +114,12 @@ fn jumps(w: &World) -> Vec<Shape> {
     for k in 2..23 {
         for gap in [0.0, 0.05, 0.12, 0.25] {
             let c = low + (high - low) * f64::from(k) / 24.0;
-            all.push(vec![w.rows_of(&step(&w.heat_degc, c, gap * (high - low), false))]);
+            all.push(vec![w.rows_of(&step(
+                &w.heat_degc,
+                c,
+                gap * (high - low),
+                false,
+            ))]);
         }
     }
     all
@@ -106,9 +130,18 @@ fn coupling(w: &World) -> Vec<Shape> {
     if w.protocol.thermometer != "phase_rad" {
         return Vec::new();
     }
-    let u: Vec<f64> = w.reading().iter().map(|p| (p - w.middle) / w.half).collect();
+    let u: Vec<f64> = w
+        .reading()
+        .iter()
+        .map(|p| (p - w.middle) / w.half)
+        .collect();
     let slope = |u: &f64| w.bias_dps[1] + 2.0 * w.bias_dps[2] * u;
-    vec![vec![u.iter().zip(&w.agc).map(|(u, g)| slope(u) * (g - 1.0)).collect()]]
+    vec![vec![
+        u.iter()
+            .zip(&w.agc)
+            .map(|(u, g)| slope(u) * (g - 1.0))
+            .collect(),
+    ]]
 }
 
 /// Sine and cosine at three to a hundred turns over the run.

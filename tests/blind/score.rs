@@ -31,8 +31,12 @@ pub fn read(v: &Value) -> Answer {
         Some(steps) => {
             for s in steps {
                 let like = s["indistinguishable_from"].as_array();
-                let like: Vec<String> =
-                    like.into_iter().flatten().filter_map(Value::as_str).map(str::to_owned).collect();
+                let like: Vec<String> = like
+                    .into_iter()
+                    .flatten()
+                    .filter_map(Value::as_str)
+                    .map(str::to_owned)
+                    .collect();
                 if like.len() > 4 {
                     broken.push("more than four indistinguishable".to_owned());
                 }
@@ -47,7 +51,9 @@ pub fn read(v: &Value) -> Answer {
         Some(left) => a.left = left,
         None => broken.push("no residual_structure.left".to_owned()),
     }
-    a.strongest_channel = v["residual_structure"]["strongest_channel"].as_str().map(str::to_owned);
+    a.strongest_channel = v["residual_structure"]["strongest_channel"]
+        .as_str()
+        .map(str::to_owned);
     a.before_rms = v["before"]["heldout_rms"].as_f64();
     a.after_rms = v["after"]["heldout_rms"].as_f64();
     a.firmware_rms = v["firmware"]["heldout_rms"].as_f64();
@@ -109,20 +115,34 @@ impl Mark {
 
 /// True if the step names `id`, or lists it while the two are in fact inseparable in this record.
 fn hits(step: &(String, Vec<String>), id: &str, truth: &Truth) -> bool {
-    let same = |other: &str| truth.alternatives.iter().any(|(p, o, _)| p == id && o == other);
+    let same = |other: &str| {
+        truth
+            .alternatives
+            .iter()
+            .any(|(p, o, _)| p == id && o == other)
+    };
     step.0 == id || (same(&step.0) && step.1.iter().any(|l| l == id))
 }
 
 /// Names against truth, without figures.
 fn mark(a: &Answer, truth: &Truth) -> Mark {
     let wanted = &truth.effects;
-    let found = wanted.iter().filter(|id| a.steps.iter().any(|s| hits(s, id, truth))).count();
-    let rightly = a.steps.iter().filter(|s| wanted.iter().any(|id| hits(s, id, truth))).count();
+    let found = wanted
+        .iter()
+        .filter(|id| a.steps.iter().any(|s| hits(s, id, truth)))
+        .count();
+    let rightly = a
+        .steps
+        .iter()
+        .filter(|s| wanted.iter().any(|id| hits(s, id, truth)))
+        .count();
     let listed = |id: &String| a.steps.iter().any(|s| s.0 == *id || s.1.contains(id));
     let right = match truth.class {
-        Class::Single | Class::Faint | Class::Covariate => {
-            Some(a.steps.first().is_some_and(|s| wanted.iter().any(|id| hits(s, id, truth))))
-        }
+        Class::Single | Class::Faint | Class::Covariate => Some(
+            a.steps
+                .first()
+                .is_some_and(|s| wanted.iter().any(|id| hits(s, id, truth))),
+        ),
         // More than four alternatives: the record decides nothing, and saying so is right.
         Class::Confounded => {
             let many = truth.alternatives.len() > 4 && a.steps.is_empty() && a.left;
@@ -130,13 +150,28 @@ fn mark(a: &Answer, truth: &Truth) -> Mark {
         }
         _ => None,
     };
-    let nothing = matches!(truth.class, Class::None | Class::NoiseOnly | Class::HiddenChannel | Class::Unexcited);
+    let nothing = matches!(
+        truth.class,
+        Class::None | Class::NoiseOnly | Class::HiddenChannel | Class::Unexcited
+    );
     let outside = truth.class == Class::Outside;
-    let channel = truth.outside_channel.is_none_or(|c| a.strongest_channel.as_deref() == Some(c));
+    let channel = truth
+        .outside_channel
+        .is_none_or(|c| a.strongest_channel.as_deref() == Some(c));
     Mark {
         class: truth.class,
-        planted: truth.planted.iter().map(|p| p.id.as_str()).collect::<Vec<_>>().join("+"),
-        answered: a.steps.iter().map(|s| s.0.as_str()).collect::<Vec<_>>().join("+"),
+        planted: truth
+            .planted
+            .iter()
+            .map(|p| p.id.as_str())
+            .collect::<Vec<_>>()
+            .join("+"),
+        answered: a
+            .steps
+            .iter()
+            .map(|s| s.0.as_str())
+            .collect::<Vec<_>>()
+            .join("+"),
         violations: a.violations.clone(),
         right,
         wanted: wanted.len(),
@@ -161,7 +196,11 @@ pub fn score(record: &BlindRecord, answer: &Value, heldout: &[bool]) -> Mark {
         let oracle = oracle_rms(record, heldout);
         m.over_oracle = a.after_rms.map(|x| x / oracle);
     } else if !heldout.is_empty() {
-        m.violations.push(format!("{} held-out marks for {} rows", heldout.len(), record.truth.reading.len()));
+        m.violations.push(format!(
+            "{} held-out marks for {} rows",
+            heldout.len(),
+            record.truth.reading.len()
+        ));
     }
     m.after_over_before = a.after_rms.zip(a.before_rms).map(|(x, y)| x / y);
     m.firmware_over_float = a.firmware_rms.zip(a.after_rms).map(|(x, y)| x / y);
@@ -171,8 +210,13 @@ pub fn score(record: &BlindRecord, answer: &Value, heldout: &[bool]) -> Mark {
 /// A column of the CSV; NaN where empty or `nan`. Empty if there is no such column.
 pub fn column(csv: &str, name: &str) -> Vec<f64> {
     let mut lines = csv.lines().filter(|l| !l.starts_with('#'));
-    let at = lines.next().and_then(|h| h.split(',').position(|n| n == name));
-    let cell = |l: &str| at.and_then(|k| l.split(',').nth(k)).and_then(|c| c.parse().ok());
+    let at = lines
+        .next()
+        .and_then(|h| h.split(',').position(|n| n == name));
+    let cell = |l: &str| {
+        at.and_then(|k| l.split(',').nth(k))
+            .and_then(|c| c.parse().ok())
+    };
     match at {
         Some(_) => lines.map(|l| cell(l).unwrap_or(f64::NAN)).collect(),
         None => Vec::new(),
@@ -183,22 +227,41 @@ pub fn column(csv: &str, name: &str) -> Vec<f64> {
 /// other rows without the outliers (which it knows), judged on all held-out rows that have an output.
 pub fn oracle_rms(record: &BlindRecord, heldout: &[bool]) -> f64 {
     let (residual, _) = oracle_residual(record, |k| !heldout[k]);
-    rms(&(0..heldout.len()).filter(|k| heldout[*k]).map(|k| residual[k]).filter(|r| r.is_finite()).collect::<Vec<_>>())
+    rms(&(0..heldout.len())
+        .filter(|k| heldout[*k])
+        .map(|k| residual[k])
+        .filter(|r| r.is_finite())
+        .collect::<Vec<_>>())
 }
 
 /// The oracle's residual on every row (NaN where not measured) and its coefficients (1, u, u^2, effects), fitted on the rows
 /// that `train` keeps.
-pub fn oracle_residual(record: &BlindRecord, train: impl Fn(usize) -> bool) -> (Vec<f64>, Vec<f64>) {
+pub fn oracle_residual(
+    record: &BlindRecord,
+    train: impl Fn(usize) -> bool,
+) -> (Vec<f64>, Vec<f64>) {
     let t = &record.truth;
     let out = column(&record.csv, "rate_out_dps");
     let rate = column(&record.csv, "rate_dps");
     let p = column(&record.csv, t.thermometer);
-    let p: Vec<f64> = p.iter().zip(&t.reading).map(|(m, r)| if m.is_nan() { *r } else { *m }).collect();
-    let error: Vec<f64> = (0..out.len()).map(|k| out[k] - rate.get(k).copied().unwrap_or(0.0)).collect();
+    let p: Vec<f64> = p
+        .iter()
+        .zip(&t.reading)
+        .map(|(m, r)| if m.is_nan() { *r } else { *m })
+        .collect();
+    let error: Vec<f64> = (0..out.len())
+        .map(|k| out[k] - rate.get(k).copied().unwrap_or(0.0))
+        .collect();
     let u = super::linear::centred(&p);
-    let mut columns = vec![vec![1.0; u.len()], u.clone(), u.iter().map(|x| x * x).collect()];
+    let mut columns = vec![
+        vec![1.0; u.len()],
+        u.clone(),
+        u.iter().map(|x| x * x).collect(),
+    ];
     columns.extend(t.oracle.iter().cloned());
-    let rows: Vec<usize> = (0..error.len()).filter(|k| train(*k) && !t.outlier[*k] && error[*k].is_finite()).collect();
+    let rows: Vec<usize> = (0..error.len())
+        .filter(|k| train(*k) && !t.outlier[*k] && error[*k].is_finite())
+        .collect();
     let on_rows = |v: &[f64]| rows.iter().map(|k| v[*k]).collect::<Vec<f64>>();
     let picked: Vec<Vec<f64>> = columns.iter().map(|c| on_rows(c)).collect();
     let k = least_squares(&picked, &on_rows(&error));

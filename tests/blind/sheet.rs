@@ -40,7 +40,11 @@ fn truth_of<'a>(w: &'a World, name: &str) -> &'a [f64] {
 /// the output, other channels by a few thousandths of what of them is orthogonal to the declared model.
 fn reading(w: &World, name: &str, r: &mut Rng) -> Column {
     let is_thermometer = name == w.protocol.thermometer;
-    let values = if is_thermometer { w.reading() } else { truth_of(w, name).to_vec() };
+    let values = if is_thermometer {
+        w.reading()
+    } else {
+        truth_of(w, name).to_vec()
+    };
     let noise = match name {
         "rate_dps" => 0.0,
         "time_since_power_on_s" => 0.0,
@@ -49,7 +53,12 @@ fn reading(w: &World, name: &str, r: &mut Rng) -> Column {
         _ => {
             let free = rms(&Span::declared(&w.reading()).residual(&values));
             let typical = rms(&values).max(1e-3);
-            r.between(0.001, 0.004) * free.max(if free < 1e-6 * typical { 0.01 * typical } else { 0.0 })
+            r.between(0.001, 0.004)
+                * free.max(if free < 1e-6 * typical {
+                    0.01 * typical
+                } else {
+                    0.0
+                })
         }
     };
     let digits = match name {
@@ -65,18 +74,36 @@ fn reading(w: &World, name: &str, r: &mut Rng) -> Column {
 }
 
 /// The text of the record. `output_dps` is the column `rate_out_dps`.
-pub fn csv(w: &World, channels: &[&str], auxiliaries: &[Auxiliary], output_dps: &[f64], r: &mut Rng) -> String {
+pub fn csv(
+    w: &World,
+    channels: &[&str],
+    auxiliaries: &[Auxiliary],
+    output_dps: &[f64],
+    r: &mut Rng,
+) -> String {
     let mut columns: Vec<Column> = channels.iter().map(|name| reading(w, name, r)).collect();
     for a in auxiliaries {
         let step = 0.003 * deviation(&a.values);
-        columns.push(Column { name: a.name.to_owned(), values: a.values.clone(), decimals: decimals(step) });
+        columns.push(Column {
+            name: a.name.to_owned(),
+            values: a.values.clone(),
+            decimals: decimals(step),
+        });
     }
     r.shuffle(&mut columns);
     columns.insert(
         r.range(0, columns.len() as i64) as usize,
-        Column { name: "rate_out_dps".to_owned(), values: output_dps.to_vec(), decimals: decimals(0.1 * w.sigma_dps) },
+        Column {
+            name: "rate_out_dps".to_owned(),
+            values: output_dps.to_vec(),
+            decimals: decimals(0.1 * w.sigma_dps),
+        },
     );
-    let holes = if r.odds(0.15) { r.between(0.001, 0.01) } else { 0.0 };
+    let holes = if r.odds(0.15) {
+        r.between(0.001, 0.01)
+    } else {
+        0.0
+    };
     let blank = r.pick(&["", "nan"]);
     let mut text = String::new();
     if r.odds(0.3) {

@@ -95,7 +95,8 @@ pub fn table(marks: &[Mark]) -> String {
          | over oracle median | p90 | worse than before | firmware/float worst | violations |\n\
          |---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
-    let show = |v: Option<f64>, digits: usize| v.map_or("-".to_owned(), |x| format!("{x:.digits$}"));
+    let show =
+        |v: Option<f64>, digits: usize| v.map_or("-".to_owned(), |x| format!("{x:.digits$}"));
     for class in CLASSES {
         let these = of_class(marks, class);
         if these.is_empty() {
@@ -129,19 +130,34 @@ pub fn confusion(marks: &[Mark]) -> String {
         let row = rows.entry((m.class, m.planted.as_str())).or_default();
         row.0 += 1;
         let nothing = m.wanted == 0 && !m.false_discovery && !m.confident_wrong;
-        let right = m.right.unwrap_or(nothing || (m.wanted > 0 && m.found == m.wanted && m.named == m.rightly));
+        let right = m
+            .right
+            .unwrap_or(nothing || (m.wanted > 0 && m.found == m.wanted && m.named == m.rightly));
         if right {
             row.1 += 1;
         } else {
-            let said = if m.answered.is_empty() { "(nothing)" } else { m.answered.as_str() };
+            let said = if m.answered.is_empty() {
+                "(nothing)"
+            } else {
+                m.answered.as_str()
+            };
             *row.2.entry(said).or_default() += 1;
         }
     }
-    let mut text = String::from("| class | planted | records | right | instead |\n|---|---|---|---|---|\n");
+    let mut text =
+        String::from("| class | planted | records | right | instead |\n|---|---|---|---|---|\n");
     for ((class, planted), (all, right, instead)) in rows {
-        let planted = if planted.is_empty() { "(nothing)" } else { planted };
+        let planted = if planted.is_empty() {
+            "(nothing)"
+        } else {
+            planted
+        };
         let said: Vec<String> = instead.iter().map(|(k, n)| format!("{k} x{n}")).collect();
-        let _ = writeln!(text, "| {class:?} | {planted} | {all} | {right} | {} |", said.join(", "));
+        let _ = writeln!(
+            text,
+            "| {class:?} | {planted} | {all} | {right} | {} |",
+            said.join(", ")
+        );
     }
     text
 }

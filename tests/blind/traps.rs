@@ -14,7 +14,13 @@ pub fn confounded(rng: &mut Rng) -> (&'static str, Protocol) {
             // Temperature and time rise together.
             p.chamber = rng.pick(&[Chamber::HeatOnly, Chamber::HeatOnly, Chamber::CoolOnly]);
             p.power_cycles = 1;
-            rng.pick(&["thermal_lag", "temperature_rate", "warmup_transient", "ageing_drift", "bias_third_order"])
+            rng.pick(&[
+                "thermal_lag",
+                "temperature_rate",
+                "warmup_transient",
+                "ageing_drift",
+                "bias_third_order",
+            ])
         }
         2 => {
             // Rest and one rate: any law of the rate is one number.
@@ -37,7 +43,11 @@ pub fn confounded(rng: &mut Rng) -> (&'static str, Protocol) {
         }
         _ => {
             p.quadrature = Inner::OfTemperature;
-            rng.pick(&["demod_phase_drift", "quadrature_leakage", "bias_third_order"])
+            rng.pick(&[
+                "demod_phase_drift",
+                "quadrature_leakage",
+                "bias_third_order",
+            ])
         }
     };
     (id, p)

@@ -50,7 +50,11 @@ impl Drive {
             f0_hz: rng.spread(1.7e3, 2.5e4),
             q: rng.between(30.0, 120.0),
             kappa_per_k: rng.between(2e-5, 7e-5),
-            electronics_rad_per_k: if rng.odds(0.5) { -rng.between(1e-4, 6.5e-3) } else { 0.0 },
+            electronics_rad_per_k: if rng.odds(0.5) {
+                -rng.between(1e-4, 6.5e-3)
+            } else {
+                0.0
+            },
             gamma: rng.pick(&[0.0, 0.5, 0.7, 1.5, 4.0]),
         }
     }
@@ -118,7 +122,13 @@ impl World {
     /// Runs the protocol.
     pub fn run(protocol: Protocol, rng: &mut Rng) -> Self {
         let n = protocol.rows;
-        let clock = clock(protocol.chamber, n, protocol.row_s, protocol.power_cycles, rng);
+        let clock = clock(
+            protocol.chamber,
+            n,
+            protocol.row_s,
+            protocol.power_cycles,
+            rng,
+        );
         let drive = Drive::draw(rng);
         let length_s = n as f64 * protocol.row_s;
         let tau_s = rng.spread(60.0, 400.0).min(length_s / 15.0);
@@ -148,7 +158,11 @@ impl World {
             .collect();
         let quad_middle = rng.sign() * rng.spread(20.0, 500.0);
         let quad_swing = quad_middle * rng.between(0.05, 0.5);
-        let quad_slope = if rng.odds(0.5) { 0.1 * quad_middle * rng.signed_unit() } else { 0.0 };
+        let quad_slope = if rng.odds(0.5) {
+            0.1 * quad_middle * rng.signed_unit()
+        } else {
+            0.0
+        };
         let quad_dps = pick(programs::inner(protocol.quadrature, n, &warmth, rng))
             .iter()
             .zip(pick(warmth.clone()))
@@ -162,8 +176,17 @@ impl World {
             _ => temp.clone(),
         };
         let (low, high) = range(&p);
-        let drift = rng.spread(2.0, 80.0) * if protocol.chamber == Chamber::Static { 0.02 } else { 1.0 };
-        let bias_dps = [rng.between(-60.0, 60.0), rng.sign() * drift, rng.between(-0.45, 0.45) * drift];
+        let drift = rng.spread(2.0, 80.0)
+            * if protocol.chamber == Chamber::Static {
+                0.02
+            } else {
+                1.0
+            };
+        let bias_dps = [
+            rng.between(-60.0, 60.0),
+            rng.sign() * drift,
+            rng.between(-0.45, 0.45) * drift,
+        ];
         Self {
             time_s: at.iter().map(|k| *k as f64 * clock.fine_s).collect(),
             on_s: take(&clock.on_s),
@@ -174,7 +197,11 @@ impl World {
             rate_dps: pick(programs::rate(protocol.rate, n, rng)),
             supply_v: pick(programs::supply(protocol.supply, n, rng)),
             accel_g: pick(programs::accel(protocol.accel, n, rng)),
-            agc: amplitude.iter().zip(&relative_q).map(|(a, q)| a / q).collect(),
+            agc: amplitude
+                .iter()
+                .zip(&relative_q)
+                .map(|(a, q)| a / q)
+                .collect(),
             amplitude,
             relative_q,
             quad_dps,
@@ -239,12 +266,20 @@ impl World {
 
 /// The regular rows that are there: powered, not in a gap; some twice.
 fn present(clock: &Clock, n: usize, rng: &mut Rng) -> Vec<usize> {
-    let mut there: Vec<bool> = clock.rows.iter().map(|k| !clock.on_s[*k].is_nan()).collect();
+    let mut there: Vec<bool> = clock
+        .rows
+        .iter()
+        .map(|k| !clock.on_s[*k].is_nan())
+        .collect();
     if rng.odds(0.25) {
         for _ in 0..rng.range(1, 4) {
             let start = rng.range(0, n as i64 - 1) as usize;
             let length = rng.range(1, (n as i64 / 20).max(2)) as usize;
-            there.iter_mut().skip(start).take(length).for_each(|t| *t = false);
+            there
+                .iter_mut()
+                .skip(start)
+                .take(length)
+                .for_each(|t| *t = false);
         }
     }
     let twice = rng.odds(0.1);
