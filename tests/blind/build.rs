@@ -41,16 +41,31 @@ fn cast(s: &Scenario, rng: &mut Rng) -> Cast {
         .then(|| &OUTSIDERS[rng.range(0, OUTSIDERS.len() as i64 - 1) as usize]);
     let mut needs: Vec<Need> = known.iter().flat_map(|e| e.needs).copied().collect();
     needs.extend(outsider.iter().flat_map(|o| o.needs));
+    if known.iter().any(|e| e.id == "output_saturation") && rng.odds(0.3) {
+        // Clipped by its bias alone.
+        needs.retain(|n| *n != Need::Rate || known.len() > 1);
+    }
     let protocol = match s.class {
-        Class::Confounded | Class::Unexcited => {
-            let f = if s.class == Class::Confounded {
-                traps::confounded
-            } else {
-                traps::unexcited
-            };
-            let (id, protocol) = f(rng);
+        Class::Confounded => {
+            let (id, protocol) = traps::confounded(rng);
             known = vec![catalogue::of(id)];
             protocol
+        }
+        Class::Unexcited => {
+            let (id, protocol) = traps::unexcited(rng);
+            known = vec![catalogue::of(id)];
+            protocol
+        }
+        Class::HiddenChannel => {
+            // With one power-on, time_s is the time since power-on: nothing would be hidden.
+            let p = catalogue::protocol(&needs, rng);
+            let hides_clock = needs.contains(&Need::Cycles);
+            let power_cycles = if hides_clock {
+                p.power_cycles.max(2)
+            } else {
+                p.power_cycles
+            };
+            Protocol { power_cycles, ..p }
         }
         _ => catalogue::protocol(&needs, rng),
     };

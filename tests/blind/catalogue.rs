@@ -224,7 +224,12 @@ pub fn protocol(needs: &[Need], rng: &mut Rng) -> Protocol {
         chamber,
         rows,
         row_s,
-        power_cycles: if cycles { rng.range(2, 4) as usize } else { 1 },
+        // One power-on is enough to see a warm-up, if the temperature does not just follow it.
+        power_cycles: if cycles {
+            rng.pick(&[1, 1, 2, 3, 4])
+        } else {
+            1
+        },
         rate: if rate {
             rng.pick(&[
                 RateProgram::Sequence,
