@@ -7,6 +7,7 @@ use super::form::{Form, Plan, Planted, plant};
 use super::linear::{Span, rms, sum};
 use super::noise::{self, Flavour};
 use super::outside::{OUTSIDERS, Outsider};
+use super::programs::RateProgram;
 use super::rivals::rivals;
 use super::rng::Rng;
 use super::world::{Protocol, World};
@@ -67,7 +68,12 @@ fn cast(s: &Scenario, rng: &mut Rng) -> Cast {
             };
             Protocol { power_cycles, ..p }
         }
-        _ => catalogue::protocol(&needs, rng),
+        _ => {
+            let p = catalogue::protocol(&needs, rng);
+            let creeps = known.iter().any(|e| e.id == "output_deadband") && rng.odds(0.4);
+            let rate = if creeps { RateProgram::Creep } else { p.rate };
+            Protocol { rate, ..p }
+        }
     };
     Cast {
         known,

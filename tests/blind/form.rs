@@ -159,14 +159,15 @@ pub fn plant(
     })
 }
 
-/// The number in 0..1 where the rising `size` first meets `target`, by scan and bisection; None where it
-/// misses by more than 5 %.
+/// The number in 0..1 where the rising `size` meets `target`, by scan and bisection, from whichever side is nearer where
+/// it jumps (a dead band swallows whole rows); None where it misses by more than 10 %.
 fn reach(target: f64, size: impl Fn(f64) -> f64) -> Option<f64> {
     let steps = 64;
     // Finer near 0: a small effect may need a thousandth of the range.
     let grid = |k: usize| 10f64.powf(-5.0 * (1.0 - k as f64 / steps as f64));
     let above = (0..=steps).find(|k| size(grid(*k)) >= target)?;
-    let (mut low, mut high) = (if above == 0 { 0.0 } else { grid(above - 1) }, grid(above));
+    let mut low = if above == 0 { 0.0 } else { grid(above - 1) };
+    let mut high = grid(above);
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
         if size(middle) < target {
@@ -175,5 +176,7 @@ fn reach(target: f64, size: impl Fn(f64) -> f64) -> Option<f64> {
             high = middle;
         }
     }
-    ((size(high) / target - 1.0).abs() < 0.05).then_some(high)
+    let miss = |s: f64| (size(s) / target - 1.0).abs();
+    let best = if miss(low) < miss(high) { low } else { high };
+    (miss(best) < 0.1).then_some(best)
 }

@@ -8,7 +8,7 @@ use super::world::{T0_DEGC, World};
 /// Anisotropic damping: bias k (1/Q - 1), Q relative; or the bending of the measured phase by the changing Q
 /// (eq. 7 with Q(T, t) in place of Q), which the declared quadratic does not know; or both as one.
 pub fn damping_bias(w: &World, r: &mut Rng) -> Option<Plan> {
-    if w.protocol.thermometer == "phase_rad" && r.odds(0.3) {
+    if w.protocol.thermometer == "phase_rad" && r.odds(0.5) {
         let bent = (0..w.len())
             .map(|k| {
                 let t = w.temp_degc[k];

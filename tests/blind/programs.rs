@@ -17,6 +17,8 @@ pub enum RateProgram {
     Random,
     /// Slow sine.
     Sine,
+    /// Slow triangle through zero at small rates, where a dead band shows.
+    Creep,
     /// Rest and one rate of one sign: separates no two laws of the rate.
     TwoLevels,
 }
@@ -120,6 +122,12 @@ pub fn rate(program: RateProgram, n: usize, rng: &mut Rng) -> Vec<f64> {
             (0..n)
                 .map(|k| top * (TAU * (turns * k as f64 / n as f64 + lead)).sin())
                 .collect()
+        }
+        RateProgram::Creep => {
+            let (turns, lead) = (rng.between(4.3, 15.0), rng.unit());
+            let triangle =
+                |k: usize| 4.0 * ((turns * k as f64 / n as f64 + lead).fract() - 0.5).abs() - 1.0;
+            (0..n).map(|k| 0.1 * top * triangle(k)).collect()
         }
         RateProgram::TwoLevels => held(&[0.0, top * rng.sign()], n.div_ceil(9), n, rng),
     }
