@@ -4,14 +4,14 @@ use super::catalogue::{self, CATALOGUE, Entry, Need};
 use super::covariates::{self, Auxiliary};
 use super::dice::{Dice, seed_of};
 use super::form::{Form, Plan, Planted, plant};
+use super::judge::Bench;
 use super::linear::{Span, rms, sum};
 use super::noise::{self, Flavour};
 use super::outside::{OUTSIDERS, Outsider};
 use super::programs::RateProgram;
-use super::rivals::rivals;
 use super::rng::Rng;
 use super::world::{Protocol, World};
-use super::{BlindRecord, Class, INSEPARABLE, Scenario, Truth, sheet, traps};
+use super::{BlindRecord, Class, Scenario, Truth, sheet, traps};
 
 /// What is to be planted, and in which experiment.
 struct Cast {
@@ -197,7 +197,16 @@ pub fn attempt(s: &Scenario, attempt: u64) -> Option<BlindRecord> {
     }
     let auxiliaries = auxiliary_columns(s.class, &w, cause, &mut rng);
     let (channels, hidden) = channels(s.class, &c, &w, &mut rng);
-    let judged = judge(s.class, &c, &w, &planted, &channels, &auxiliaries)?;
+    let nearest = c.outsider.map_or(&[][..], |o| o.nearest);
+    let bench = Bench {
+        class: s.class,
+        w: &w,
+        short_term,
+        nearest,
+        channels: &channels,
+        auxiliaries: &auxiliaries,
+    };
+    let judged = bench.judge(&planted)?;
     let (output, noise, outlier) = output(&w, &planted, noise, short_term, &mut rng);
     let truth = Truth {
         class: s.class,
@@ -226,7 +235,7 @@ pub fn attempt(s: &Scenario, attempt: u64) -> Option<BlindRecord> {
             .outsider
             .and_then(|o| o.channel)
             .filter(|n| channels.contains(n)),
-        nearest: c.outsider.map_or(Vec::new(), |o| o.nearest.to_vec()),
+        nearest: nearest.to_vec(),
         decoys: auxiliaries
             .iter()
             .map(|a| a.name)
@@ -287,55 +296,6 @@ fn channels(
     };
     all.retain(|name| Some(*name) != hidden);
     (all, hidden)
-}
-
-/// (planted, other, correlation).
-type Likeness = Vec<(String, String, f64)>;
-
-/// Alternatives and closest others; None where the draw is not what its class promises.
-fn judge(
-    class: Class,
-    c: &Cast,
-    w: &World,
-    planted: &[Planted],
-    channels: &[&str],
-    aux: &[Auxiliary],
-) -> Option<(Likeness, Likeness)> {
-    let (mut alternatives, mut closest) = (Vec::new(), Vec::new());
-    for (k, p) in planted.iter().enumerate() {
-        if class == Class::Unexcited {
-            break;
-        }
-        let others: Vec<&[f64]> = planted
-            .iter()
-            .enumerate()
-            .filter(|(j, _)| *j != k)
-            .map(|(_, o)| o.contribution.as_slice())
-            .collect();
-        let mut base = Span::declared(&w.reading());
-        others.iter().for_each(|o| base.add(o));
-        let own = rms(&base.residual(&p.contribution));
-        if p.surviving < 0.03 || own < 0.7 * p.orthogonal_rms {
-            return None;
-        }
-        let all = rivals(w, &p.id, &p.contribution, &others, channels, aux);
-        let limit = |id: &str| match class {
-            Class::Confounded => 2.0,
-            Class::HiddenChannel => 0.9,
-            Class::Outside if !c.outsider.is_some_and(|o| o.nearest.contains(&id)) => 0.9,
-            // A lag shorter than everything in the program is a rate; the reverse need not be.
-            _ if p.id == "temperature_rate" && id == "thermal_lag" => 2.0,
-            _ if id.starts_with("covariate:") => 0.9,
-            _ => INSEPARABLE,
-        };
-        if all.iter().any(|(id, r)| *r > limit(id)) {
-            return None;
-        }
-        let like = |(id, r): &(String, f64)| (p.id.clone(), id.clone(), *r);
-        closest.extend(all.first().map(like));
-        alternatives.extend(all.iter().filter(|(_, r)| *r > INSEPARABLE).map(like));
-    }
-    (class != Class::Confounded || !alternatives.is_empty()).then_some((alternatives, closest))
 }
 
 /// `rate_out_dps`, the noise in it, and which rows are outliers. Where the output clips, half of the devices clip

@@ -6,7 +6,7 @@
 //!
 //! Read in this order: `chamber` and `programs` (what is done to the gyro), `world` (what is then true of it),
 //! `heat_effects`, `loop_effects`, `rate_effects`, `field_effects`, `covariates`, `outside` (one function an
-//! effect), `form` (how large it is made), `catalogue` (id, needs, channel), `rivals` (what else would explain it), `build`
+//! effect), `form` (how large it is made), `catalogue` (id, needs, channel), `rivals` (what else would explain it), `judge`, `build`
 //! (the classes), `sheet` (the CSV), `score` and `tally` (what an answer is worth).
 #![allow(dead_code)]
 
@@ -20,6 +20,7 @@ pub mod field_effects;
 pub mod form;
 pub mod heat;
 pub mod heat_effects;
+pub mod judge;
 pub mod linear;
 pub mod loop_effects;
 pub mod noise;
@@ -39,6 +40,9 @@ use form::Planted;
 
 /// Correlation after projection above which two causes count as one.
 pub const INSEPARABLE: f64 = 0.97;
+
+/// A cause that leaves less than this sum of squares, in units of the short-term variance, is no worse than the truth (5 sigma).
+pub const EVIDENCE: f64 = 25.0;
 
 /// What kind of record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -128,7 +132,7 @@ pub struct Truth {
     pub effects: Vec<String>,
     /// What was planted, unexcited, hidden and outside causes included.
     pub planted: Vec<Planted>,
-    /// (planted, other id, correlation) above `INSEPARABLE`.
+    /// (planted, other id, correlation) above `INSEPARABLE`, or with less than `EVIDENCE` against the other.
     pub alternatives: Vec<(String, String, f64)>,
     /// (planted, closest other id, correlation), whatever it is.
     pub closest: Vec<(String, String, f64)>,
