@@ -152,6 +152,13 @@ fn clean(w: &World, planted: &[Planted]) -> Vec<f64> {
     planted.iter().fold(bias, |a, p| sum(&a, &p.contribution))
 }
 
+/// All contributions together.
+fn contributions(planted: &[Planted], rows: usize) -> Vec<f64> {
+    planted
+        .iter()
+        .fold(vec![0.0; rows], |a, p| sum(&a, &p.contribution))
+}
+
 /// An effect that the experiment does not show: as large as it may be without showing.
 fn hide(w: &World, entry: &Entry, short_term: f64, rng: &mut Rng) -> Planted {
     let unit = match (entry.draw)(w, rng).map(|p| p.form) {
@@ -207,6 +214,7 @@ pub fn attempt(s: &Scenario, attempt: u64) -> Option<BlindRecord> {
         auxiliaries: &auxiliaries,
     };
     let judged = bench.judge(&planted)?;
+    let dictionary = bench.best(&sum(&noise, &contributions(&planted, w.len())));
     let (output, noise, outlier) = output(&w, &planted, noise, short_term, &mut rng);
     let truth = Truth {
         class: s.class,
@@ -241,6 +249,7 @@ pub fn attempt(s: &Scenario, attempt: u64) -> Option<BlindRecord> {
             .map(|a| a.name)
             .filter(|n| !planted.iter().any(|p| p.id.ends_with(n)))
             .collect(),
+        dictionary,
         attempts: attempt,
         protocol: format!("{:?} {flavour:?}", w.protocol),
         planted,

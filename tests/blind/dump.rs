@@ -39,6 +39,7 @@ pub fn truth_json(t: &Truth) -> Value {
         "noise_rms_dps": t.noise_rms,
         "short_term_dps": t.short_term,
         "outliers": t.outlier.iter().filter(|o| **o).count(),
+        "dictionary": t.dictionary,
         "attempts": t.attempts,
         "protocol": t.protocol,
         "contribution_dps": t.oracle,

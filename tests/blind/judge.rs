@@ -39,6 +39,11 @@ impl Bench<'_> {
             if p.surviving < 0.03 || own < 0.7 * p.orthogonal_rms {
                 return None;
             }
+            // A scale factor that errs by more is another sensor.
+            let errs = p.id.starts_with("scale_factor") || p.id == "outside:accel_times_rate";
+            if errs && rms(&p.contribution) > 0.15 * rms(&self.w.rate_dps) {
+                return None;
+            }
             let all = rivals(
                 self.w,
                 &p.id,
@@ -63,6 +68,14 @@ impl Bench<'_> {
         }
         let suits = self.class != Class::Confounded || !alternatives.is_empty();
         suits.then_some((alternatives, closest))
+    }
+
+    /// The id whose best shape fits an error (deg/s) best, for classes with one cause of the catalogue: what a plain
+    /// search through the dictionary names, with no care for how many shapes an id has.
+    pub fn best(&self, error: &[f64]) -> Option<String> {
+        let one = matches!(self.class, Class::Single | Class::Faint | Class::Covariate);
+        let all = one.then(|| rivals(self.w, "", error, &[], self.channels, self.auxiliaries))?;
+        all.into_iter().next().map(|(id, _)| id)
     }
 
     /// True where an id that correlates by `r` is as good an answer: alike in shape, or what it leaves of the effect (`own`,

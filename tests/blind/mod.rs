@@ -161,6 +161,8 @@ pub struct Truth {
     pub nearest: Vec<&'static str>,
     /// Auxiliary columns that cause nothing.
     pub decoys: Vec<&'static str>,
+    /// What a plain search through all shapes of all ids names (one cause of the catalogue only).
+    pub dictionary: Option<String>,
     /// Draws that were thrown away before this one.
     pub attempts: u64,
     /// For the eye: chamber, rate program, noise.

@@ -48,7 +48,9 @@ fn reading(w: &World, name: &str, r: &mut Rng) -> Column {
     let noise = match name {
         "rate_dps" => 0.0,
         "time_since_power_on_s" => 0.0,
-        _ if is_thermometer => r.between(0.02, 0.1) * w.sigma_dps / w.steepest(),
+        _ if is_thermometer => {
+            r.between(0.02, 0.1) * (w.sigma_dps / w.steepest()).min(0.1 * w.half)
+        }
         "die_degc" | "chamber_degc" => r.between(0.002, 0.05),
         _ => {
             let free = rms(&Span::declared(&w.reading()).residual(&values));

@@ -146,9 +146,12 @@ pub fn table(marks: &[Mark]) -> String {
     text
 }
 
+/// Records, right answers, and what was said instead.
+type Confusion<'a> = (usize, usize, BTreeMap<&'a str, usize>);
+
 /// What was planted, how often it was answered rightly, and what was answered instead.
 pub fn confusion(marks: &[Mark]) -> String {
-    let mut rows: BTreeMap<(Class, &str), (usize, usize, BTreeMap<&str, usize>)> = BTreeMap::new();
+    let mut rows: BTreeMap<(Class, &str), Confusion<'_>> = BTreeMap::new();
     for m in marks {
         let row = rows.entry((m.class, m.planted.as_str())).or_default();
         row.0 += 1;
