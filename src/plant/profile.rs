@@ -1,7 +1,7 @@
 //! What surrounds the device over time: chamber, table, supply, acceleration, piecewise linear.
 
 use crate::design::ThermalRun;
-use crate::error::{InputError, Result, io_error};
+use crate::error::{Error, InputError, Result, io_error};
 use std::path::Path;
 
 /// A corner of a profile.
@@ -202,8 +202,9 @@ fn parse(bytes: &[u8], path: &Path) -> Result<Profile> {
     };
     let header = reader.headers().map_err(broken)?.clone();
     let find = |name: &str| header.iter().position(|h| h == name);
-    let need =
-        |name: &str| find(name).ok_or_else(|| refuse(format!("has no column {name}"), 1, None));
+    let need = |name: &str| {
+        find(name).ok_or_else(|| Error::from(refuse(format!("has no column {name}"), 1, None)))
+    };
     let places = [
         Some(need("time_s")?),
         Some(need("chamber_degc")?),

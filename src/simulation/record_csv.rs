@@ -53,9 +53,12 @@ pub fn text(design: &Design, run: &Run) -> String {
     text
 }
 
+/// A column's name, and its value in a reading.
+type Quantity = (&'static str, fn(&Mean) -> f64);
+
 /// Float and fixed beside each other, uncompensated and (where it was fitted) compensated, as CSV.
 pub fn both_paths(taken: &[Taken], after: Option<&[Taken]>) -> String {
-    let quantities: [(&str, fn(&Mean) -> f64); 6] = [
+    let quantities: [Quantity; 6] = [
         ("phase_rad", |m| m.phase_rad),
         ("freq_hz", |m| m.freq_hz),
         ("agc", |m| m.agc),
