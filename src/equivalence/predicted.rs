@@ -15,7 +15,7 @@
 //!   rate, what table errors do to the phase and to the sense channel is one and the same sequence: their product
 //!   is counted.
 //!
-//! A condition that does not hold is a flag, and the figure is left out. (`coherent_nco`, `near_coherent_nco` and
+//! A condition that does not hold is a flag, and the figure is left out. (`coherent_nco` and
 //! `few_rows` stand beside a figure: they say that white noise is no model of that table error,
 //! or that the observed figure is uncertain.)
 //!
@@ -128,7 +128,7 @@ pub(super) fn set(all: &mut [Prediction], at: usize, rms: Option<f64>, flags: &[
         p.rms = rms.filter(|_| {
             flags
                 .iter()
-                .all(|f| ["coherent_nco", "near_coherent_nco", "few_rows"].contains(f))
+                .all(|f| ["coherent_nco", "few_rows"].contains(f))
         });
     }
 }

@@ -26,6 +26,10 @@ struct BiasError {
     with_input: f64,
 }
 
+/// E[1/r^2] E[r^2] up to which all vectors count as equally long: it is 1 for equal ones, and their
+/// stretching weighs by r^2.
+const EVEN_LENGTH: f64 = 1.05;
+
 /// The phase's error from [`Lines`](super::table_noise::Lines), rad: u' x.
 fn across(turns: f64) -> [f64; 4] {
     let (sin, cos) = (turns * TAU).sin_cos();
@@ -104,6 +108,11 @@ impl Theory<'_> {
         magnitude += block.along_variance(square_length);
         if along_doubt > DOUBTFUL * magnitude {
             magnitude_flags.push("carrier_lines");
+        }
+        // The mean square length stands for the length of every row.
+        if inverse_square * square_length > EVEN_LENGTH && !magnitude_flags.contains(&"weak_vector")
+        {
+            magnitude_flags.push("weak_vector");
         }
         set(all, at + 1, Some(magnitude.sqrt()), &magnitude_flags);
         error.flags = flags;
