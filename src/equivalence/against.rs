@@ -1,6 +1,6 @@
 //! Two bit-accurate chains on the same codes: the first word in which they differ.
 //!
-//! Both run once and leave a digest of all words after every [`SPAN`] samples. In the first span whose
+//! Both run once and leave a digest of all words after every `SPAN` samples. In the first span whose
 //! digests differ, both run again and keep their words; these are compared one by one.
 
 use super::layout::Layout;

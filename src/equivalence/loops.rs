@@ -123,7 +123,7 @@ impl PhaseLoopBound {
         })
     }
 
-    /// True if the linear loop is stable and settles in [`MOST_ROWS`].
+    /// True if the linear loop is stable and settles in `MOST_ROWS`.
     pub fn is_contracting(&self) -> bool {
         self.gains.is_some()
     }

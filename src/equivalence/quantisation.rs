@@ -94,7 +94,7 @@ const STEPS: f64 = 64.0;
 /// With x = word / 2^w, every convergent p/q of x says that the phases lie in q clusters that drift by
 /// samples * |q x - p| / q; the circle is covered if they drift by their distance 1 / q. If the clusters are not finer than
 /// the table's addresses, its errors are waves as slow as that drift: they go round often enough to have nothing in
-/// common with the signal's own changes if the drift is over [`STEPS`] addresses.
+/// common with the signal's own changes if the drift is over `STEPS` addresses.
 pub fn spread(design: &Design, samples: u64) -> Spread {
     let nco = &design.circuit.nco;
     let circle = 1i128 << nco.phase_bits;

@@ -18,9 +18,9 @@ pub fn exp2i(exponent: i32) -> f64 {
 /// A word in both arithmetics.
 #[derive(Debug, Clone, Copy)]
 pub struct Pair<W> {
-    /// The integer that [`Fixed`] has.
+    /// The integer that `Fixed` has.
     pub raw: W,
-    /// What [`Float`] has.
+    /// What `Float` has.
     pub real: f64,
     /// |raw * 2^-fraction_bits - real| is at most `bound + phase_bound`: this is what quantisation
     /// adds if both oscillators have the same phase.
@@ -91,9 +91,9 @@ impl<W: Lane> Pair<W> {
 /// An element of a ring in both arithmetics.
 #[derive(Debug, Clone, Copy)]
 pub struct PairResidue<R> {
-    /// [`Fixed`]'s residue.
+    /// `Fixed`'s residue.
     pub raw: R,
-    /// [`Float`]'s residue, on its grid of 2^-128 of the circle.
+    /// `Float`'s residue, on its grid of 2^-128 of the circle.
     pub grid: i128,
     /// The bound as an integer, in steps of `bound_exponent`; modulo 2^128 between the
     /// integrators and the combs of a CIC, as the sums themselves are.

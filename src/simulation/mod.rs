@@ -1,7 +1,7 @@
 //! `gyrogen simulate`: a run of plant and circuit in closed loop, float and fixed; its record, the
 //! compensation that it gives, what the loops do, and the published figures beside it.
 //!
-//! [`profile_run`] is a thermal run of warm-started readings, [`continuous`] simulates every sample;
+//! [`readings`] is a thermal run of warm-started readings, [`continuous`] simulates every sample;
 //! [`record_csv`] writes the record, [`startup`] switches the gyro on, [`trace`] keeps every node's words of it, [`hunting`] looks at what
 //! quantisation leaves of the loops, [`paper`] has the published figures; [`outcome`] is `simulate.json`.
 

@@ -1,7 +1,7 @@
 //! How far a polynomial is from an enclosed function, proved from above and shown from below.
 //!
 //! On every segment the difference is a polynomial in `t = x - centre` with a radius, whose largest
-//! magnitude branch and bound finds ([`super::search`]; compare S. Chevillard, J. Harrison, M. Joldes, C. Lauter,
+//! magnitude branch and bound finds (`search`; compare S. Chevillard, J. Harrison, M. Joldes, C. Lauter,
 //! "Efficient and accurate computation of upper bounds of approximation errors", TCS 412 (2011), with
 //! plain subdivision in place of sums of squares).
 
