@@ -315,25 +315,6 @@ impl<const N: usize> Chain<N> {
     }
 }
 
-impl Bias {
-    /// Every cast, in a fixed order.
-    pub fn casts_mut(&mut self) -> [&mut Cast; 4] {
-        [
-            &mut self.first,
-            &mut self.inner,
-            &mut self.outer,
-            &mut self.output,
-        ]
-    }
-}
-
-impl Rate {
-    /// Every cast, in a fixed order.
-    pub fn casts_mut(&mut self) -> [&mut Cast; 2] {
-        [&mut self.scale, &mut self.output]
-    }
-}
-
 /// The columns of a decimated sample that are words, in the contract's order (bias is not one of the
 /// contract's); an empty name = the design has no such stage.
 fn meanings(circuit: &Circuit, compensation: Option<&Compensation>) -> Vec<Port> {

@@ -4,7 +4,7 @@
 //! Two blocks: [`Bias`] depends on the thermometer alone, so that its emitted code can be compared
 //! with the model over every input code; [`Rate`] subtracts it.
 
-use crate::design::{Circuit, Compensation, CompensationInput};
+use crate::design::{Circuit, Compensation, CompensationInput, Outside};
 use crate::numeric::arithmetic::{Arithmetic, Block, Port};
 use crate::numeric::cast::{Cast, Label, Target};
 use crate::numeric::trace::ir::Interval;
@@ -36,7 +36,20 @@ pub struct Bias {
     pub outer: Cast,
     /// The polynomial's value to the output format.
     pub output: Cast,
+    /// Beyond the calibrated range: the tangent.
+    tangent: Option<Tangent>,
     meanings: [String; 2],
+}
+
+/// The polynomial's slopes at both ends of the calibrated range, with which it goes on beyond them.
+#[derive(Debug, Clone)]
+struct Tangent {
+    /// Raw, at the lower and the upper end.
+    slopes: [i128; 2],
+    /// slope * (p - limited p).
+    rise: Cast,
+    /// t + rise.
+    sum: Cast,
 }
 
 impl Bias {
@@ -82,9 +95,18 @@ impl Bias {
         } else {
             coefficient
         };
+        let has_slope = compensation.coefficients_raw.len() > 1;
+        let holds = compensation.outside == Outside::HoldSlope && has_slope;
+        let tangent = compensation.clamp_raw.filter(|_| holds);
+        let tangent = tangent.map(|(low, high)| Tangent {
+            slopes: [low, high].map(|end| compensation.slope_raw(circuit, end)),
+            rise: Cast::to(ACCUMULATOR, coefficient + p, 0, compensation.accumulator),
+            sum: Cast::to(ACCUMULATOR, accumulator, 0, compensation.accumulator),
+        });
         Bias {
             input_range,
             input_fraction_bits,
+            tangent,
             clamp: compensation.clamp_raw,
             offset,
             read_exponent,
@@ -99,6 +121,22 @@ impl Bias {
             output: Cast::to(OUTPUT, last, 0, compensation.output),
             meanings: [meaning, format!("bias in deg/s, {}", compensation.output)],
         }
+    }
+}
+
+impl Bias {
+    /// Every cast, in a fixed order.
+    pub fn casts_mut(&mut self) -> Vec<&mut Cast> {
+        let mut casts = vec![
+            &mut self.first,
+            &mut self.inner,
+            &mut self.outer,
+            &mut self.output,
+        ];
+        if let Some(tangent) = &mut self.tangent {
+            casts.extend([&mut tangent.rise, &mut tangent.sum]);
+        }
+        casts
     }
 }
 
@@ -154,6 +192,13 @@ impl<A: Arithmetic> Block<A, 1, 1> for Bias {
             t = ar.cast(ar.add(c, inner), &self.outer, &[c, inner]);
             reported = t;
         }
+        if let Some(tangent) = &self.tangent {
+            let beyond = ar.read_as(ar.sub(input, limited), self.read_exponent);
+            let [below, above] = tangent.slopes.map(|s| ar.constant(s, coarse));
+            let slope = ar.select(ar.is_negative(beyond), below, above);
+            let rise = ar.cast(ar.mul(slope, beyond), &tangent.rise, &[slope, beyond]);
+            t = ar.cast(ar.add(t, rise), &tangent.sum, &[t, rise]);
+        }
         [ar.cast(t, &self.output, &[t])]
     }
 }
@@ -201,6 +246,13 @@ impl Rate {
                 format!("compensated rate in deg/s, {output}"),
             ],
         }
+    }
+}
+
+impl Rate {
+    /// Every cast, in a fixed order.
+    pub fn casts_mut(&mut self) -> Vec<&mut Cast> {
+        vec![&mut self.scale, &mut self.output]
     }
 }
 

@@ -231,14 +231,78 @@ pub(super) fn compensation(t: &Table, circuit: &Circuit) -> Result<Compensation>
             ))
             .into());
     }
-    Ok(Compensation {
-        coefficients_raw: coefficients(t, coefficient_format, accumulator.format)?,
+    let coefficients_raw = coefficients(t, coefficient_format, accumulator.format)?;
+    let mut compensation = Compensation {
+        fitted: fitted(t, coefficients_raw.len())?,
+        coefficients_raw,
         coefficient_format,
         accumulator,
         rate_full_scale_dps,
         output: t.need("output")?.quantizer()?,
         clamp_raw: clamp(t, &input, circuit)?,
+        outside: Outside::Clamp,
         input,
+    };
+    compensation.outside = outside(t, &compensation, circuit)?;
+    Ok(compensation)
+}
+
+/// A slope is a constant like a coefficient.
+fn outside(t: &Table, c: &Compensation, circuit: &Circuit) -> Result<Outside> {
+    let Some(value) = t.get("outside") else {
+        return Ok(Outside::Clamp);
+    };
+    let kinds = [Outside::Clamp, Outside::HoldSlope].map(|o| (o.name(), o));
+    let outside = value.choice(&kinds)?;
+    if outside == Outside::Clamp {
+        return Ok(outside);
+    }
+    // Without a calibrated range there is no outside; a fit sets both.
+    let Some((low, high)) = c.clamp_raw else {
+        return Ok(outside);
+    };
+    for word in [low, high] {
+        let slope = c.slope_raw(circuit, word);
+        if !c.coefficient_format.contains(slope) {
+            return Err(value
+                .error(format!(
+                    "needs the polynomial's slope at input {word}, raw {slope}, which coefficient_format {} \
+                     cannot hold",
+                    c.coefficient_format
+                ))
+                .help("give coefficient_format more integer bits, or set `outside = \"clamp\"`")
+                .into());
+        }
+    }
+    Ok(outside)
+}
+
+fn fitted(t: &Table, count: usize) -> Result<Option<Fitted>> {
+    optional(t, "fitted", |table| fitted_table(table, count))
+}
+
+fn fitted_table(table: &Table, count: usize) -> Result<Fitted> {
+    let value = table.need("coefficients_dps")?;
+    let elements = value.array("[109.60, 763.31, 1350.36]")?;
+    if elements.len() != count {
+        return Err(value
+            .error(format!(
+                "has {} coefficients, coefficients_raw has {count}",
+                elements.len()
+            ))
+            .help("delete [compensation.fitted] where coefficients are changed by hand")
+            .into());
+    }
+    let any = |v: &Value, what| v.real(Real::Any, what);
+    let coefficients_dps = elements
+        .iter()
+        .map(|e| any(e, "deg/s"))
+        .collect::<Result<Vec<f64>>>()?;
+    let size = |key: &str| table.need(key)?.real(Real::NotNegative, "deg/s");
+    Ok(Fitted {
+        coefficients_dps,
+        std_max_dps: size("std_max_dps")?,
+        heldout_rms_dps: size("heldout_rms_dps")?,
     })
 }
 

@@ -107,10 +107,20 @@ pub(super) const KEYS: &[(&str, &[(&str, &str)])] = &[
                 "{ format = \"Q12.12\", rounding = \"half_up\", overflow = \"saturate\" }",
             ),
             ("clamp_raw", "[-5900000, -3900000]"),
+            ("outside", "\"clamp\""),
+            ("fitted", "["),
             ("input_format", "\"Q9.7\""),
             ("input_offset_raw", "0"),
             ("input_scale_bits", "15"),
             ("rate_input_format", "\"Q2.22\""),
+        ],
+    ),
+    (
+        "compensation.fitted",
+        &[
+            ("coefficients_dps", "[109.60, 763.31, 1350.36]"),
+            ("std_max_dps", "0.01"),
+            ("heldout_rms_dps", "0.02"),
         ],
     ),
     (

@@ -215,6 +215,17 @@ fn polynomial(c: &Circuit, k: &Compensation) -> Result<(), Excess> {
             ],
         )?;
     }
+    if k.coefficients_raw.len() > 1 && k.outside == Outside::HoldSlope {
+        let from = i64::from(first.fraction_bits) + i64::from(fraction);
+        count(
+            KEY,
+            &[
+                (first.bits(), "slope"),
+                (bits + 1, "input beyond the range"),
+                (left_shift(from, to), "left shift"),
+            ],
+        )?;
+    }
     if k.coefficients_raw.len() > 2 {
         count(
             KEY,

@@ -2,7 +2,7 @@
 //! `docs/manual.md`; their meaning is stated there and only summarised here.
 
 use super::effects::Effects;
-use crate::numeric::format::{Format, Overflow, Quantizer, Rounding};
+use crate::numeric::format::{Format, Overflow, Quantizer, Rounding, pow2};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -212,6 +212,42 @@ pub struct Compensation {
     pub output: Quantizer,
     /// `clamp_raw = [low, high]`: the input is limited to the calibrated range; absent = not.
     pub clamp_raw: Option<(i128, i128)>,
+    /// What the firmware does with an input outside `clamp_raw`.
+    pub outside: Outside,
+    /// The fit that the coefficients stand for, where there is one.
+    pub fitted: Option<Fitted>,
+}
+
+/// `outside`: the polynomial beyond the calibrated range.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Outside {
+    /// The bias of the nearer end.
+    #[default]
+    Clamp,
+    /// The tangent of the nearer end goes on.
+    HoldSlope,
+}
+
+impl Outside {
+    /// As a design file spells it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Outside::Clamp => "clamp",
+            Outside::HoldSlope => "hold_slope",
+        }
+    }
+}
+
+/// `[compensation.fitted]`: a fit before its coefficients were put into their format; what the firmware's error
+/// budget is counted from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fitted {
+    /// In the firmware's variable, lowest order first, deg/s; as many as `coefficients_raw`.
+    pub coefficients_dps: Vec<f64>,
+    /// Largest standard deviation of the fitted bias over the calibrated range, deg/s.
+    pub std_max_dps: f64,
+    /// What the polynomial leaves of data that it has not seen, rms, deg/s.
+    pub heldout_rms_dps: f64,
 }
 
 impl CompensationInput {
@@ -225,6 +261,25 @@ impl Compensation {
     /// log2 of `rate_full_scale_dps`, which is a power of two.
     pub fn rate_full_scale_exponent(&self) -> i32 {
         self.rate_full_scale_dps.log2().round() as i32
+    }
+
+    /// The polynomial's variable at an input word: p = (raw - offset) * 2^-fraction_bits.
+    pub fn variable_scale(&self, circuit: &Circuit) -> (i128, i32) {
+        match &self.input {
+            CompensationInput::Phase => (0, circuit.cordic.angle_bits as i32 - 1),
+            CompensationInput::TuningWord(t) => (t.offset_raw, t.scale_bits as i32),
+            CompensationInput::Channel(c) => (c.offset_raw, c.scale_bits as i32),
+        }
+    }
+
+    /// The polynomial's slope at an input word, rounded to the coefficients' format (which may not hold it):
+    /// sum of k c_k p^(k-1).
+    pub fn slope_raw(&self, circuit: &Circuit, word: i128) -> i128 {
+        let (offset, fraction_bits) = self.variable_scale(circuit);
+        let p = (word - offset) as f64 * pow2(-fraction_bits);
+        let orders = self.coefficients_raw.iter().enumerate().skip(1).rev();
+        let slope = orders.fold(0.0, |t, (k, c)| t * p + k as f64 * *c as f64);
+        (slope + 0.5).floor() as i128
     }
 }
 

@@ -1,6 +1,6 @@
 //! The design with the fitted compensation as a design file of its own: what reproduces the firmware.
 
-use crate::design::{Compensation, CompensationInput, Design};
+use crate::design::{Compensation, CompensationInput, Design, Outside};
 use crate::numeric::format::Quantizer;
 use std::fmt::Write as _;
 
@@ -61,6 +61,16 @@ fn compensation(c: &Compensation) -> String {
     if let Some((low, high)) = c.clamp_raw {
         _ = writeln!(text, "clamp_raw = [{low}, {high}]");
     }
+    if c.outside != Outside::Clamp {
+        _ = writeln!(text, "outside = \"{}\"", c.outside.name());
+    }
+    if let Some(fitted) = &c.fitted {
+        text += "\n# The fit before its coefficients were put into their format; for the error budget.\n";
+        text += "[compensation.fitted]\n";
+        _ = writeln!(text, "coefficients_dps = {:?}", fitted.coefficients_dps);
+        _ = writeln!(text, "std_max_dps = {:?}", fitted.std_max_dps);
+        _ = writeln!(text, "heldout_rms_dps = {:?}", fitted.heldout_rms_dps);
+    }
     text
 }
 
@@ -76,7 +86,7 @@ fn quantizer(q: Quantizer) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::design::{ChannelInput, reader};
+    use crate::design::{ChannelInput, Fitted, reader};
     use crate::numeric::format::Format;
 
     #[test]
@@ -95,6 +105,11 @@ mod tests {
                 c.input = input;
                 c.coefficients_raw = vec![1, -2, 3, -4];
                 c.clamp_raw = Some((-5, 6));
+                c.fitted = Some(Fitted {
+                    coefficients_dps: vec![1.5, -0.1, 1e-300, 4e9],
+                    std_max_dps: 0.0,
+                    heldout_rms_dps: 0.25,
+                });
             }
             let back = reader::parse(&text(&design), None).expect("a design");
             assert_eq!(back.compensation, design.compensation);

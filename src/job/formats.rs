@@ -101,6 +101,8 @@ pub fn fill(design: &mut Design, fit: &BaselineFit, record: &ThermalRecord) -> R
         rate_full_scale_dps: 1.0,
         output: Quantizer::default_of(output),
         clamp_raw: None,
+        outside: Outside::Clamp,
+        fitted: None,
     };
     if of_chain {
         compensation.rate_full_scale_dps = power_of_two_near(nominal_full_scale_dps(design));

@@ -154,14 +154,16 @@ where
 }
 
 /// Copies of a block in which one rounding constant is off by one.
-fn nudged<B: Clone, const C: usize>(block: &B, casts: fn(&mut B) -> [&mut Cast; C]) -> Vec<B> {
+fn nudged<B: Clone>(block: &B, casts: fn(&mut B) -> Vec<&mut Cast>) -> Vec<B> {
     let mut blocks = Vec::new();
-    for k in 0..C {
+    for k in 0..casts(&mut block.clone()).len() {
         for step in [-1, 1] {
             let mut damaged = block.clone();
-            let cast: &mut Cast = casts(&mut damaged)[k];
-            if let Some(moved) = cast.nudged(step) {
-                *cast = moved;
+            let moved = casts(&mut damaged).into_iter().nth(k).and_then(|cast| {
+                *cast = cast.nudged(step)?;
+                Some(())
+            });
+            if moved.is_some() {
                 blocks.push(damaged);
             }
         }
@@ -209,7 +211,7 @@ fn of_chain<const N: usize>(chain: &Chain<N>, design: &Design, program: &Program
                 let channel = if variants > 1 { channel.min(3) } else { 0 };
                 let mixer = &chain.mixers[channel];
                 Model::new(function, mixer.clone(), narrow)
-                    .with_damage(nudged(mixer, |m| [&mut m.product]), narrow)
+                    .with_damage(nudged(mixer, |m| vec![&mut m.product]), narrow)
             }
             ("cordic", _) => Model::new(function, chain.cordic.clone(), narrow),
             ("bias", Some((bias, _))) => Model::new(function, bias.clone(), narrow)
