@@ -87,19 +87,19 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let request = request(arguments)?;
     let command = command(arguments);
     let bar = Progress::new();
-    let made = job::approximate(
-        &request,
-        &command,
-        super::threads(arguments.threads),
-        &|total, count| bar.add(total, count),
-    );
+    let threads = super::threads(arguments.threads);
+    let made = job::approximate(&request, &command, threads, &|total, count| {
+        bar.add(total, count)
+    });
     bar.done();
     let made = made?;
     let model = bundle::model(&made.settled)?;
+    let vectors = bundle::vectors(&made.settled, &model, threads);
     let emit = |language| {
         bundle::emit(
             &made.settled,
             &model,
+            &vectors,
             &made.outcome,
             &request.name,
             language,
