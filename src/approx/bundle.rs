@@ -36,6 +36,11 @@ fn damaged(form: &Form) -> Vec<Form> {
     all
 }
 
+/// What both languages' bundles are tested with.
+pub fn vectors(settled: &Settled, model: &Model, threads: usize) -> Vec<EmittedFile> {
+    function::vectors(&settled.program, model, &|x| settled.run(x), threads)
+}
+
 /// The bundle in one language, as files in memory.
 ///
 /// # Errors
@@ -43,6 +48,7 @@ fn damaged(form: &Form) -> Vec<Form> {
 pub fn emit(
     settled: &Settled,
     model: &Model,
+    vectors: &[EmittedFile],
     outcome: &Outcome,
     prefix: &str,
     language: Language,
@@ -54,6 +60,7 @@ pub fn emit(
         facts: facts(outcome),
         request_sha256: &outcome.design_sha256,
         command: &outcome.command,
+        vectors,
     };
     function::emit(&standalone, language)
 }

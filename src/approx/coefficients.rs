@@ -2,13 +2,14 @@
 
 use super::datapath::Evaluation;
 use super::form::measure::Reference;
-use super::form::polynomial::{Monomials, Polynomial};
+use super::form::polynomial::{self, Monomials, Polynomial};
 use super::form::{Codes, Form};
 use super::job::{self, Request, Weight};
-use super::minimax::search::{Effort, Judged};
-use super::minimax::{self, Basis, Budget, CoefficientFormat, Problem, Samples};
+use super::minimax::search::{Effort, Found, Judged};
+use super::minimax::{self, Basis, Budget, CoefficientFormat, Datapath, Problem, Samples};
 use super::outcome::{Compared, Search};
 use super::reference::Function;
+use super::selection::{self, Errors, Reason};
 use crate::error::Result;
 use crate::numeric::format::Format;
 use crate::numeric::trace::ir::Interval;
@@ -22,8 +23,8 @@ const SPARE_BITS: i32 = 4;
 /// Coefficients with how they were found.
 #[derive(Debug, Clone)]
 pub struct Chosen {
-    /// From order 0 to the degree.
-    pub raw: Vec<i128>,
+    /// With its formats.
+    pub form: Polynomial,
     /// For the report.
     pub search: Search,
 }
@@ -95,24 +96,101 @@ pub fn choose(
     let pattern = Polynomial::new(formats, kind, rounded)?;
     let settled = Form::Polynomial(Box::new(pattern)).settle()?;
     let path = Evaluation::new(function, &settled, formats, kind, degree, request.weight);
-    let found = minimax::search(&problem, &path, Effort::default())?;
-    let mut compared: Vec<Compared> = found.baselines.iter().map(shown).collect();
-    compared.push(Compared {
-        name: "chosen with the evaluation in the loop",
-        raw: found.raw.clone(),
-        ideal_max_abs: found.ideal_error,
-        total_max_abs: found.total_error.is_finite().then_some(found.total_error),
-    });
+    // The best for the whole interval, its ends and what lies between codes included.
+    let whole = Samples::new(
+        function,
+        &basis,
+        function.domain().0,
+        function.domain().1,
+        weight,
+    )?;
+    let whole_real = minimax::minimax(&whole)?;
+    let whole = Problem::new(&whole, &whole_real, &[CoefficientFormat::from(format)])?;
+    let effort = Effort::default();
+    let best = whole.best(effort.budget)?;
+    let found = minimax::search_from(&problem, best, &path, effort)?;
+    let taken = Taken::of(&found, &whole, &path);
+    let raw = spread(&taken.raw, kind, degree);
+    if request.intermediate.is_none() {
+        formats = polynomial::trimmed(formats, kind, &raw);
+    }
     Ok(Chosen {
-        raw: spread(&found.raw, kind, degree),
-        search: Search {
+        form: Polynomial::new(formats, kind, raw)?,
+        search: taken.report(&found),
+    })
+}
+
+/// The coefficients that are taken.
+struct Taken {
+    raw: Vec<i128>,
+    errors: Errors,
+    reason: Reason,
+    /// Evaluation and output rounding as a part of the whole error.
+    rounding_part: f64,
+}
+
+impl Taken {
+    fn of(found: &Found, whole: &Problem, path: &Evaluation) -> Taken {
+        let errors = |j: &Judged| Errors {
+            ideal: j.ideal_error,
+            total: j.total_error,
+        };
+        let ideal = found.baselines.iter().find(|j| j.name == "ideal");
+        let ideal = ideal.map_or(
+            Errors {
+                ideal: found.best.error,
+                total: f64::INFINITY,
+            },
+            errors,
+        );
+        let others = found.baselines.iter().filter(|j| j.name != "ideal");
+        let baselines: Vec<Errors> = others.map(errors).collect();
+        let near: Vec<Errors> = found
+            .near
+            .iter()
+            .map(|(c, total)| Errors {
+                ideal: whole.exact_error(&c.raw),
+                total: *total,
+            })
+            .collect();
+        let rounding = path.evaluation_bound(&found.best.raw);
+        let (which, reason) = selection::select(ideal, rounding, &baselines, &near);
+        let one = which.and_then(|k| Some((found.near.get(k)?.0.raw.clone(), *near.get(k)?)));
+        let (raw, errors) = one.unwrap_or((found.best.raw.clone(), ideal));
+        Taken {
+            raw,
+            errors,
+            reason,
+            rounding_part: rounding / ideal.total,
+        }
+    }
+
+    fn report(self, found: &Found) -> Search {
+        let mut compared: Vec<Compared> = found.baselines.iter().map(shown).collect();
+        for (one, judged) in compared.iter_mut().zip(&found.baselines) {
+            one.proved = judged.name == "ideal" && found.best.proved;
+        }
+        compared.push(Compared {
+            name: "taken",
+            raw: self.raw,
+            ideal_max_abs: self.errors.ideal,
+            total_max_abs: self.errors.total.is_finite().then_some(self.errors.total),
+            proved: found.proved && self.errors.total <= found.least,
+        });
+        let heuristic = found.baselines.iter().find(|j| j.name == "babai");
+        let gain = heuristic.map(|j| 100.0 * (1.0 - self.errors.total / j.total_error));
+        Search {
             minimax_error: found.best.minimax_error,
+            reason: self.reason,
+            rounding_part: self.rounding_part,
+            least_total: found.least,
             proved_best: found.proved,
             coefficients_proved_best: found.best.proved,
+            gain_over_nearest_plane_percent: gain.filter(|g| g.is_finite()),
             evaluations: found.evaluations,
             compared,
-        },
-    })
+        }
+    }
 }
 
 fn shown(judged: &Judged) -> Compared {
@@ -126,6 +204,7 @@ fn shown(judged: &Judged) -> Compared {
         raw: judged.raw.clone(),
         ideal_max_abs: judged.ideal_error,
         total_max_abs: judged.total_error.is_finite().then_some(judged.total_error),
+        proved: false,
     }
 }
 

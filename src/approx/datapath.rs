@@ -4,7 +4,7 @@ use super::form::measure::Reference;
 use super::form::polynomial::{Formats, Monomials, Polynomial};
 use super::form::{Codes, Form, Settled, run_in};
 use super::job::Weight;
-use super::minimax::Datapath;
+use super::minimax::{Datapath, Slab, Slabs};
 use super::reference::Function;
 use std::cell::RefCell;
 
@@ -137,5 +137,71 @@ impl Datapath for Evaluation {
         let steps = form.evaluation_bound(codes.low, codes.high);
         let factor = self.points.iter().map(|p| p.2).fold(0.0, f64::max);
         (steps + 0.5 * self.formats.output.lsb()) * factor
+    }
+
+    fn slabs(&self, raw: &[i128], limit: f64, count: usize) -> Slabs {
+        let Some(Form::Polynomial(form)) = self.form(raw) else {
+            return Slabs::Some(Vec::new());
+        };
+        let codes = self.formats.codes;
+        let evaluation = 1.05 * form.evaluation_bound(codes.low, codes.high);
+        // Places lie densest towards the ends, as those of a polynomial's greatest errors do.
+        let bins = (count / 2).max(1);
+        let bin = |code: i128| {
+            let along = (code - codes.low) as f64 / (codes.count() - 1).max(1) as f64;
+            let angle = (1.0 - 2.0 * along).clamp(-1.0, 1.0).acos();
+            ((angle / std::f64::consts::PI * bins as f64) as usize).min(bins - 1)
+        };
+        // The tightest slab from above and from below in each bin.
+        let mut tightest: Vec<[Option<(f64, Slab)>; 2]> = vec![[None; 2]; bins];
+        for &(code, value, factor) in &self.points {
+            let Some((low, high)) = self.allowed(value, limit / factor) else {
+                return Slabs::Impossible;
+            };
+            let slab = Slab {
+                x: codes.real(code),
+                low: low - evaluation,
+                high: high + evaluation,
+            };
+            let Some(best) = tightest.get_mut(bin(code)) else {
+                continue;
+            };
+            for (best, room) in best.iter_mut().zip([high - value, value - low]) {
+                let room = room * factor;
+                if slab.low.is_finite()
+                    && slab.high.is_finite()
+                    && best.is_none_or(|(other, _)| room < other)
+                {
+                    *best = Some((room, slab));
+                }
+            }
+        }
+        let all = tightest.into_iter().flatten().flatten();
+        Slabs::Some(all.map(|(_, slab)| slab).collect())
+    }
+}
+
+impl Evaluation {
+    /// Between which values a word before the output's rounding lies if the result is at most `most`
+    /// from `value`; infinite where the output's limits act. None if no output code is that near.
+    fn allowed(&self, value: f64, most: f64) -> Option<(f64, f64)> {
+        let output = self.formats.output;
+        let lsb = output.lsb();
+        let (bottom, top) = (output.min_raw() as f64, output.max_raw() as f64);
+        // A double's rounding may count for the candidate.
+        let slack = 4.0 * f64::EPSILON * value.abs();
+        let least = ((value - most - slack) / lsb).ceil().max(bottom);
+        let greatest = ((value + most + slack) / lsb).floor().min(top);
+        (least <= greatest).then(|| {
+            let low = match least > bottom {
+                true => (least - 0.5) * lsb,
+                false => f64::NEG_INFINITY,
+            };
+            let high = match greatest < top {
+                true => (greatest + 0.5) * lsb,
+                false => f64::INFINITY,
+            };
+            (low, high)
+        })
     }
 }

@@ -259,8 +259,7 @@ fn polynomial_as_asked(
         .coefficients
         .unwrap_or(Format::q(2, request.output.fraction_bits));
     let chosen = coefficients::choose(function, codes, request, kind, degree, format)?;
-    let Chosen { raw, search } = chosen;
-    let form = compiled(codes, request, kind, format, raw)?;
+    let Chosen { form, search } = chosen;
     Ok((Form::Polynomial(Box::new(form)), search))
 }
 

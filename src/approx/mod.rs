@@ -17,3 +17,4 @@ pub mod minimax;
 pub mod outcome;
 pub mod real;
 pub mod reference;
+pub mod selection;

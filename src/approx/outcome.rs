@@ -126,10 +126,19 @@ pub struct ErrorBounds {
 pub struct Search {
     /// The error of the best real coefficients.
     pub minimax_error: f64,
-    /// No coefficients in these formats have a smaller error of the whole evaluation (to half a per cent).
+    /// Why the coefficients were taken that were taken.
+    pub reason: super::selection::Reason,
+    /// What evaluation and output may round, as a part of the whole error of the ideally best coefficients.
+    pub rounding_part: f64,
+    /// The least error of the whole evaluation that was met.
+    pub least_total: f64,
+    /// No coefficients in these formats have an error of the whole evaluation below `least_total`.
     pub proved_best: bool,
     /// The compared coefficients that are best under ideal evaluation are proved to be that.
     pub coefficients_proved_best: bool,
+    /// By how much the whole error is below that of the lattice heuristic (as fpminimax) in the same datapath,
+    /// in per cent; 0 is a tie, and if `proved_best` nothing better exists.
+    pub gain_over_nearest_plane_percent: Option<f64>,
     /// Choices that were run.
     pub evaluations: u64,
     /// Choices side by side, the taken one last.
@@ -147,6 +156,9 @@ pub struct Compared {
     pub ideal_max_abs: f64,
     /// Of the whole evaluation, over the codes; null if it was not run.
     pub total_max_abs: Option<f64>,
+    /// It is proved that none has a smaller one: an ideal error for the ideally best, of the whole
+    /// evaluation for what is taken.
+    pub proved: bool,
 }
 
 /// A form that meets the bound.

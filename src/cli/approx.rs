@@ -5,7 +5,8 @@ use crate::approx::bundle;
 use crate::approx::cost::Target;
 use crate::approx::form::polynomial::Monomials;
 use crate::approx::job::{self, Asked, Request, Weight};
-use crate::approx::outcome::Outcome;
+use crate::approx::outcome::{Outcome, Search};
+use crate::approx::selection::Reason;
 use crate::emit::files;
 use crate::emit::views::Language;
 use crate::error::{Error, InputError, Result};
@@ -86,19 +87,19 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let request = request(arguments)?;
     let command = command(arguments);
     let bar = Progress::new();
-    let made = job::approximate(
-        &request,
-        &command,
-        super::threads(arguments.threads),
-        &|total, count| bar.add(total, count),
-    );
+    let threads = super::threads(arguments.threads);
+    let made = job::approximate(&request, &command, threads, &|total, count| {
+        bar.add(total, count)
+    });
     bar.done();
     let made = made?;
     let model = bundle::model(&made.settled)?;
+    let vectors = bundle::vectors(&made.settled, &model, threads);
     let emit = |language| {
         bundle::emit(
             &made.settled,
             &model,
+            &vectors,
             &made.outcome,
             &request.name,
             language,
@@ -248,6 +249,7 @@ fn print(o: &Outcome, out: &std::path::Path) {
             table.add_row([c.name.to_owned(), format!("{:.5e}", c.ideal_max_abs), total]);
         }
         say!("{table}");
+        say!("{}", taken(search));
     }
     say!("{} on {}: {}", o.function, o.domain, o.detail);
     let f = &o.formats;
@@ -289,6 +291,32 @@ fn print(o: &Outcome, out: &std::path::Path) {
         spelled(&o.target)
     );
     say!("wrote {}", out.display());
+}
+
+/// Why the coefficients were taken and what that gains, in a line.
+fn taken(search: &Search) -> String {
+    let part = 100.0 * search.rounding_part;
+    let why = match search.reason {
+        Reason::RoundingNegligible => {
+            format!("rounding is {part:.2} % of the error: the coefficients that are best by themselves")
+        }
+        Reason::RoundingSmall => format!(
+            "rounding is {part:.1} % of the error: the coefficients that are best by themselves, \
+             ahead of the heuristics in this datapath too"
+        ),
+        Reason::LeastTotal => {
+            format!("rounding is {part:.0} % of the error: the least error of the whole evaluation")
+        }
+    };
+    let gain = search.gain_over_nearest_plane_percent.map_or(String::new(), |g| {
+        format!("; {g:.2} % below the nearest plane's")
+    });
+    let best = match search.compared.last() {
+        Some(c) if c.proved => "; proved: nothing better exists",
+        _ if search.proved_best => "; proved: nothing is below the least total error",
+        _ => "",
+    };
+    format!("taken: {why}{gain}{best}")
 }
 
 /// A bar on a terminal for what takes over two seconds.

@@ -32,6 +32,8 @@ pub struct Standalone<'a> {
     pub request_sha256: &'a str,
     /// The command that makes it again.
     pub command: &'a str,
+    /// From [`vectors`]: the same in every language.
+    pub vectors: &'a [EmittedFile],
 }
 
 /// Emits the function in one language, as files in memory.
@@ -46,8 +48,7 @@ pub fn emit(what: &Standalone, language: Language) -> Result<Vec<EmittedFile>> {
     facts.push("words are two's complement; ranges beside them are proved, not observed".into());
     let view = View::new(&bundle, models, language, banner, facts);
     let mut emitted = files::sources(&view, Part::Compensation, language)?;
-    emitted.push(vectors(what));
-    emitted.extend(every_input(what.model));
+    emitted.extend_from_slice(what.vectors);
     emitted.push(files::table_vectors(&view.tables));
     let header = Header {
         design_sha256: what.request_sha256,
@@ -78,12 +79,24 @@ pub fn bundle(what: &Standalone) -> Bundle {
     }
 }
 
+/// Vectors, and checksums over every input there is if these have few enough bits. `run` is the model's
+/// only output for its only input, computed on `threads` threads.
+pub fn vectors(
+    program: &Program,
+    model: &Model,
+    run: &(dyn Fn(i128) -> i128 + Sync),
+    threads: usize,
+) -> Vec<EmittedFile> {
+    let mut all = vec![chosen(program, model)];
+    all.extend(every_input(model, run, threads));
+    all
+}
+
 /// Inputs with the model's outputs: corners, random words, and words that show a rounding constant or a
 /// coefficient that is off by one.
-fn vectors(what: &Standalone) -> EmittedFile {
-    let model = what.model;
+fn chosen(program: &Program, model: &Model) -> EmittedFile {
     let mut text = String::new();
-    if let Some(f) = what.program.function(&model.name) {
+    if let Some(f) = program.function(&model.name) {
         let names = f.inputs.iter().map(|(port, _)| port.name);
         let names = names.chain(f.outputs.iter().map(|(port, _)| port.name));
         text = names.chain(["fault"]).collect::<Vec<_>>().join(",") + "\n";
@@ -106,28 +119,36 @@ fn vectors(what: &Standalone) -> EmittedFile {
 }
 
 /// Checksums of the outputs over every input there is, block by block, if it has few enough bits.
-fn every_input(model: &Model) -> Option<EmittedFile> {
+fn every_input(
+    model: &Model,
+    run: &(dyn Fn(i128) -> i128 + Sync),
+    threads: usize,
+) -> Option<EmittedFile> {
     let [range] = model.inputs.as_slice() else {
         return None;
     };
     if range.high - range.low >= 1 << EXHAUSTIVE_BITS {
         return None;
     }
-    let mut text = String::from("low,count,checksum\n");
-    let mut outputs = vec![0; model.outputs];
-    for block in blocks(*range) {
-        let mut h = views::BASIS;
-        for input in block.low..=block.high {
-            let fault = model.call(&[input], &mut outputs);
-            h = outputs.iter().fold(h, |h, word| mix(h, *word as u64));
-            h = mix(h, u64::from(fault));
-        }
-        let count = block.high - block.low + 1;
-        text += &csv_line(&[block.low, count, i128::from(h)]);
-    }
+    // Of the output and of the fault, which is none.
+    let checksum = |block: &Interval| {
+        let inputs = block.low..=block.high;
+        let h = inputs.fold(views::BASIS, |h, x| mix(mix(h, run(x) as u64), 0));
+        [block.low, block.high - block.low + 1, i128::from(h)]
+    };
+    let blocks: Vec<Interval> = blocks(*range).collect();
+    let share = blocks.len().div_ceil(threads.max(1)).max(1);
+    let lines = std::thread::scope(|scope| {
+        let parts = blocks.chunks(share).map(|part| {
+            scope.spawn(move || part.iter().map(checksum).map(|l| csv_line(&l)).collect())
+        });
+        let parts: Vec<_> = parts.collect();
+        let joined: Option<Vec<String>> = parts.into_iter().map(|p| p.join().ok()).collect();
+        joined
+    })?;
     Some(EmittedFile {
         path: format!("vectors/{}.every.csv", model.name),
-        text,
+        text: "low,count,checksum\n".to_owned() + &lines.concat(),
     })
 }
 

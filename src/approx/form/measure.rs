@@ -247,16 +247,19 @@ fn run_piece<L: HasKernel>(
         at: piece.low,
         checked: 0,
     };
-    let mut code = piece.low;
-    while code <= piece.high {
-        let x = codes.real(code);
-        let y = run_in::<L>(form, L::low(code)).real() * lsb;
+    let input_lsb = codes.format.lsb();
+    let polynomial = piece.in_doubles();
+    // Codes have at most 48 bits.
+    let (mut code, last, stride) = (piece.low as i64, piece.high as i64, stride as i64);
+    while code <= last {
+        let x = code as f64 * input_lsb;
+        let y = run_in::<L>(form, L::low(i128::from(code))).real() * lsb;
         let (value, radius) = reference.at(x);
         let error = (y - value).abs() + radius;
         if error > result.observed {
-            (result.observed, result.at) = (error, code);
+            (result.observed, result.at) = (error, i128::from(code));
         }
-        let (ideal, slack) = piece.value(x);
+        let (ideal, slack) = polynomial.value(x);
         let difference = (y - ideal.clamp(bottom, top)).abs() + slack;
         if bottom <= ideal && ideal <= top {
             result.rounding = result.rounding.max(difference);
@@ -265,8 +268,8 @@ fn run_piece<L: HasKernel>(
         }
         result.checked += 1;
         // The last code is always run.
-        code = if code < piece.high {
-            (code + stride).min(piece.high)
+        code = if code < last {
+            (code + stride).min(last)
         } else {
             code + 1
         };

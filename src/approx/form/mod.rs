@@ -91,13 +91,36 @@ pub struct Piece {
 }
 
 impl Piece {
-    /// The polynomial's value at x and a bound on the rounding of this computation (Horner's rule; Higham,
-    /// Accuracy and Stability of Numerical Algorithms, 2nd ed., eq. 5.3).
+    /// The polynomial in doubles, for many values.
+    pub fn in_doubles(&self) -> Doubles {
+        Doubles {
+            centre: self.centre.real(),
+            terms: self.terms.iter().rev().map(|t| t.real()).collect(),
+        }
+    }
+
+    /// The polynomial's value at x and a bound on the rounding of this computation.
     pub fn value(&self, x: f64) -> (f64, f64) {
-        let d = x - self.centre.real();
+        self.in_doubles().value(x)
+    }
+}
+
+/// A piece's polynomial in doubles.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Doubles {
+    centre: f64,
+    /// Highest order first.
+    terms: Vec<f64>,
+}
+
+impl Doubles {
+    /// The value at x and a bound on the rounding of this computation (Horner's rule; Higham,
+    /// Accuracy and Stability of Numerical Algorithms, 2nd ed., eq. 5.3).
+    #[inline]
+    pub fn value(&self, x: f64) -> (f64, f64) {
+        let d = x - self.centre;
         let (mut value, mut size) = (0.0, 0.0);
-        for term in self.terms.iter().rev() {
-            let c = term.real();
+        for c in &self.terms {
             value = value * d + c;
             size = size * d.abs() + c.abs();
         }

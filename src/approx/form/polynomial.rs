@@ -301,31 +301,14 @@ pub fn choose_intermediate(
     monomials: Monomials,
     coefficients: &[i128],
 ) -> Result<Format> {
-    let with = |fraction_bits: i32| -> Option<(u32, Format, f64)> {
+    let with = |fraction_bits: i32| {
         let formats = Formats {
             codes,
             coefficients: coefficient_format,
             intermediate: Target::signed(127, fraction_bits),
             output,
         };
-        let form = Polynomial::new(formats, monomials, coefficients.to_vec()).ok()?;
-        let bound = form
-            .pieces()
-            .iter()
-            .map(|p| p.evaluation_bound)
-            .fold(0.0, f64::max);
-        let labels: Vec<bool> = { form.clone() }
-            .casts_mut()
-            .iter()
-            .map(|c| c.overflow == Some(Overflow::Saturate) && c.label.key != "output")
-            .collect();
-        let settled = super::Form::Polynomial(Box::new(form)).settle().ok()?;
-        let ranges = settled.program.cast_ranges.iter().zip(labels);
-        let ranges = ranges.filter_map(|(range, counts)| range.filter(|_| counts));
-        let range = ranges.reduce(Interval::join).unwrap_or(Interval::point(0));
-        let integer_bits = integer_bits_of(range, fraction_bits).max(1) as u32;
-        let format = Format::q(integer_bits, fraction_bits as u32);
-        (format.bits() <= 64).then_some((settled.bits, format, bound))
+        intermediate_with(formats, monomials, coefficients)
     };
     let formats = Formats {
         codes,
@@ -351,4 +334,48 @@ pub fn choose_intermediate(
             .help("give input or coefficients fewer bits, or say `--intermediate`")
             .into()
     })
+}
+
+/// The intermediate of these fraction bits, with the integer bits that ranges need: (widest word of the
+/// evaluation, format, bound of what the steps round). None if it has over 64 bits.
+fn intermediate_with(
+    formats: Formats,
+    monomials: Monomials,
+    coefficients: &[i128],
+) -> Option<(u32, Format, f64)> {
+    let fraction_bits = formats.intermediate.fraction_bits;
+    let form = Polynomial::new(formats, monomials, coefficients.to_vec()).ok()?;
+    let bound = form
+        .pieces()
+        .iter()
+        .map(|p| p.evaluation_bound)
+        .fold(0.0, f64::max);
+    let labels: Vec<bool> = { form.clone() }
+        .casts_mut()
+        .iter()
+        .map(|c| c.overflow == Some(Overflow::Saturate) && c.label.key != "output")
+        .collect();
+    let settled = super::Form::Polynomial(Box::new(form)).settle().ok()?;
+    let ranges = settled.program.cast_ranges.iter().zip(labels);
+    let ranges = ranges.filter_map(|(range, counts)| range.filter(|_| counts));
+    let range = ranges.reduce(Interval::join).unwrap_or(Interval::point(0));
+    let integer_bits = integer_bits_of(range, fraction_bits).max(1) as u32;
+    let format = Format::q(integer_bits, u32::try_from(fraction_bits).ok()?);
+    (format.bits() <= 64).then_some((settled.bits, format, bound))
+}
+
+/// The same polynomial formats with only as many integer bits in the intermediate as these coefficients
+/// need: the same results.
+pub fn trimmed(formats: Formats, monomials: Monomials, coefficients: &[i128]) -> Formats {
+    let wide = Formats {
+        intermediate: Target::signed(127, formats.intermediate.fraction_bits),
+        ..formats
+    };
+    match intermediate_with(wide, monomials, coefficients) {
+        Some((_, format, _)) => Formats {
+            intermediate: Target::from(format),
+            ..formats
+        },
+        None => formats,
+    }
 }

@@ -7,10 +7,12 @@
 //! best of them are improved by steps of their coefficients and along short lattice vectors.
 //!
 //! If E(c) is the ideal error over the codes, T(c) the whole one and B a bound of what rounding adds, then
-//! T(c) >= E(c) - B: once every c with E(c) <= T_best + B has been looked at, T_best is the optimum.
+//! T(c) >= E(c) - B: once every c with E(c) <= T_best + B has been looked at, T_best is the optimum. These are
+//! often too many; what the output's codes allow ([`super::proof`]) leaves few.
 
 use super::coefficients::{Best, Budget, Enumeration};
 use super::problem::{Candidate, Problem};
+use super::proof::{self, SLABS_EACH, Slabs};
 use crate::error::Result;
 use std::collections::HashSet;
 
@@ -26,6 +28,13 @@ pub trait Datapath {
 
     /// Bound of |datapath - polynomial in real arithmetic| over all codes, output rounding included.
     fn evaluation_bound(&self, raw: &[i128]) -> f64;
+
+    /// About `count` slabs of the polynomials whose total error is at most `limit`, given that the
+    /// evaluation without the output's rounding adds at most what it adds to `raw`, and a twentieth. By default nothing
+    /// is known.
+    fn slabs(&self, _raw: &[i128], _limit: f64, _count: usize) -> Slabs {
+        Slabs::Some(Vec::new())
+    }
 }
 
 /// How much may be spent. Steps, not seconds: the same result on every machine.
@@ -73,10 +82,14 @@ pub struct Found {
     pub ideal_error: f64,
     /// Largest error of the datapath over all codes.
     pub total_error: f64,
-    /// True if no coefficients in these formats can have a total error smaller by more than
-    /// [`NEAR`], given that [`Datapath::evaluation_bound`] is nowhere above the largest value met.
+    /// True if no coefficients in these formats can have a total error below [`Found::least`], given that
+    /// [`Datapath::evaluation_bound`] is nowhere above the largest value met.
     /// Needs a problem on codes ([`super::Samples::on_codes`]).
     pub proved: bool,
+    /// The least total error that was met.
+    pub least: f64,
+    /// The coefficients that were met with a total error within [`NEAR`] of the least, with it.
+    pub near: Vec<(Candidate, f64)>,
     /// Every choice with an ideal error below this was looked at.
     pub complete_below: f64,
     /// Coefficients looked at, by the sample at least.
@@ -92,6 +105,12 @@ pub struct Found {
 pub const NEAR: f64 = 0.005;
 /// Starting points of the local search.
 const STARTS: usize = 24;
+/// Rounds of the proof, each with the least total error that the one before it found.
+const PROOF_ROUNDS: usize = 6;
+/// Choices in the slabs that are run.
+const MOST_IN_SLABS: usize = 4000;
+/// What is less than the least total error.
+const STRICTLY: f64 = 1.0 - 1e-9;
 /// Choices near the least total error that are kept whatever their ideal error.
 const MOST_NEAR: usize = 64;
 
@@ -101,6 +120,19 @@ const MOST_NEAR: usize = 64;
 /// result is infinite.
 pub fn search(problem: &Problem, datapath: &dyn Datapath, effort: Effort) -> Result<Found> {
     let best = problem.best(effort.budget)?;
+    search_from(problem, best, datapath, effort)
+}
+
+/// The same from ideal coefficients that are known, such as those for the whole interval instead of its codes.
+///
+/// # Errors
+/// As [`search`].
+pub fn search_from(
+    problem: &Problem,
+    best: Best,
+    datapath: &dyn Datapath,
+    effort: Effort,
+) -> Result<Found> {
     let mut run = Run::new(problem, datapath, effort.evaluations);
     let ideal = Candidate {
         raw: best.raw.clone(),
@@ -129,8 +161,10 @@ pub fn search(problem: &Problem, datapath: &dyn Datapath, effort: Effort) -> Res
     for start in run.pool(STARTS) {
         run.walk(start, &steps);
     }
-    let chosen = run.chosen(&baselines).unwrap_or((ideal, f64::INFINITY));
     let needed = run.total + run.largest_bound;
+    let complete = all && !problem.samples.is_continuous() && listed.complete_below >= needed;
+    let proved = complete || !problem.samples.is_continuous() && run.prove(effort.budget);
+    let chosen = run.chosen(&baselines).unwrap_or((ideal, f64::INFINITY));
     Ok(Found {
         values: problem
             .values(&chosen.0.raw)
@@ -140,7 +174,9 @@ pub fn search(problem: &Problem, datapath: &dyn Datapath, effort: Effort) -> Res
         ideal_error: problem.exact_error(&chosen.0.raw).max(chosen.0.error),
         raw: chosen.0.raw,
         total_error: chosen.1,
-        proved: all && !problem.samples.is_continuous() && listed.complete_below >= needed,
+        proved,
+        least: run.total,
+        near: run.near.clone(),
         complete_below: if all { listed.complete_below } else { 0.0 },
         evaluations: run.evaluations,
         baselines,
@@ -151,7 +187,8 @@ pub fn search(problem: &Problem, datapath: &dyn Datapath, effort: Effort) -> Res
 /// Lattice points up to the ideal error beyond which none can win, or as many as may be tried. The limit
 /// grows in steps, for a large ball holds far more points than are wanted.
 fn candidates(run: &Run, best: &Best, effort: Effort) -> Result<Enumeration> {
-    let most = run.total + run.largest_bound;
+    // A little more, for the bound may grow with the coefficients to come.
+    let most = (run.total + run.largest_bound) * (1.0 + NEAR);
     let most = if most.is_finite() {
         most
     } else {
@@ -317,6 +354,36 @@ impl<'p> Run<'p> {
                 _ => return,
             }
         }
+    }
+
+    /// True if what the output's codes allow leaves nothing better, which is then known to be all.
+    fn prove(&mut self, budget: Budget) -> bool {
+        for _ in 0..PROOF_ROUNDS {
+            let before = self.total;
+            let Some(widest) = self.near.first().map(|(c, _)| c.raw.clone()) else {
+                return false;
+            };
+            let count = SLABS_EACH * self.problem.formats.len();
+            let slabs = match self.datapath.slabs(&widest, before * STRICTLY, count) {
+                Slabs::Impossible => return true,
+                Slabs::Some(slabs) => slabs,
+            };
+            let Some((found, all)) = proof::within(self.problem, slabs, MOST_IN_SLABS, budget) else {
+                return false;
+            };
+            self.most_evaluations = self.evaluations + found.len() as u64;
+            for candidate in found {
+                let candidate = self.problem.candidate(candidate.raw);
+                self.judge(&candidate);
+            }
+            if all {
+                return true;
+            }
+            if self.total >= before {
+                return false;
+            }
+        }
+        false
     }
 
     /// Of those near the least total error the one with the least ideal error; but not one that loses
