@@ -4,6 +4,7 @@
 //! forms; [`coefficients`] puts them together for a polynomial, [`choice`] among all forms; [`job`] does what
 //! `gyrogen approx` is asked, [`bundle`] emits it.
 
+pub mod bias;
 pub mod bundle;
 mod check;
 pub mod choice;

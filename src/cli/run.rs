@@ -118,8 +118,11 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
         s.budget.bound_dps,
         s.budget.estimate_dps
     );
+    for line in &s.certainty_text {
+        say!("{line}");
+    }
     say!(
-        "outside {:.6} .. {:.6} {} the compensation's input is clamped",
+        "calibrated for {:.6} .. {:.6} {}",
         s.fit.range.0,
         s.fit.range.1,
         s.fit.unit

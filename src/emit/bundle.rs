@@ -60,6 +60,8 @@ pub struct Bundle {
     pub has_chain: bool,
     /// R, where there is a chain.
     pub ratio: u32,
+    /// How accurate the compensation is, in sentences for the head of the sources.
+    pub accuracy: Vec<String>,
 }
 
 impl Bundle {
@@ -87,6 +89,7 @@ impl Bundle {
             program,
             has_chain,
             ratio: design.circuit.decimator.ratio,
+            accuracy: Vec::new(),
         }
     }
 

@@ -5,6 +5,7 @@ use super::machine::{Type, Width};
 use super::manifest::{self, Header, Manifest};
 use super::views::{self, FunctionView, Language, StateView, StructView, TableView, mix};
 use super::{c, rust};
+use crate::approx::bias::certainty;
 use crate::circuit::engine::{self, ArithmeticKind, Rows};
 use crate::design::Design;
 use crate::error::{InputError, Result, io_error};
@@ -105,7 +106,11 @@ pub fn emit(
             .help("add a [compensation] table, or emit `--part chain`")
             .into());
     }
-    let bundle = Bundle::new(design, part);
+    let mut bundle = Bundle::new(design, part);
+    // Words so long that the polynomial cannot be enclosed have no such line.
+    if let Ok(Some(bounds)) = certainty::bounds(design) {
+        bundle.accuracy = certainty::sentences(design, &bounds);
+    }
     let models = model::models(design, &bundle.program);
     let banner = manifest::banner(&design.source.sha256, command);
     let facts = manifest::facts(design, &bundle);

@@ -76,6 +76,7 @@ pub fn bundle(what: &Standalone) -> Bundle {
         program: what.program.clone(),
         has_chain: false,
         ratio: 1,
+        accuracy: Vec::new(),
     }
 }
 

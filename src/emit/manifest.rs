@@ -3,7 +3,7 @@
 use super::bundle::Bundle;
 use super::files::EmittedFile;
 use super::views::{FunctionView, Language, TableView};
-use crate::design::{CompensationInput, Design};
+use crate::design::{CompensationInput, Design, Outside};
 use crate::numeric::format::Overflow;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -177,10 +177,15 @@ pub fn facts(design: &Design, bundle: &Bundle) -> Vec<String> {
         ));
         facts.push(match k.clamp_raw {
             Some((low, high)) => {
-                format!("calibrated for inputs {low} .. {high}; outside, the input is clamped")
+                let outside = match k.outside {
+                    Outside::Clamp => "the input is clamped",
+                    Outside::HoldSlope => "the slope of the nearer end is held",
+                };
+                format!("calibrated for inputs {low} .. {high}; outside, {outside}")
             }
             None => "no calibrated range: the polynomial is evaluated at every input".into(),
         });
+        facts.extend_from_slice(&bundle.accuracy);
     }
     facts.push("words are two's complement; ranges beside them are proved, not observed".into());
     if bundle.may_fault() {

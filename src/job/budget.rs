@@ -1,9 +1,10 @@
 //! One budget for the compensation: what each step may add to the bias, in deg/s and in output LSB.
 
-use super::coefficients::{Rounded, variable};
+use super::coefficients::variable;
+use crate::approx::bias::certainty::Certainty;
 use crate::closure::BaselineFit;
 use crate::design::{CompensationInput, Design};
-use crate::numeric::format::{Rounding, pow2};
+use crate::numeric::format::pow2;
 use serde::Serialize;
 
 /// One contribution.
@@ -31,7 +32,7 @@ pub struct Budget {
 }
 
 /// The budget of a design whose coefficients have been rounded.
-pub fn budget(design: &Design, fit: &BaselineFit, rounded: &Rounded) -> Budget {
+pub fn budget(design: &Design, fit: &BaselineFit, certainty: &Certainty) -> Budget {
     let Some(c) = &design.compensation else {
         return Budget {
             lines: Vec::new(),
@@ -56,10 +57,6 @@ pub fn budget(design: &Design, fit: &BaselineFit, rounded: &Rounded) -> Budget {
         .map(|k| fit.centre + fit.half_span * (f64::from(k) / 50.0 - 1.0))
         .map(|t| fit.slope_dps(t).abs())
         .fold(0.0, f64::max);
-    let p_max = rounded.p_range.0.abs().max(rounded.p_range.1.abs());
-    let step = one_rounding(c.accumulator.rounding) * c.accumulator.format.lsb();
-    // Each step's rounding is multiplied by p in every later step.
-    let evaluation = (1..rounded.exact.len()).fold(0.0, |e, _| e * p_max + step);
     let lines = vec![
         line(
             "calibration: noise of the fit",
@@ -74,17 +71,17 @@ pub fn budget(design: &Design, fit: &BaselineFit, rounded: &Rounded) -> Budget {
         ),
         line(
             "coefficients: rounding to their format",
-            rounded.cost_dps,
+            certainty.bounds.coefficients_dps,
             "bound",
         ),
         line(
             "evaluation: rounding of each Horner step",
-            evaluation,
+            certainty.bounds.evaluation_dps,
             "bound",
         ),
         line(
             "output: rounding of bias and of rate",
-            2.0 * one_rounding(c.output.rounding) * output_lsb,
+            2.0 * certainty.bounds.output_dps,
             "bound",
         ),
     ];
@@ -96,13 +93,5 @@ pub fn budget(design: &Design, fit: &BaselineFit, rounded: &Rounded) -> Budget {
         bound_dps: of("bound").iter().sum(),
         estimate_dps: of("estimate").iter().map(|v| v * v).sum::<f64>().sqrt(),
         lines,
-    }
-}
-
-/// The largest error of one rounding, LSB.
-fn one_rounding(rounding: Rounding) -> f64 {
-    match rounding {
-        Rounding::HalfUp | Rounding::HalfEven | Rounding::HalfAway => 0.5,
-        Rounding::Floor | Rounding::TowardZero | Rounding::Ceil => 1.0,
     }
 }

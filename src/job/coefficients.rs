@@ -1,9 +1,9 @@
 //! The fitted polynomial in the firmware's variable and formats, and what the rounding costs.
 
 use super::{compensation, thermometer_raw};
+use crate::approx::bias::coefficients as best_coefficients;
 use crate::closure::BaselineFit;
-use crate::closure::polynomial;
-use crate::design::{Circuit, Compensation, CompensationInput, Design};
+use crate::design::{Circuit, Compensation, CompensationInput, Design, Fitted, Outside};
 use crate::error::{InputError, Result};
 use crate::numeric::format::{Format, pow2};
 
@@ -14,8 +14,6 @@ pub struct Rounded {
     pub exact: Vec<f64>,
     /// The range of p.
     pub p_range: (f64, f64),
-    /// Largest change of the bias over the calibrated range that rounding makes, deg/s.
-    pub cost_dps: f64,
 }
 
 /// The firmware's variable: T = offset + scale * p.
@@ -66,28 +64,42 @@ pub fn round(design: &mut Design, fit: &BaselineFit) -> Result<Rounded> {
     for (order, value) in exact.iter().enumerate() {
         raw.push(quantise(order, *value, format)?);
     }
-    let errors: Vec<f64> = raw
-        .iter()
-        .zip(&exact)
-        .map(|(r, e)| *r as f64 * format.lsb() - e)
-        .collect();
-    let at = |k: u32| p_range.0 + (p_range.1 - p_range.0) * f64::from(k) / 1000.0;
-    let cost_dps = (0..=1000)
-        .map(|k| polynomial::evaluate(&errors, at(k)).abs())
-        .fold(0.0, f64::max);
     let clamp = (
         thermometer_raw(design, c, fit.range.0),
         thermometer_raw(design, c, fit.range.1),
     );
-    if let Some(c) = &mut design.compensation {
-        c.coefficients_raw = raw;
-        c.clamp_raw = (clamp.0 < clamp.1).then_some(clamp);
+    let mut chosen = Compensation {
+        coefficients_raw: raw.clone(),
+        clamp_raw: (clamp.0 < clamp.1).then_some(clamp),
+        fitted: Some(Fitted {
+            coefficients_dps: exact.clone(),
+            std_max_dps: fit.std_max_dps(),
+            heldout_rms_dps: fit.heldout_rms_dps,
+        }),
+        ..c.clone()
+    };
+    chosen.coefficients_raw = best_coefficients::best(&design.circuit, &chosen, &exact, &raw)?;
+    check_slopes(&design.circuit, &chosen)?;
+    design.compensation = Some(chosen);
+    Ok(Rounded { exact, p_range })
+}
+
+/// A slope that goes on beyond the range is a constant in the coefficients' format.
+fn check_slopes(circuit: &Circuit, c: &Compensation) -> Result<()> {
+    let ends = c.clamp_raw.filter(|_| c.outside == Outside::HoldSlope);
+    for word in ends.map_or(Vec::new(), |(low, high)| vec![low, high]) {
+        let slope = c.slope_raw(circuit, word);
+        if !c.coefficient_format.contains(slope) {
+            return Err(InputError::new(format!(
+                "`compensation.outside = \"hold_slope\"` needs the fitted slope at input {word}, raw {slope}, which \
+                 {} cannot hold",
+                c.coefficient_format
+            ))
+            .help("give `compensation.coefficient_format` more integer bits")
+            .into());
+        }
     }
-    Ok(Rounded {
-        exact,
-        p_range,
-        cost_dps,
-    })
+    Ok(())
 }
 
 /// Nearest, ties up.

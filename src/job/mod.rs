@@ -18,6 +18,7 @@ pub mod from_record;
 pub mod outcome;
 pub mod own_run;
 
+use crate::approx::bias::certainty;
 use crate::closure::BaselineFit;
 use crate::design::{Compensation, CompensationInput, Design};
 use crate::error::Result;
@@ -66,7 +67,17 @@ pub fn run(
         warnings.extend(run.warnings(&design));
     }
     let (fit, chosen, rounded) = (calibration.fit, calibration.chosen, calibration.rounded);
-    let budget = budget::budget(&design, &fit, &rounded);
+    let certainty = certainty::certainty(&design)?.ok_or_else(no_compensation)?;
+    if certainty.saturates {
+        warnings.push(warning(
+            "bias_saturates",
+            format!(
+                "the bias leaves its formats inside the calibrated range: at input {} it is {:.4} deg/s from the fit",
+                certainty.at_input_raw, certainty.exhaustive_max_dps
+            ),
+        ));
+    }
+    let budget = budget::budget(&design, &fit, &certainty);
 
     say("emitting, building and comparing C and Rust");
     let firmware = firmware::Firmware::make(&design, command)?;
@@ -88,6 +99,7 @@ pub fn run(
         chosen,
         rounded,
         budget,
+        certainty,
         firmware,
         compared,
         points,
@@ -97,11 +109,13 @@ pub fn run(
 
 /// The compensation of a design that has been filled in.
 fn compensation(design: &Design) -> Result<&Compensation> {
-    design.compensation.as_ref().ok_or_else(|| {
-        crate::error::InputError::new("the design has no [compensation]")
-            .help("add one, or leave [circuit] out to use the default's")
-            .into()
-    })
+    design.compensation.as_ref().ok_or_else(no_compensation)
+}
+
+fn no_compensation() -> crate::error::Error {
+    crate::error::InputError::new("the design has no [compensation]")
+        .help("add one, or leave [circuit] out to use the default's")
+        .into()
 }
 
 /// Raw input of the compensation for a reading of the thermometer, rounded and limited as a driver

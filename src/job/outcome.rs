@@ -4,6 +4,7 @@ use super::budget::Budget;
 use super::coefficients::Rounded;
 use super::firmware::Firmware;
 use super::{drift_pp, rms};
+use crate::approx::bias::certainty::{self, Certainty};
 use crate::closure::BaselineFit;
 use crate::design::Design;
 use crate::emit::manifest::sha256;
@@ -56,6 +57,8 @@ pub struct Parts {
     pub rounded: Rounded,
     /// What each step costs.
     pub budget: Budget,
+    /// The bias against the fit, proved and run.
+    pub certainty: Certainty,
     /// Emitted and built.
     pub firmware: Firmware,
     /// Against the model.
@@ -91,6 +94,10 @@ pub struct Summary {
     pub chosen: Vec<String>,
     /// What each step costs.
     pub budget: Budget,
+    /// The emitted bias against the fitted polynomial: proved, and run over the calibrated inputs.
+    pub certainty: Certainty,
+    /// The same in words.
+    pub certainty_text: Vec<String>,
     /// Emitted code against the model.
     pub equivalence: Equivalence,
     /// The firmware's files.
@@ -240,6 +247,12 @@ impl Outcome {
             },
             chosen: parts.chosen.clone(),
             budget: parts.budget.clone(),
+            certainty_text: {
+                let mut text = certainty::sentences(&parts.design, &parts.certainty.bounds);
+                text.push(certainty::run_sentence(&parts.design, &parts.certainty));
+                text
+            },
+            certainty: parts.certainty.clone(),
             equivalence: Equivalence {
                 compared: parts.compared.iter().map(|c| c.compared).sum(),
                 mismatches: parts.compared.iter().map(|c| c.mismatches).sum::<u64>() + on_record,

@@ -29,6 +29,8 @@ pub struct Page {
     pub budget: Vec<[String; 4]>,
     /// The sums in the same layout.
     pub budget_sums: Vec<[String; 4]>,
+    /// The bias against the fit, in sentences.
+    pub certainty: Vec<String>,
     /// The fit: name, value.
     pub fit: Vec<[String; 2]>,
     /// Orders that were tried.
@@ -118,6 +120,7 @@ impl Page {
                     "estimate",
                 ),
             ],
+            certainty: s.certainty_text.clone(),
             fit: tables::fit(shown),
             orders: tables::orders(shown),
             unit: shown.fit.unit.to_owned(),

@@ -1,6 +1,7 @@
 //! Tests of the page, on a record that is made up.
 
 use super::super::{Shown, render};
+use crate::approx::bias::certainty;
 use crate::closure::{self, BaselineFit};
 use crate::design::Design;
 use crate::job::coefficients::{self, Rounded};
@@ -34,7 +35,8 @@ impl Made {
         let fit = closure::fit(&record, &Default::default(), &design.fit).unwrap();
         let chosen = formats::fill(&mut design, &fit, &record).unwrap();
         let rounded = coefficients::round(&mut design, &fit).unwrap();
-        let budget = budget::budget(&design, &fit, &rounded);
+        let certainty = certainty::certainty(&design).unwrap().unwrap();
+        let budget = budget::budget(&design, &fit, &certainty);
         let points: Vec<Point> = rows
             .iter()
             .map(|(time, die, rate)| {
@@ -103,6 +105,8 @@ impl Made {
                 outliers: 0,
             },
             budget,
+            certainty_text: certainty::sentences(&design, &certainty.bounds),
+            certainty,
             equivalence: Equivalence {
                 compared: 262_144,
                 mismatches: 0,

@@ -10,8 +10,8 @@ pub fn fit(shown: &Shown) -> Vec<[String; 2]> {
     let f = shown.fit;
     let unit = f.unit;
     let outside = if shown.is_clamped() {
-        "the firmware clamps its input to this range, so the bias stays at that of the nearer end; how \
-         large the worst error is there is unknown"
+        "nothing was measured there; what the firmware does, and how far from the continued polynomial that \
+         may be, is said below the budget"
     } else {
         "the firmware does not limit its input, so the polynomial extrapolates; how large the worst \
          error is there is unknown"

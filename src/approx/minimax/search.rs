@@ -368,7 +368,8 @@ impl<'p> Run<'p> {
                 Slabs::Impossible => return true,
                 Slabs::Some(slabs) => slabs,
             };
-            let Some((found, all)) = proof::within(self.problem, slabs, MOST_IN_SLABS, budget) else {
+            let Some((found, all)) = proof::within(self.problem, slabs, MOST_IN_SLABS, budget)
+            else {
                 return false;
             };
             self.most_evaluations = self.evaluations + found.len() as u64;
