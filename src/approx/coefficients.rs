@@ -108,7 +108,8 @@ pub fn choose(
     let whole = Problem::new(&whole, &whole_real, &[CoefficientFormat::from(format)])?;
     let effort = Effort::default();
     let best = whole.best(effort.budget)?;
-    let found = minimax::search_from(&problem, best, &path, effort)?;
+    let mut found = minimax::search_from(&problem, best, &path, effort)?;
+    improve_ideal(&mut found, &whole, &path);
     let taken = Taken::of(&found, &whole, &path);
     let raw = spread(&taken.raw, kind, degree);
     if request.intermediate.is_none() {
@@ -118,6 +119,32 @@ pub fn choose(
         form: Polynomial::new(formats, kind, raw)?,
         search: taken.report(&found),
     })
+}
+
+/// Where the search met coefficients with a smaller ideal error than the best that it began with (these
+/// are not proved, then), they are the best.
+fn improve_ideal(found: &mut Found, whole: &Problem, path: &Evaluation) {
+    if found.best.proved {
+        return;
+    }
+    let met = found.listed.iter().chain(found.near.iter().map(|(c, _)| c));
+    let errors = met.map(|c| (whole.exact_error(&c.raw), c.raw.clone()));
+    let Some((error, raw)) = errors.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))) else {
+        return;
+    };
+    if error >= found.best.error {
+        return;
+    }
+    if let Some(ideal) = found.baselines.iter_mut().find(|j| j.name == "ideal") {
+        let total = path.max_error(&raw, f64::INFINITY);
+        *ideal = Judged {
+            raw: raw.clone(),
+            ideal_error: error,
+            total_error: total.unwrap_or(f64::INFINITY),
+            ..ideal.clone()
+        };
+    }
+    (found.best.error, found.best.raw) = (error, raw);
 }
 
 /// The coefficients that are taken.
@@ -252,3 +279,7 @@ pub fn within(
         (format.bits() <= 64).then(|| (format, spread(&best.raw, kind, degree)))
     })
 }
+
+#[cfg(test)]
+#[path = "coefficients_tests.rs"]
+mod tests;

@@ -129,6 +129,7 @@ pub fn approximate(
     let function = check::function(request)?;
     let codes = check::codes(request, &function)?;
     check::output(request, &function)?;
+    check::polynomial(request, &function, codes)?;
     let (form, search, candidates) = choose(request, &function, codes)?;
     let most_codes = if request.exhaustive {
         MOST_CODES

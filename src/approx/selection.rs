@@ -54,14 +54,15 @@ pub fn select(
         return (None, Reason::RoundingSmall);
     }
     // Nearly as good is not good enough where it loses what the least one wins.
-    let good = |e: &Errors| {
-        e.total <= least || (e.total <= least * (1.0 + NEAR) && e.total < to_beat)
-    };
+    let good =
+        |e: &Errors| e.total <= least || (e.total <= least * (1.0 + NEAR) && e.total < to_beat);
     let best = (0..near.len())
         .filter(|k| near.get(*k).is_some_and(good))
         .min_by(|a, b| {
             let (a, b) = (near[*a], near[*b]);
-            a.ideal.total_cmp(&b.ideal).then(a.total.total_cmp(&b.total))
+            a.ideal
+                .total_cmp(&b.ideal)
+                .then(a.total.total_cmp(&b.total))
         });
     let own = good(&ideal) && best.is_none_or(|k| ideal.ideal <= near[k].ideal);
     (best.filter(|_| !own), Reason::LeastTotal)

@@ -47,7 +47,7 @@ pub struct Arguments {
     #[arg(long, value_enum, default_value = "polynomial")]
     form: Asked,
     /// The most that the certified error may be, in the function's unit.
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     bound: Option<f64>,
     /// What the coefficients' error is weighed with.
     #[arg(long, value_enum, default_value = "absolute")]
@@ -298,7 +298,9 @@ fn taken(search: &Search) -> String {
     let part = 100.0 * search.rounding_part;
     let why = match search.reason {
         Reason::RoundingNegligible => {
-            format!("rounding is {part:.2} % of the error: the coefficients that are best by themselves")
+            format!(
+                "rounding is {part:.2} % of the error: the coefficients that are best by themselves"
+            )
         }
         Reason::RoundingSmall => format!(
             "rounding is {part:.1} % of the error: the coefficients that are best by themselves, \
@@ -308,9 +310,11 @@ fn taken(search: &Search) -> String {
             format!("rounding is {part:.0} % of the error: the least error of the whole evaluation")
         }
     };
-    let gain = search.gain_over_nearest_plane_percent.map_or(String::new(), |g| {
-        format!("; {g:.2} % below the nearest plane's")
-    });
+    let gain = search
+        .gain_over_nearest_plane_percent
+        .map_or(String::new(), |g| {
+            format!("; {g:.2} % below the nearest plane's")
+        });
     let best = match search.compared.last() {
         Some(c) if c.proved => "; proved: nothing better exists",
         _ if search.proved_best => "; proved: nothing is below the least total error",
