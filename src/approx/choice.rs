@@ -16,6 +16,8 @@ use crate::numeric::format::Format;
 
 /// Codes that are run for each candidate; beyond them its bound comes from analysis.
 const QUICK_CODES: u128 = 1 << 16;
+/// Of these so many, which only show an error of the proof.
+const QUICK_SAMPLE: u128 = 1 << 12;
 /// Codes of a first look at a candidate.
 const FIRST_LOOK: u128 = 2000;
 /// The highest degree of a polynomial that is looked for.
@@ -55,6 +57,7 @@ impl Candidate {
         }
         let effort = Effort {
             most_codes: QUICK_CODES,
+            sample: QUICK_SAMPLE,
             threads: super::form::measure::threads(),
             progress: &|_| (),
         };

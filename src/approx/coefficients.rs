@@ -20,6 +20,9 @@ const GUARD_BITS: [u32; 4] = [0, 2, 4, 8];
 /// Fraction bits that the search's intermediate does without.
 const SPARE_BITS: i32 = 4;
 
+/// For the best coefficients under ideal evaluation.
+const BEST: Budget = Budget { nodes: 2_000_000 };
+
 /// Coefficients with how they were found.
 #[derive(Debug, Clone)]
 pub struct Chosen {
@@ -107,7 +110,7 @@ pub fn choose(
     let whole_real = minimax::minimax(&whole)?;
     let whole = Problem::new(&whole, &whole_real, &[CoefficientFormat::from(format)])?;
     let effort = Effort::default();
-    let best = whole.best(effort.budget)?;
+    let best = whole.best(BEST)?;
     let mut found = minimax::search_from(&problem, best, &path, effort)?;
     improve_ideal(&mut found, &whole, &path);
     let taken = Taken::of(&found, &whole, &path);
@@ -128,10 +131,11 @@ fn improve_ideal(found: &mut Found, whole: &Problem, path: &Evaluation) {
         return;
     }
     let met = found.listed.iter().chain(found.near.iter().map(|(c, _)| c));
-    let errors = met.map(|c| (whole.exact_error(&c.raw), c.raw.clone()));
-    let Some((error, raw)) = errors.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))) else {
+    let errors = met.map(|c| (whole.error(&c.raw), &c.raw));
+    let Some((_, raw)) = errors.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(b.1))) else {
         return;
     };
+    let (error, raw) = (whole.exact_error(raw), raw.clone());
     if error >= found.best.error {
         return;
     }

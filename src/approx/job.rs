@@ -5,7 +5,7 @@ use super::choice::{self, Candidate, Wanted};
 use super::coefficients::{self, Chosen};
 use super::cost::{Cost, Target};
 use super::describe;
-use super::form::measure::{Effort, Measured, measure};
+use super::form::measure::{Effort, Measured, SAMPLE, measure};
 use super::form::polynomial::{self, Monomials, Polynomial};
 use super::form::{Codes, Form, Settled, overflow};
 use super::outcome::{ErrorBounds, Outcome};
@@ -141,6 +141,7 @@ pub fn approximate(
     let total = codes.count();
     let effort = Effort {
         most_codes,
+        sample: SAMPLE,
         threads,
         progress: &|count| progress(total, count),
     };

@@ -53,7 +53,7 @@ impl Default for Effort {
         Effort {
             candidates: 6000,
             evaluations: 20_000,
-            budget: Budget { nodes: 2_000_000 },
+            budget: Budget { nodes: 1_000_000 },
         }
     }
 }
@@ -90,7 +90,7 @@ pub struct Found {
     pub least: f64,
     /// The coefficients that were met with a total error within [`NEAR`] of the least, with it.
     pub near: Vec<(Candidate, f64)>,
-    /// The first of the lattice points that were run, by their ideal error over the problem's points.
+    /// The lattice points that were run, by their ideal error over the problem's points.
     pub listed: Vec<Candidate>,
     /// Every choice with an ideal error below this was looked at.
     pub complete_below: f64,
@@ -107,8 +107,6 @@ pub struct Found {
 pub const NEAR: f64 = 0.005;
 /// Starting points of the local search.
 const STARTS: usize = 24;
-/// Lattice points that are told.
-const LISTED: usize = 64;
 /// Rounds of the proof, each with the least total error that the one before it found.
 const PROOF_ROUNDS: usize = 6;
 /// Choices in the slabs that are run.
@@ -181,7 +179,7 @@ pub fn search_from(
         proved,
         least: run.total,
         near: run.near.clone(),
-        listed: listed.candidates.iter().take(LISTED).cloned().collect(),
+        listed: listed.candidates,
         complete_below: if all { listed.complete_below } else { 0.0 },
         evaluations: run.evaluations,
         baselines,
