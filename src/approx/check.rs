@@ -188,8 +188,52 @@ pub(super) fn output(request: &Request, function: &Function) -> Result<()> {
         return Ok(());
     }
     Err(InputError::new(format!(
-        "the function's values, {least:.6} to {greatest:.6}, do not fit the output format {format}, which holds {low} to {high}"
+        "the function's values, {} to {}, do not fit the output format {format}, which holds {low} to {high}",
+        readable(least),
+        readable(greatest)
     ))
     .help(integer_bits(least.min(0.0), greatest.max(0.0), format))
     .into())
+}
+
+/// A value that is known to a few digits.
+fn readable(value: f64) -> String {
+    match value.abs() {
+        v if v < 1e-7 => "0".to_owned(),
+        v if (1e-3..1e7).contains(&v) => format!("{value:.6}"),
+        _ => format!("{value:.4e}"),
+    }
+}
+
+/// Refuses polynomials that have more coefficients than there are codes, or that are 0 where the function is not.
+///
+/// # Errors
+/// Which of the two.
+pub(super) fn polynomial(request: &Request, function: &Function, codes: Codes) -> Result<()> {
+    let (Some(degree), Asked::Polynomial | Asked::Auto) = (request.degree, request.form) else {
+        return Ok(());
+    };
+    let kind = request.monomials.unwrap_or_default();
+    let unknowns = kind.exponents(degree).len();
+    if unknowns as u128 > codes.count() {
+        return Err(InputError::new(format!(
+            "a polynomial of degree {degree} has {unknowns} coefficients, but the domain holds only {} codes of the input",
+            codes.count()
+        ))
+        .help("use a lower degree, or a plain table: `--form table --degree 0`")
+        .into());
+    }
+    let (a, b) = function.domain();
+    if kind == Monomials::Odd && a <= 0.0 && b >= 0.0 {
+        let (value, radius) = function.at(0.0);
+        if value.abs() - radius > 0.5 * request.output.lsb() {
+            return Err(InputError::new(format!(
+                "an odd polynomial is 0 at x = 0, where the function is {}",
+                readable(value)
+            ))
+            .help("use `--monomials all` or `even`, or a domain without 0")
+            .into());
+        }
+    }
+    Ok(())
 }

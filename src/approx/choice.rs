@@ -16,6 +16,8 @@ use crate::numeric::format::Format;
 
 /// Codes that are run for each candidate; beyond them its bound comes from analysis.
 const QUICK_CODES: u128 = 1 << 16;
+/// Of these so many, which only show an error of the proof.
+const QUICK_SAMPLE: u128 = 1 << 12;
 /// Codes of a first look at a candidate.
 const FIRST_LOOK: u128 = 2000;
 /// The highest degree of a polynomial that is looked for.
@@ -55,6 +57,7 @@ impl Candidate {
         }
         let effort = Effort {
             most_codes: QUICK_CODES,
+            sample: QUICK_SAMPLE,
             threads: super::form::measure::threads(),
             progress: &|_| (),
         };
@@ -291,10 +294,27 @@ impl Search<'_> {
         self.longest(&make, &self.guards())
     }
 
+    /// The code from which power-of-two segments go outward: 0 if that is the middle of a symmetry or an end of
+    /// the domain, else the middle of a symmetry or the first code. Seen from the last code downward
+    /// everything is the mirror image of what is not there.
+    fn outward(&self) -> Option<Symmetry> {
+        let from_zero = Symmetry {
+            about_raw: 0,
+            odd: false,
+        };
+        match self.symmetry {
+            Some(s) if s.about_raw == 0 => Some(s),
+            _ if self.codes.low == 0 => None,
+            _ if self.codes.high == 0 => Some(from_zero),
+            other => other,
+        }
+    }
+
     fn power_of_two(&self, degree: usize) -> Option<Candidate> {
+        let symmetry = self.outward();
         let with = |steps: u32, fraction_bits: u32| {
             let spacing = Spacing::PowerOfTwo { steps };
-            let split = Split::new(self.codes, self.symmetry, spacing);
+            let split = Split::new(self.codes, symmetry, spacing);
             let (f, output) = (self.function, self.output);
             self.meets(generate::piecewise(f, split, degree, output, fraction_bits))
         };

@@ -20,6 +20,9 @@ const GUARD_BITS: [u32; 4] = [0, 2, 4, 8];
 /// Fraction bits that the search's intermediate does without.
 const SPARE_BITS: i32 = 4;
 
+/// For the best coefficients under ideal evaluation.
+const BEST: Budget = Budget { nodes: 2_000_000 };
+
 /// Coefficients with how they were found.
 #[derive(Debug, Clone)]
 pub struct Chosen {
@@ -107,8 +110,9 @@ pub fn choose(
     let whole_real = minimax::minimax(&whole)?;
     let whole = Problem::new(&whole, &whole_real, &[CoefficientFormat::from(format)])?;
     let effort = Effort::default();
-    let best = whole.best(effort.budget)?;
-    let found = minimax::search_from(&problem, best, &path, effort)?;
+    let best = whole.best(BEST)?;
+    let mut found = minimax::search_from(&problem, best, &path, effort)?;
+    improve_ideal(&mut found, &whole, &path);
     let taken = Taken::of(&found, &whole, &path);
     let raw = spread(&taken.raw, kind, degree);
     if request.intermediate.is_none() {
@@ -118,6 +122,33 @@ pub fn choose(
         form: Polynomial::new(formats, kind, raw)?,
         search: taken.report(&found),
     })
+}
+
+/// Where the search met coefficients with a smaller ideal error than the best that it began with (these
+/// are not proved, then), they are the best.
+fn improve_ideal(found: &mut Found, whole: &Problem, path: &Evaluation) {
+    if found.best.proved {
+        return;
+    }
+    let met = found.listed.iter().chain(found.near.iter().map(|(c, _)| c));
+    let errors = met.map(|c| (whole.error(&c.raw), &c.raw));
+    let Some((_, raw)) = errors.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(b.1))) else {
+        return;
+    };
+    let (error, raw) = (whole.exact_error(raw), raw.clone());
+    if error >= found.best.error {
+        return;
+    }
+    if let Some(ideal) = found.baselines.iter_mut().find(|j| j.name == "ideal") {
+        let total = path.max_error(&raw, f64::INFINITY);
+        *ideal = Judged {
+            raw: raw.clone(),
+            ideal_error: error,
+            total_error: total.unwrap_or(f64::INFINITY),
+            ..ideal.clone()
+        };
+    }
+    (found.best.error, found.best.raw) = (error, raw);
 }
 
 /// The coefficients that are taken.
@@ -252,3 +283,7 @@ pub fn within(
         (format.bits() <= 64).then(|| (format, spread(&best.raw, kind, degree)))
     })
 }
+
+#[cfg(test)]
+#[path = "coefficients_tests.rs"]
+mod tests;

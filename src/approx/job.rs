@@ -5,7 +5,7 @@ use super::choice::{self, Candidate, Wanted};
 use super::coefficients::{self, Chosen};
 use super::cost::{Cost, Target};
 use super::describe;
-use super::form::measure::{Effort, Measured, measure};
+use super::form::measure::{Effort, Measured, SAMPLE, measure};
 use super::form::polynomial::{self, Monomials, Polynomial};
 use super::form::{Codes, Form, Settled, overflow};
 use super::outcome::{ErrorBounds, Outcome};
@@ -129,6 +129,7 @@ pub fn approximate(
     let function = check::function(request)?;
     let codes = check::codes(request, &function)?;
     check::output(request, &function)?;
+    check::polynomial(request, &function, codes)?;
     let (form, search, candidates) = choose(request, &function, codes)?;
     let most_codes = if request.exhaustive {
         MOST_CODES
@@ -140,6 +141,7 @@ pub fn approximate(
     let total = codes.count();
     let effort = Effort {
         most_codes,
+        sample: SAMPLE,
         threads,
         progress: &|count| progress(total, count),
     };

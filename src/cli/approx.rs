@@ -47,7 +47,7 @@ pub struct Arguments {
     #[arg(long, value_enum, default_value = "polynomial")]
     form: Asked,
     /// The most that the certified error may be, in the function's unit.
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     bound: Option<f64>,
     /// What the coefficients' error is weighed with.
     #[arg(long, value_enum, default_value = "absolute")]

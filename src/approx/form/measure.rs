@@ -13,8 +13,8 @@ use crate::numeric::cast::HasKernel;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Codes that are run where there are too many to run all.
-const SAMPLE: u128 = 1 << 20;
+/// Codes that are run where there are too many to run all, if nothing else is wanted.
+pub const SAMPLE: u128 = 1 << 20;
 
 /// Pieces are divided so that there are about so many at least: a sum of maxima is the tighter the shorter the piece.
 const PARTS: i128 = 128;
@@ -54,6 +54,8 @@ pub struct Measured {
 pub struct Effort<'a> {
     /// All codes are run if there are at most so many.
     pub most_codes: u128,
+    /// About so many are run if there are more.
+    pub sample: u128,
     /// Threads.
     pub threads: usize,
     /// Told of codes that have been run.
@@ -85,7 +87,7 @@ pub fn measure(settled: &Settled, reference: &dyn Reference, effort: &Effort) ->
     let exhaustive = codes.count() <= effort.most_codes;
     let stride = match exhaustive {
         true => 1,
-        false => (codes.count() / SAMPLE).max(1) as i128,
+        false => (codes.count() / effort.sample.max(1)).max(1) as i128,
     };
     let (a, b) = reference.domain();
     let (least, greatest) = reference.range(a, b);

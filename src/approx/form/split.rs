@@ -33,7 +33,7 @@ pub enum Spacing {
         /// s.
         bits: u32,
     },
-    /// Each twice as long as the one before it, from the first code outward.
+    /// Each twice as long as the one before it, from the symmetry's code or the first code outward.
     PowerOfTwo {
         /// b: normalising steps; 2^b + 1 segments.
         steps: u32,

@@ -46,6 +46,7 @@ fn report(name: &str, form: Form, reference: &dyn Reference) -> (f64, f64) {
     let settled = form.settle().unwrap();
     let effort = Effort {
         most_codes: 1 << 24,
+        sample: super::measure::SAMPLE,
         threads: 2,
         progress: &|_| (),
     };

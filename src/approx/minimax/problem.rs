@@ -63,24 +63,21 @@ impl CoefficientFormat {
 
     fn refuse(self, value: Wide, exponent: u32) -> Error {
         let value = value.to_f64();
-        let help = if value < 0.0 && self.min_raw >= 0 {
-            "use a signed format".to_owned()
-        } else {
-            let sign = u32::from(self.min_raw < 0);
-            let mut bits = 0u32;
-            while bits < 1000 && value.abs() >= pow2(bits as i32) {
-                bits += 1;
-            }
-            format!(
-                "it takes {} integer bits{}",
-                bits + sign,
-                if sign == 1 {
-                    ", the sign among them"
-                } else {
-                    ""
-                }
-            )
+        let signed = self.min_raw < 0 || value < 0.0;
+        let mut bits = u32::from(signed);
+        while bits < 1000 && value.abs() >= pow2(bits as i32 - i32::from(signed)) {
+            bits += 1;
+        }
+        let which = match (self.min_raw >= 0, signed) {
+            (true, true) => "it takes a signed format and",
+            _ => "it takes",
         };
+        let sign = if signed { ", the sign among them" } else { "" };
+        let u = if signed { "" } else { "U" };
+        let help = format!(
+            "{which} {bits} integer bits{sign}: {u}Q{bits}.{}",
+            self.fraction_bits
+        );
         InputError::new(format!(
             "the coefficient of x^{exponent} is about {value:.6}, which its format does not hold \
              ({} to {})",

@@ -53,7 +53,7 @@ impl Default for Effort {
         Effort {
             candidates: 6000,
             evaluations: 20_000,
-            budget: Budget { nodes: 2_000_000 },
+            budget: Budget { nodes: 1_000_000 },
         }
     }
 }
@@ -90,6 +90,8 @@ pub struct Found {
     pub least: f64,
     /// The coefficients that were met with a total error within [`NEAR`] of the least, with it.
     pub near: Vec<(Candidate, f64)>,
+    /// The lattice points that were run, by their ideal error over the problem's points.
+    pub listed: Vec<Candidate>,
     /// Every choice with an ideal error below this was looked at.
     pub complete_below: f64,
     /// Coefficients looked at, by the sample at least.
@@ -177,6 +179,7 @@ pub fn search_from(
         proved,
         least: run.total,
         near: run.near.clone(),
+        listed: listed.candidates,
         complete_below: if all { listed.complete_below } else { 0.0 },
         evaluations: run.evaluations,
         baselines,

@@ -1,0 +1,171 @@
+//! What `gyrogen approx` cannot use is refused with the reason, and nothing is written.
+
+use std::process::{Command, Output};
+
+fn gyrogen(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_gyrogen"))
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+#[test]
+fn what_cannot_be_used_is_refused_with_the_reason() {
+    let base = |function: &'static str, domain: &'static str| {
+        vec!["--function", function, domain, "--input", "Q1.15"]
+    };
+    let with = |mut list: Vec<&'static str>, more: &[&'static str]| {
+        list.extend(more);
+        list
+    };
+    let cubic = [
+        "--degree",
+        "3",
+        "--output",
+        "Q2.14",
+        "--coefficients",
+        "Q2.14",
+    ];
+    let [odd, fifth, unsigned, quadratic] = [
+        ["--degree=3", "--monomials=odd", "--coefficients=Q2.14"],
+        ["--degree=5", "--monomials=all", "--coefficients=Q2.14"],
+        ["--degree=1", "--monomials=all", "--coefficients=UQ1.15"],
+        ["--degree=2", "--monomials=all", "--coefficients=Q1.15"],
+    ]
+    .map(|list| [&list[..], &["--output=Q2.14"]].concat());
+    let cases: Vec<(Vec<&str>, &[&str])> = vec![
+        (
+            with(base("1/x", "--domain=-1,1"), &cubic),
+            &["pole", "x = 0", "1:2"],
+        ),
+        (
+            with(base("tan(2*x)", "--domain=-0.9,0.9"), &cubic),
+            &["pole"],
+        ),
+        (
+            with(base("log(x)", "--domain=-0.5,0.5"), &cubic),
+            &["undefined"],
+        ),
+        (with(base("sin(x", "--domain=0,1"), &cubic), &["error"]),
+        (
+            with(base("sinn(x)", "--domain=0,1"), &cubic),
+            &["`sinn`", "1:1", "sin"],
+        ),
+        (
+            with(base("sin(x)", "--domain=1,0"), &cubic),
+            &["wrong order"],
+        ),
+        (with(base("sin(x)", "--domain=1,1"), &cubic), &["empty"]),
+        (with(base("sin(x)", "--domain=0"), &cubic), &["comma"]),
+        (
+            with(base("sin(x)", "--domain=0,3"), &cubic),
+            &["outside the input format", "Q3.15"],
+        ),
+        (
+            with(base("9*x", "--domain=0,1"), &cubic),
+            &["output format", "integer bits"],
+        ),
+        (
+            with(base("sin(x)", "--domain=0,1"), &["--output", "Q2.14"]),
+            &["neither a degree nor a bound"],
+        ),
+        (
+            with(
+                base("sin(x)", "--domain=0,1"),
+                &[
+                    "--degree",
+                    "25",
+                    "--output",
+                    "Q2.14",
+                    "--coefficients",
+                    "Q2.14",
+                ],
+            ),
+            &["degree 25", "24"],
+        ),
+        (
+            with(
+                base("1.7*x-0.2", "--domain=0,1"),
+                &[
+                    "--degree",
+                    "1",
+                    "--output",
+                    "Q2.14",
+                    "--coefficients",
+                    "Q1.15",
+                ],
+            ),
+            &["x^1", "2 integer bits"],
+        ),
+        (
+            with(
+                base("sin(x)", "--domain=0,1"),
+                &["--bound", "1e-9", "--output", "Q2.14"],
+            ),
+            &["half an LSB"],
+        ),
+        (
+            with(base("cos(x)", "--domain=-0.5,0.5"), &odd),
+            &["odd polynomial is 0", "function is 1"],
+        ),
+        (
+            with(base("sin(x)", "--domain=0,0.0001"), &fifth),
+            &["6 coefficients", "4 codes"],
+        ),
+        (
+            with(base("0.5-x", "--domain=0,0.9"), &unsigned),
+            &["x^1", "-1.0", "signed format", "2 integer bits"],
+        ),
+        (
+            with(base("2.3*x^2", "--domain=0,0.9"), &quadratic),
+            &["x^2", "2.3", "Q3.15"],
+        ),
+        (
+            with(base("1e300*x", "--domain=0,1"), &cubic),
+            &["1.0000e300", "output format"],
+        ),
+        (
+            with(base("sin(x)", "--domain=0,nan"), &cubic),
+            &["unknown name `nan`"],
+        ),
+        (
+            with(
+                base("sin(x)", "--domain=0,1"),
+                &["--bound", "-1", "--output", "Q2.14"],
+            ),
+            &["not a positive number"],
+        ),
+        (
+            with(
+                base("sin(3*x)", "--domain=-1,1"),
+                &[
+                    "--degree",
+                    "5",
+                    "--output",
+                    "Q2.14",
+                    "--coefficients",
+                    "Q4.12",
+                    "--intermediate",
+                    "Q1.15",
+                ],
+            ),
+            &["overflows", "integer bits", "polynomial step"],
+        ),
+    ];
+    for (arguments, expected) in cases {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("made");
+        let mut all = vec!["approx", "--out", out.to_str().unwrap()];
+        all.extend(&arguments);
+        let output = gyrogen(&all);
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {told}");
+        for word in expected {
+            assert!(
+                told.contains(word),
+                "{arguments:?}: `{word}` is not in {told}"
+            );
+        }
+        assert!(!out.exists(), "{arguments:?} left something behind");
+    }
+}
