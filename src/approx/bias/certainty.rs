@@ -71,7 +71,11 @@ pub fn bounds(design: &Design) -> Result<Option<Bounds>> {
     let fraction_bits = c.coefficient_format.fraction_bits as i32;
     let terms = c.coefficients_raw.iter();
     let terms: Vec<Dyadic> = terms.map(|v| Dyadic::new(*v, fraction_bits)).collect();
-    let coefficients_dps = calibrated.supremum_over_domain(&terms).upper;
+    let coefficients_dps = match c.fitted {
+        Some(_) => calibrated.supremum_over_domain(&terms).upper,
+        // The coefficients are the polynomial.
+        None => 0.0,
+    };
     let (low, high) = evaluation.calibrated();
     let p_max = [low, high].map(|word| evaluation.variable(word).abs());
     let evaluation_dps = evaluation.steps_bound_dps(p_max[0].max(p_max[1]));
