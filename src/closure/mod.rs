@@ -9,6 +9,7 @@
 pub mod baseline;
 pub mod checks;
 pub mod folds;
+pub mod likelihood;
 pub mod noise;
 pub mod order;
 pub mod polynomial;

@@ -1,0 +1,146 @@
+//! How large the best of a dictionary is by chance, the noise being known but for its strength.
+//!
+//! Under the null hypothesis the products of a whitened residual with the dictionary's orthonormal
+//! directions are normal with the directions' Gram matrix as covariance. Its pivoted Cholesky factor
+//! (of the rank that the dictionary has, not of its size) turns a few independent normal numbers
+//! into a draw of all products at once; what the factor leaves of a direction's variance is added as
+//! independent noise, which keeps every direction's own distribution exact and errs towards a larger
+//! maximum. The sum of squares that the statistics are relative to is drawn along.
+
+use super::candidates::Directions;
+use super::linear::dot;
+use super::random::{Stream, chi_square};
+use super::tail::{Tail, chi_square_surprise};
+
+/// Share of a direction's variance that the factor may leave.
+const LEFT: f64 = 0.02;
+
+/// Multiplier of -ln(1 - R^2), R^2 being the share that `degrees` columns explain of `contrasts`,
+/// that makes it chi-square with `degrees` degrees of freedom on average (Bartlett 1937).
+pub fn bartlett(contrasts: usize, degrees: usize) -> f64 {
+    (contrasts as f64 - 0.5 * degrees as f64 - 1.0).max(1.0)
+}
+
+/// The surprise (minus ln of the pointwise probability) of the best of several likelihood ratios,
+/// `best[k]` being the greatest -ln(1 - R^2) among those with k degrees of freedom.
+pub fn surprise(best: &[f64], contrasts: usize) -> f64 {
+    best.iter()
+        .enumerate()
+        .skip(1)
+        .filter(|(_, v)| **v > 0.0)
+        .map(|(k, v)| chi_square_surprise(k, bartlett(contrasts, k) * v))
+        .fold(0.0, f64::max)
+}
+
+/// The distribution of the dictionary's greatest surprise.
+pub fn greatest(
+    directions: &Directions,
+    contrasts: usize,
+    draws: usize,
+    stream: impl Fn(u64) -> Stream,
+) -> Tail {
+    let (factor, left) = factor(&directions.columns);
+    let rank = factor.len();
+    let width = directions.points.iter().map(|p| p.range.len()).max();
+    let mut best = vec![0.0; width.unwrap_or(0) + 1];
+    // Direction by direction: its row of the factor.
+    let rows: Vec<Vec<f64>> = (0..directions.columns.len())
+        .map(|i| factor.iter().map(|c| c[i]).collect())
+        .collect();
+    let noisy = left.iter().filter(|l| **l > 1e-4).count();
+    let mut sample = Vec::with_capacity(draws);
+    let mut products = vec![0.0; rows.len()];
+    for draw in 0..draws {
+        let normals = stream(draw as u64).normals(rank + noisy + 1);
+        let (common, own) = normals.split_at(rank);
+        let mut own = own.iter();
+        let last = own.next().copied().unwrap_or(0.0);
+        let total = dot(common, common) + chi_square(contrasts.saturating_sub(rank) as f64, last);
+        for ((product, row), left) in products.iter_mut().zip(&rows).zip(&left) {
+            *product = dot(row, common);
+            if *left > 1e-4 {
+                *product += left.sqrt() * own.next().copied().unwrap_or(0.0);
+            }
+        }
+        best.fill(0.0);
+        for point in &directions.points {
+            let z = &products[point.range.clone()];
+            let share = (dot(z, z) / total.max(f64::MIN_POSITIVE)).min(1.0 - 1e-12);
+            if let Some(best) = best.get_mut(z.len()) {
+                *best = f64::max(*best, share);
+            }
+        }
+        for b in &mut best {
+            *b = -(-*b).ln_1p();
+        }
+        sample.push(surprise(&best, contrasts));
+    }
+    Tail::new(sample)
+}
+
+/// Pivoted Cholesky factor of the Gram matrix of unit columns, column by column, without forming
+/// the matrix; and what it leaves of the diagonal.
+fn factor(columns: &[Vec<f64>]) -> (Vec<Vec<f64>>, Vec<f64>) {
+    let mut left = vec![1.0; columns.len()];
+    let mut out: Vec<Vec<f64>> = Vec::new();
+    let most = columns.first().map_or(0, Vec::len).min(columns.len());
+    while out.len() < most {
+        let worst = (0..left.len()).fold(0, |a, b| if left[b] > left[a] { b } else { a });
+        if left[worst] <= LEFT {
+            break;
+        }
+        let pivot = left[worst].sqrt();
+        let mut next: Vec<f64> = columns.iter().map(|c| dot(c, &columns[worst])).collect();
+        for earlier in &out {
+            let share = earlier[worst];
+            for (n, e) in next.iter_mut().zip(earlier) {
+                *n -= share * e;
+            }
+        }
+        for (n, l) in next.iter_mut().zip(&mut left) {
+            *n /= pivot;
+            *l = (*l - *n * *n).max(0.0);
+        }
+        left[worst] = 0.0;
+        out.push(next);
+    }
+    (out, left)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::candidates::Point;
+    use super::*;
+
+    /// Directions of one column each.
+    fn directions(columns: Vec<Vec<f64>>) -> Directions {
+        let points = (0..columns.len())
+            .map(|i| Point {
+                range: i..i + 1,
+                excitation: vec![1.0],
+                kept: vec![0],
+            })
+            .collect();
+        Directions { columns, points }
+    }
+
+    #[test]
+    fn independent_and_identical_directions_have_the_known_maxima() {
+        let unit = |k: usize| -> Vec<f64> {
+            (0..400).map(|i| f64::from(u8::from(i == k))).collect()
+        };
+        let stream = |k| Stream::new(11, k);
+        // 50 independent ones: p = 1 - (1 - q)^50; 50 equal ones: p = q.
+        let many = greatest(&directions((0..50).map(unit).collect()), 397, 4000, stream);
+        let one = greatest(&directions(vec![unit(3); 50]), 397, 4000, stream);
+        for q in [0.02f64, 0.002, 0.0002] {
+            let sidak = 1.0 - (1.0 - q).powi(50);
+            let found = many.survival(-q.ln());
+            assert!((found / sidak - 1.0).abs() < 0.25, "{q}: {found} for {sidak}");
+        }
+        for q in [0.2f64, 0.02, 0.004] {
+            let found = one.survival(-q.ln());
+            assert!((found / q - 1.0).abs() < 0.25, "{q}: {found}");
+        }
+    }
+}
