@@ -8,12 +8,15 @@
 //! maximum. The sum of squares that the statistics are relative to is drawn along.
 
 use super::candidates::Directions;
-use super::linear::dot;
+use super::linear::{add_scaled, dot, dots};
 use super::random::{Stream, chi_square};
 use super::tail::{Tail, chi_square_surprise};
 
 /// Share of a direction's variance that the factor may leave.
 const LEFT: f64 = 0.02;
+
+/// See `sparse_factor`.
+const SMALL: f64 = 1e-4;
 
 /// Multiplier of -ln(1 - R^2), R^2 being the share that `degrees` columns explain of `contrasts`,
 /// that makes it chi-square with `degrees` degrees of freedom on average (Bartlett 1937).
@@ -39,14 +42,9 @@ pub fn greatest(
     draws: usize,
     stream: impl Fn(u64) -> Stream,
 ) -> Tail {
-    let (factor, left) = factor(&directions.columns);
-    let rank = factor.len();
+    let (rank, rows, left) = sparse_factor(&directions.columns);
     let width = directions.points.iter().map(|p| p.range.len()).max();
     let mut best = vec![0.0; width.unwrap_or(0) + 1];
-    // Direction by direction: its row of the factor.
-    let rows: Vec<Vec<f64>> = (0..directions.columns.len())
-        .map(|i| factor.iter().map(|c| c[i]).collect())
-        .collect();
     let noisy = left.iter().filter(|l| **l > 1e-4).count();
     let mut sample = Vec::with_capacity(draws);
     let mut products = vec![0.0; rows.len()];
@@ -57,7 +55,7 @@ pub fn greatest(
         let last = own.next().copied().unwrap_or(0.0);
         let total = dot(common, common) + chi_square(contrasts.saturating_sub(rank) as f64, last);
         for ((product, row), left) in products.iter_mut().zip(&rows).zip(&left) {
-            *product = dot(row, common);
+            *product = row.iter().map(|(k, f)| f * common[*k as usize]).sum();
             if *left > 1e-4 {
                 *product += left.sqrt() * own.next().copied().unwrap_or(0.0);
             }
@@ -78,24 +76,38 @@ pub fn greatest(
     Tail::new(sample)
 }
 
-/// Pivoted Cholesky factor of the Gram matrix of unit columns, column by column, without forming
-/// the matrix; and what it leaves of the diagonal.
+/// The rank, the entries of each direction's row of the factor, and the variance that they lack.
+/// Entries that add less than [`SMALL`] to a direction's variance count as lacking.
+fn sparse_factor(columns: &[Vec<f64>]) -> (usize, Vec<Vec<(u32, f64)>>, Vec<f64>) {
+    let (factor, mut left) = factor(columns);
+    let mut rows: Vec<Vec<(u32, f64)>> = vec![Vec::new(); columns.len()];
+    for (k, column) in (0u32..).zip(&factor) {
+        for ((row, left), f) in rows.iter_mut().zip(&mut left).zip(column) {
+            if f * f < SMALL {
+                *left += f * f;
+            } else {
+                row.push((k, *f));
+            }
+        }
+    }
+    (factor.len(), rows, left)
+}
+
+/// Pivoted Cholesky factor of the Gram matrix of unit columns, column by column, and what it
+/// leaves of the diagonal.
 fn factor(columns: &[Vec<f64>]) -> (Vec<Vec<f64>>, Vec<f64>) {
+    let gram = gram(columns);
     let mut left = vec![1.0; columns.len()];
     let mut out: Vec<Vec<f64>> = Vec::new();
-    let most = columns.first().map_or(0, Vec::len).min(columns.len());
-    while out.len() < most {
+    while out.len() < columns.len() {
         let worst = (0..left.len()).fold(0, |a, b| if left[b] > left[a] { b } else { a });
         if left[worst] <= LEFT {
             break;
         }
         let pivot = left[worst].sqrt();
-        let mut next: Vec<f64> = columns.iter().map(|c| dot(c, &columns[worst])).collect();
+        let mut next = gram[worst].clone();
         for earlier in &out {
-            let share = earlier[worst];
-            for (n, e) in next.iter_mut().zip(earlier) {
-                *n -= share * e;
-            }
+            add_scaled(&mut next, -earlier[worst], earlier);
         }
         for (n, l) in next.iter_mut().zip(&mut left) {
             *n /= pivot;
@@ -105,6 +117,23 @@ fn factor(columns: &[Vec<f64>]) -> (Vec<Vec<f64>>, Vec<f64>) {
         out.push(next);
     }
     (out, left)
+}
+
+/// All dot products of the columns, the symmetric half computed once.
+fn gram(columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    const BLOCK: usize = 32;
+    let mut out = vec![vec![0.0; columns.len()]; columns.len()];
+    for start in (0..columns.len()).step_by(BLOCK) {
+        let later = &columns[start..];
+        let block = &later[..later.len().min(BLOCK)];
+        for (i, row) in dots(block, later).chunks(later.len()).enumerate() {
+            for (j, v) in row.iter().enumerate() {
+                out[start + i][start + j] = *v;
+                out[start + j][start + i] = *v;
+            }
+        }
+    }
+    out
 }
 
 #[cfg(test)]
