@@ -120,7 +120,11 @@ fn coverage(thermometer: &[f64], heldout: &[bool]) -> f64 {
     let (mut all, mut train) = ([false; 50], [false; 50]);
     for (t, held) in thermometer.iter().zip(heldout) {
         // A cast of a float saturates and turns NaN into 0.
-        let bin = if width > 0.0 { ((t - low) / width) as usize } else { 0 };
+        let bin = if width > 0.0 {
+            ((t - low) / width) as usize
+        } else {
+            0
+        };
         let bin = bin.min(49);
         all[bin] = true;
         train[bin] |= !held;
@@ -138,7 +142,11 @@ fn runs(thermometer: &[f64]) -> Vec<usize> {
     let threshold = 0.1 * (finite().fold(f64::NEG_INFINITY, f64::max) - low);
     let mut turns = vec![0];
     let (mut extreme, mut at, mut up) = (f64::NAN, 0, None);
-    for (i, t) in thermometer.iter().enumerate().filter(|(_, t)| t.is_finite()) {
+    for (i, t) in thermometer
+        .iter()
+        .enumerate()
+        .filter(|(_, t)| t.is_finite())
+    {
         if extreme.is_nan() {
             (extreme, at) = (*t, i);
         }
@@ -225,7 +233,10 @@ mod tests {
         let (_, _, split) = shares(&t);
         assert_eq!(split.segment.last(), Some(&15));
         for (i, s) in split.segment.iter().enumerate() {
-            assert!((i as i64 / 25 - *s as i64).abs() <= 1 && (i + 3) / 25 >= *s, "{i} {s}");
+            assert!(
+                (i as i64 / 25 - *s as i64).abs() <= 1 && (i + 3) / 25 >= *s,
+                "{i} {s}"
+            );
         }
         let folds = split.folds(4);
         for i in 0..400 {

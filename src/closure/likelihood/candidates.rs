@@ -105,7 +105,11 @@ impl Directions {
         }
         let products = dots(a, b);
         let matrix = nalgebra::DMatrix::from_row_slice(a.len(), b.len(), &products);
-        matrix.singular_values().iter().fold(0.0, |m: f64, s| m.max(*s)).min(1.0)
+        matrix
+            .singular_values()
+            .iter()
+            .fold(0.0, |m: f64, s| m.max(*s))
+            .min(1.0)
     }
 }
 

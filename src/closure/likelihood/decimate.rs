@@ -109,7 +109,9 @@ fn blocks_times(times_s: &[f64], blocks: &Blocks) -> Vec<f64> {
 fn plain_residual(plain: &Problem, weights: &[f64]) -> Vec<f64> {
     let masked = |c: &[f64]| -> Vec<f64> {
         let pairs = c.iter().zip(weights);
-        pairs.map(|(v, w)| if *w > 0.0 { *v } else { 0.0 }).collect()
+        pairs
+            .map(|(v, w)| if *w > 0.0 { *v } else { 0.0 })
+            .collect()
     };
     let columns: Vec<Vec<f64>> = plain.columns.iter().map(|c| masked(c)).collect();
     let basis = Basis::new(&columns);
@@ -124,17 +126,15 @@ fn plain_residual(plain: &Problem, weights: &[f64]) -> Vec<f64> {
 fn from_block_medians(residual: &[f64], blocks: &Blocks) -> Vec<f64> {
     let mut out = vec![0.0; residual.len()];
     for (a, b) in blocks.starts.iter().zip(blocks.starts.iter().skip(1)) {
-        let mut near: Vec<f64> = (*a..*b)
-            .filter(|i| blocks.weights[*i] > 0.0)
-            .map(|i| residual[i])
-            .collect();
+        let pairs = residual[*a..*b].iter().zip(&blocks.weights[*a..*b]);
+        let mut near: Vec<f64> = pairs.filter(|(_, w)| **w > 0.0).map(|(r, _)| *r).collect();
         if near.len() < 3 {
             continue;
         }
         let middle = near.len() / 2;
         let median = *near.select_nth_unstable_by(middle, f64::total_cmp).1;
-        for i in *a..*b {
-            out[i] = residual[i] - median;
+        for (o, r) in out[*a..*b].iter_mut().zip(&residual[*a..*b]) {
+            *o = r - median;
         }
     }
     out
@@ -146,11 +146,9 @@ fn within(residual: &[f64], blocks: &Blocks) -> f64 {
     let ends = blocks.starts.iter().zip(blocks.starts.iter().skip(1));
     for ((a, b), mean) in ends.zip(&means) {
         let mut weight = 0.0;
-        for i in *a..*b {
-            if blocks.weights[i] > 0.0 {
-                sum += blocks.weights[i] * (residual[i] - mean).powi(2);
-                weight += blocks.weights[i];
-            }
+        for (r, w) in residual[*a..*b].iter().zip(&blocks.weights[*a..*b]) {
+            sum += w * (r - mean).powi(2);
+            weight += w;
         }
         degrees += f64::max(weight - 1.0, 0.0);
     }
@@ -167,8 +165,7 @@ pub fn row_noise(
 ) -> NoiseModel {
     // `white_variance` is that of a row as the means see it.
     let h = shape.flicker * white_variance;
-    let per_period = shape.walk * white_variance * line.period_s
-        / decimated.problem.line.period_s;
+    let per_period = shape.walk * white_variance * line.period_s / decimated.problem.line.period_s;
     let m = decimated.blocks.rows;
     let unit = Shape {
         flicker: 1.0,

@@ -109,7 +109,13 @@ impl Problem {
             for (k, o) in free.iter().zip(offsets) {
                 logs[*k] = (logs[*k] + o).clamp(low[*k] - 0.5, high[*k] + 0.5);
             }
-            let value = |k: usize| if active[k] { f64::powf(10.0, logs[k]) } else { 0.0 };
+            let value = |k: usize| {
+                if active[k] {
+                    f64::powf(10.0, logs[k])
+                } else {
+                    0.0
+                }
+            };
             let at = self.evaluate(Shape {
                 flicker: value(0),
                 walk: value(1),
@@ -154,12 +160,7 @@ pub fn shapes(line: &Timeline) -> Vec<Shape> {
 }
 
 /// Nelder and Mead's simplex from the origin, where the cost is `first`.
-fn simplex(
-    cost: &mut impl FnMut(&[f64]) -> f64,
-    sizes: &[f64],
-    first: f64,
-    evaluations: usize,
-) {
+fn simplex(cost: &mut impl FnMut(&[f64]) -> f64, sizes: &[f64], first: f64, evaluations: usize) {
     let n = sizes.len();
     let mut corners: Vec<(f64, Vec<f64>)> = vec![(first, vec![0.0; n])];
     for (k, size) in sizes.iter().enumerate() {
@@ -190,7 +191,11 @@ fn simplex(
         let next = if reflected.0 < best.0 {
             used += 1;
             let expanded = (cost(&along(2.0)), along(2.0));
-            if expanded.0 < reflected.0 { expanded } else { reflected }
+            if expanded.0 < reflected.0 {
+                expanded
+            } else {
+                reflected
+            }
         } else if reflected.0 < second {
             reflected
         } else {

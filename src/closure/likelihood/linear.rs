@@ -217,7 +217,13 @@ mod tests {
             }
         }
         let mut three = columns[..3].to_vec();
-        three.push(three[0].iter().zip(&three[1]).map(|(a, b)| a - 2.0 * b).collect());
+        three.push(
+            three[0]
+                .iter()
+                .zip(&three[1])
+                .map(|(a, b)| a - 2.0 * b)
+                .collect(),
+        );
         three.push(columns[4].clone());
         let basis = Basis::new(&three);
         assert_eq!(basis.kept, [0, 1, 2, 4]);

@@ -42,7 +42,7 @@ pub fn greatest(
     draws: usize,
     stream: impl Fn(u64) -> Stream,
 ) -> Tail {
-    let (rank, rows, left) = sparse_factor(&directions.columns);
+    let Factor { rank, rows, left } = sparse_factor(&directions.columns);
     let width = directions.points.iter().map(|p| p.range.len()).max();
     let mut best = vec![0.0; width.unwrap_or(0) + 1];
     let noisy = left.iter().filter(|l| **l > 1e-4).count();
@@ -76,9 +76,19 @@ pub fn greatest(
     Tail::new(sample)
 }
 
-/// The rank, the entries of each direction's row of the factor, and the variance that they lack.
-/// Entries that add less than [`SMALL`] to a direction's variance count as lacking.
-fn sparse_factor(columns: &[Vec<f64>]) -> (usize, Vec<Vec<(u32, f64)>>, Vec<f64>) {
+/// A factor of the Gram matrix, by directions.
+struct Factor {
+    /// Its columns.
+    rank: usize,
+    /// The entries of each direction's row: (column, value).
+    rows: Vec<Vec<(u32, f64)>>,
+    /// The variance that each row lacks.
+    left: Vec<f64>,
+}
+
+/// The factor without entries that add less than [`SMALL`] to a direction's variance: those count
+/// as lacking.
+fn sparse_factor(columns: &[Vec<f64>]) -> Factor {
     let (factor, mut left) = factor(columns);
     let mut rows: Vec<Vec<(u32, f64)>> = vec![Vec::new(); columns.len()];
     for (k, column) in (0u32..).zip(&factor) {
@@ -90,7 +100,11 @@ fn sparse_factor(columns: &[Vec<f64>]) -> (usize, Vec<Vec<(u32, f64)>>, Vec<f64>
             }
         }
     }
-    (factor.len(), rows, left)
+    Factor {
+        rank: factor.len(),
+        rows,
+        left,
+    }
 }
 
 /// Pivoted Cholesky factor of the Gram matrix of unit columns, column by column, and what it
@@ -155,9 +169,8 @@ mod tests {
 
     #[test]
     fn independent_and_identical_directions_have_the_known_maxima() {
-        let unit = |k: usize| -> Vec<f64> {
-            (0..400).map(|i| f64::from(u8::from(i == k))).collect()
-        };
+        let unit =
+            |k: usize| -> Vec<f64> { (0..400).map(|i| f64::from(u8::from(i == k))).collect() };
         let stream = |k| Stream::new(11, k);
         // 50 independent ones: p = 1 - (1 - q)^50; 50 equal ones: p = q.
         let many = greatest(&directions((0..50).map(unit).collect()), 397, 4000, stream);
@@ -165,7 +178,10 @@ mod tests {
         for q in [0.02f64, 0.002, 0.0002] {
             let sidak = 1.0 - (1.0 - q).powi(50);
             let found = many.survival(-q.ln());
-            assert!((found / sidak - 1.0).abs() < 0.25, "{q}: {found} for {sidak}");
+            assert!(
+                (found / sidak - 1.0).abs() < 0.25,
+                "{q}: {found} for {sidak}"
+            );
         }
         for q in [0.2f64, 0.02, 0.004] {
             let found = one.survival(-q.ln());

@@ -42,7 +42,6 @@ impl Stream {
         out.truncate(count);
         out
     }
-
 }
 
 /// A chi-square number of `degrees` degrees of freedom made of one standard normal number, by

@@ -119,16 +119,9 @@ pub fn fit(
     Ok(finish(problem, lattice, at, noise, row_weights, None))
 }
 
-fn check(
-    times_s: &[f64],
-    y: &[f64],
-    columns: &[Vec<f64>],
-    used: &[bool],
-) -> Result<(), Unusable> {
+fn check(times_s: &[f64], y: &[f64], columns: &[Vec<f64>], used: &[bool]) -> Result<(), Unusable> {
     let n = times_s.len();
-    let finite = |c: &[f64]| {
-        c.len() == n && c.iter().zip(used).all(|(v, u)| !u || v.is_finite())
-    };
+    let finite = |c: &[f64]| c.len() == n && c.iter().zip(used).all(|(v, u)| !u || v.is_finite());
     if used.len() != n || !finite(y) {
         return Err(Unusable::NotFinite("the signal"));
     }

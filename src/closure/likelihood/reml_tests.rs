@@ -13,11 +13,7 @@ fn fit(record: &super::simulated::Simulated, options: &Options) -> reml::Fit {
 }
 
 /// Geometric mean of an estimate over its truth, over some records.
-fn mean_ratio(
-    strengths: (f64, f64, f64),
-    n: usize,
-    of: impl Fn(&reml::Fit) -> f64,
-) -> f64 {
+fn mean_ratio(strengths: (f64, f64, f64), n: usize, of: impl Fn(&reml::Fit) -> f64) -> f64 {
     let logs = (0..24u64).map(|k| {
         let found = of(&fit(&record(k, n, strengths), &Options::default()));
         found.max(1e-6).ln()
@@ -88,15 +84,33 @@ fn block_means_give_the_noise_of_the_rows() {
         simulated.times = (0..n).map(|i| i as f64).collect();
         simulated.y = noise(9, n, white, flicker, walk);
         simulated.y[777] += 50.0;
-        let long = fit(&simulated, &Options { rows: 1000, ..Options::default() });
+        let long = fit(
+            &simulated,
+            &Options {
+                rows: 1000,
+                ..Options::default()
+            },
+        );
         assert_eq!(long.problem.y.len(), 1000);
         assert_eq!(long.row_weights[777], 0.0);
-        assert!((long.noise.white_rms_dps / white - 1.0).abs() < 0.05, "{:?}", long.noise);
+        assert!(
+            (long.noise.white_rms_dps / white - 1.0).abs() < 0.05,
+            "{:?}",
+            long.noise
+        );
         if flicker > 0.0 {
-            assert!((0.7..1.3).contains(&(long.noise.flicker_dps / flicker)), "{:?}", long.noise);
+            assert!(
+                (0.7..1.3).contains(&(long.noise.flicker_dps / flicker)),
+                "{:?}",
+                long.noise
+            );
         }
         if walk > 0.0 {
-            assert!((0.7..1.3).contains(&(long.noise.walk_dps_rts / walk)), "{:?}", long.noise);
+            assert!(
+                (0.7..1.3).contains(&(long.noise.walk_dps_rts / walk)),
+                "{:?}",
+                long.noise
+            );
         }
     }
 }
@@ -128,10 +142,19 @@ fn what_cannot_be_fitted_is_refused() {
         reml::fit(&simulated.times, &simulated.y, columns, used, &options).err()
     };
     let few: Vec<bool> = (0..100).map(|i| i < 6).collect();
-    assert_eq!(with(&columns, &few), Some(Unusable::TooFewRows { rows: 6, columns: 3 }));
+    assert_eq!(
+        with(&columns, &few),
+        Some(Unusable::TooFewRows {
+            rows: 6,
+            columns: 3
+        })
+    );
     assert_eq!(with(&columns[1..], &used), Some(Unusable::NoConstant));
     columns[2][50] = f64::INFINITY;
-    assert!(matches!(with(&columns, &used), Some(Unusable::NotFinite(_))));
+    assert!(matches!(
+        with(&columns, &used),
+        Some(Unusable::NotFinite(_))
+    ));
 }
 
 #[test]

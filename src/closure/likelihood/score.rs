@@ -98,7 +98,11 @@ impl Scores {
         (0..self.groups.len())
             .filter(|g| self.groups[*g].point.is_some())
             .reduce(|a, b| {
-                if self.groups[b].profiled > self.groups[a].profiled { b } else { a }
+                if self.groups[b].profiled > self.groups[a].profiled {
+                    b
+                } else {
+                    a
+                }
             })
     }
 }
@@ -235,7 +239,10 @@ impl Profile {
         let eligible: Vec<usize> = (0..grid.weights.len())
             .filter(|g| grid.weights[*g] > 0.0)
             .collect();
-        let best = eligible.iter().map(|g| loglik(*g)).fold(f64::NEG_INFINITY, f64::max);
+        let best = eligible
+            .iter()
+            .map(|g| loglik(*g))
+            .fold(f64::NEG_INFINITY, f64::max);
         let mut out = vec![0.0; grid.weights.len()];
         for g in &eligible {
             out[*g] = (loglik(*g) - best).exp();
@@ -278,7 +285,9 @@ fn finish(
     let bootstrap = (count > 1).then(|| {
         let fast = (1..count).map(|s| {
             let weights = profile.weights(&grid, s);
-            -profile.mixture(&weights, tail, |g| profile.by_shape[g].1[s]).ln()
+            -profile
+                .mixture(&weights, tail, |g| profile.by_shape[g].1[s])
+                .ln()
         });
         (Tail::new(greatest[1..].to_vec()), Tail::new(fast.collect()))
     });
@@ -306,7 +315,9 @@ fn finish(
             beta_std: Vec::new(),
             excitation: Vec::new(),
             p_fast,
-            p_bootstrap: bootstrap.as_ref().map(|(p, _)| p.survival(chosen.map_or(0.0, |c| c.1))),
+            p_bootstrap: bootstrap
+                .as_ref()
+                .map(|(p, _)| p.survival(chosen.map_or(0.0, |c| c.1))),
             p_fast_bootstrap: bootstrap.as_ref().map(|(_, f)| f.survival(-p_fast.ln())),
         };
         if let Some((point, _)) = chosen {

@@ -27,7 +27,12 @@ pub(super) fn noise(stream: u64, n: usize, white: f64, flicker: f64, walk: f64) 
         let amplitude = flicker * std::f64::consts::PI.sqrt();
         for (i, y) in y.iter_mut().enumerate() {
             let end = before + i + 1;
-            let sum: f64 = drive[..end].iter().rev().zip(&filter).map(|(d, f)| d * f).sum();
+            let sum: f64 = drive[..end]
+                .iter()
+                .rev()
+                .zip(&filter)
+                .map(|(d, f)| d * f)
+                .sum();
             *y += amplitude * sum;
         }
     }
@@ -45,14 +50,17 @@ pub(super) fn thermometer(n: usize, ramps: f64) -> Vec<f64> {
         .map(|i| {
             let phase = ramps * (i as f64 + 0.5) / n as f64;
             let triangle = 1.0 - 2.0 * (phase / 2.0 - (phase / 2.0).round()).abs() * 2.0;
-            -(triangle * std::f64::consts::FRAC_PI_2 * 0.9).sin() / (0.9f64 * std::f64::consts::FRAC_PI_2).sin()
+            -(triangle * std::f64::consts::FRAC_PI_2 * 0.9).sin()
+                / (0.9f64 * std::f64::consts::FRAC_PI_2).sin()
         })
         .collect()
 }
 
 /// 1, p, p^2.
 pub(super) fn declared(p: &[f64]) -> Vec<Vec<f64>> {
-    (0..3).map(|k| p.iter().map(|v| v.powi(k)).collect()).collect()
+    (0..3)
+        .map(|k| p.iter().map(|v| v.powi(k)).collect())
+        .collect()
 }
 
 /// A record of noise with a quadratic bias.
@@ -81,13 +89,24 @@ pub(super) fn lag(p: &[f64], tau: f64) -> Vec<f64> {
 
 /// A dictionary of usual size: lags, rate, warm-up, drifts, cubic, steps, sinusoids, smooth
 /// functions of four decoys. `size` scales the grids (1 = about 300 columns).
-pub(super) fn dictionary(record: &Simulated, stream: u64, size: usize) -> Vec<super::candidates::Group> {
+pub(super) fn dictionary(
+    record: &Simulated,
+    stream: u64,
+    size: usize,
+) -> Vec<super::candidates::Group> {
     use super::candidates::Group;
     let n = record.p.len();
     let map = |f: &dyn Fn(f64, f64) -> f64| -> Vec<f64> {
-        record.times.iter().zip(&record.p).map(|(t, p)| f(*t, *p)).collect()
+        record
+            .times
+            .iter()
+            .zip(&record.p)
+            .map(|(t, p)| f(*t, *p))
+            .collect()
     };
-    let one = |c: Vec<f64>| Group { points: vec![vec![c]] };
+    let one = |c: Vec<f64>| Group {
+        points: vec![vec![c]],
+    };
     let length = n as f64;
     let geometric = |from: f64, to: f64, k: usize, of: usize| {
         from * (to / from).powf(k as f64 / (of - 1) as f64)
@@ -95,7 +114,9 @@ pub(super) fn dictionary(record: &Simulated, stream: u64, size: usize) -> Vec<su
     let mut groups = Vec::new();
     let lags = 20 * size;
     groups.push(Group {
-        points: (0..lags).map(|k| vec![lag(&record.p, geometric(2.0, 0.5 * length, k, lags))]).collect(),
+        points: (0..lags)
+            .map(|k| vec![lag(&record.p, geometric(2.0, 0.5 * length, k, lags))])
+            .collect(),
     });
     let rate: Vec<f64> = (0..n)
         .map(|i| record.p[(i + 1).min(n - 1)] - record.p[i.saturating_sub(1)])
@@ -135,12 +156,24 @@ pub(super) fn dictionary(record: &Simulated, stream: u64, size: usize) -> Vec<su
         let v: Vec<f64> = match decoy {
             0 => normals[..n].to_vec(),
             1 => lag(&normals[..n], 20.0),
-            2 => normals[..n].iter().scan(0.0, |s, d| { *s += d; Some(*s) }).collect(),
-            _ => map(&|t, p| p + 0.3 * normals[n] + 0.5 * (t / length * 9.0 + normals[n + 1]).sin()),
+            2 => normals[..n]
+                .iter()
+                .scan(0.0, |s, d| {
+                    *s += d;
+                    Some(*s)
+                })
+                .collect(),
+            _ => {
+                map(&|t, p| p + 0.3 * normals[n] + 0.5 * (t / length * 9.0 + normals[n + 1]).sin())
+            }
         };
         let high = v.iter().fold(0.0f64, |m, v| m.max(v.abs()));
-        let columns = (1..=3).map(|k| v.iter().map(|v| (v / high).powi(k)).collect()).collect();
-        groups.push(Group { points: vec![columns] });
+        let columns = (1..=3)
+            .map(|k| v.iter().map(|v| (v / high).powi(k)).collect())
+            .collect();
+        groups.push(Group {
+            points: vec![columns],
+        });
     }
     groups
 }

@@ -96,7 +96,11 @@ pub fn chi_square_surprise(degrees: usize, x: f64) -> f64 {
     let (mut sum, mut term, mut at) = if degrees.is_multiple_of(2) {
         (1.0, 1.0, 2)
     } else {
-        (scaled_erfc(half.sqrt()), (half / std::f64::consts::PI).sqrt() * 2.0, 1)
+        (
+            scaled_erfc(half.sqrt()),
+            (half / std::f64::consts::PI).sqrt() * 2.0,
+            1,
+        )
     };
     while at + 2 <= degrees {
         if at > 1 {

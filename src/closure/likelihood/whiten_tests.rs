@@ -62,7 +62,13 @@ fn dense(line: &Timeline, shape: Shape) -> (Vec<usize>, DMatrix<f64>) {
     (rows, v)
 }
 
-const SHAPES: [(f64, f64); 5] = [(0.0, 0.0), (0.3, 0.0), (0.0, 0.02), (0.1, 0.05), (30.0, 100.0)];
+const SHAPES: [(f64, f64); 5] = [
+    (0.0, 0.0),
+    (0.3, 0.0),
+    (0.0, 0.02),
+    (0.1, 0.05),
+    (30.0, 100.0),
+];
 
 #[test]
 fn whitening_is_the_inverse_cholesky_factor() {
@@ -92,8 +98,14 @@ fn whitening_is_the_inverse_cholesky_factor() {
             let u = &inverse * &chosen;
             let auxiliary = whitener.auxiliary(&white[1]);
             for (k, i) in rows.iter().enumerate() {
-                assert!((auxiliary[*i].0 - u[k]).abs() < 1e-9 * u.amax(), "{shape:?} row {i}");
-                assert!((auxiliary[*i].1 / inverse[(k, k)] - 1.0).abs() < 1e-9, "row {i}");
+                assert!(
+                    (auxiliary[*i].0 - u[k]).abs() < 1e-9 * u.amax(),
+                    "{shape:?} row {i}"
+                );
+                assert!(
+                    (auxiliary[*i].1 / inverse[(k, k)] - 1.0).abs() < 1e-9,
+                    "row {i}"
+                );
             }
             // Colouring undoes whitening.
             let back = whitener.colour(&white[2]);
@@ -136,6 +148,10 @@ fn least_squares_on_whitened_columns_is_generalised_least_squares() {
     assert!((basis.inverse_gram() - covariance).amax() < 1e-9);
     let at = problem.evaluate(shape);
     let log_det = v.determinant().ln() + gram.determinant().ln();
-    assert!((at.log_det - log_det).abs() < 1e-7, "{} {log_det}", at.log_det);
+    assert!(
+        (at.log_det - log_det).abs() < 1e-7,
+        "{} {log_det}",
+        at.log_det
+    );
     assert_eq!(at.contrasts, rows.len() - 4);
 }
