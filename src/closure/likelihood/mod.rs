@@ -31,6 +31,8 @@ mod calibration_tests;
 #[cfg(test)]
 mod reml_tests;
 #[cfg(test)]
+mod score_tests;
+#[cfg(test)]
 mod simulated;
 #[cfg(test)]
 mod whiten_tests;
