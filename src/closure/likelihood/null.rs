@@ -42,7 +42,18 @@ pub fn greatest(
     draws: usize,
     stream: impl Fn(u64) -> Stream,
 ) -> Tail {
-    let Factor { rank, rows, left } = sparse_factor(&directions.columns);
+    Tail::new(sampled(directions, contrasts, draws, stream, LEFT))
+}
+
+/// The draws of [`greatest`], the factor leaving at most `leave` of each direction's variance.
+fn sampled(
+    directions: &Directions,
+    contrasts: usize,
+    draws: usize,
+    stream: impl Fn(u64) -> Stream,
+    leave: f64,
+) -> Vec<f64> {
+    let Factor { rank, rows, left } = sparse_factor(&directions.columns, leave);
     let width = directions.points.iter().map(|p| p.range.len()).max();
     let mut best = vec![0.0; width.unwrap_or(0) + 1];
     let noisy = left.iter().filter(|l| **l > 1e-4).count();
@@ -73,7 +84,7 @@ pub fn greatest(
         }
         sample.push(surprise(&best, contrasts));
     }
-    Tail::new(sample)
+    sample
 }
 
 /// A factor of the Gram matrix, by directions.
@@ -88,8 +99,8 @@ struct Factor {
 
 /// The factor without entries that add less than [`SMALL`] to a direction's variance: those count
 /// as lacking.
-fn sparse_factor(columns: &[Vec<f64>]) -> Factor {
-    let (factor, mut left) = factor(columns);
+fn sparse_factor(columns: &[Vec<f64>], leave: f64) -> Factor {
+    let (factor, mut left) = factor(columns, leave);
     let mut rows: Vec<Vec<(u32, f64)>> = vec![Vec::new(); columns.len()];
     for (k, column) in (0u32..).zip(&factor) {
         for ((row, left), f) in rows.iter_mut().zip(&mut left).zip(column) {
@@ -109,13 +120,13 @@ fn sparse_factor(columns: &[Vec<f64>]) -> Factor {
 
 /// Pivoted Cholesky factor of the Gram matrix of unit columns, column by column, and what it
 /// leaves of the diagonal.
-fn factor(columns: &[Vec<f64>]) -> (Vec<Vec<f64>>, Vec<f64>) {
+fn factor(columns: &[Vec<f64>], leave: f64) -> (Vec<Vec<f64>>, Vec<f64>) {
     let gram = gram(columns);
     let mut left = vec![1.0; columns.len()];
     let mut out: Vec<Vec<f64>> = Vec::new();
     while out.len() < columns.len() {
         let worst = (0..left.len()).fold(0, |a, b| if left[b] > left[a] { b } else { a });
-        if left[worst] <= LEFT {
+        if left[worst] <= leave {
             break;
         }
         let pivot = left[worst].sqrt();
@@ -187,5 +198,27 @@ mod tests {
             let found = one.survival(-q.ln());
             assert!((found / q - 1.0).abs() < 0.25, "{q}: {found}");
         }
+    }
+
+    #[test]
+    fn what_the_factor_leaves_is_drawn_independently() {
+        let unit = |k: usize| -> Vec<f64> {
+            let near = |i: usize| match i {
+                0 => 0.6,
+                i if i == k + 1 => 0.8,
+                _ => 0.0,
+            };
+            (0..60).map(near).collect()
+        };
+        let directions = directions((0..50).map(unit).collect());
+        let stream = |k| Stream::new(12, k);
+        let mean = |leave: f64| {
+            let all = sampled(&directions, 5000, 4000, stream, leave);
+            all.iter().sum::<f64>() / 4000.0
+        };
+        // All of it in the factor, and one pivot with 0.64^2 .. 1 left of the others.
+        let (full, coarse) = (mean(1e-6), mean(0.9));
+        assert!((full - 4.2).abs() < 0.4, "{full}");
+        assert!((0.0..0.7).contains(&(coarse - full)), "{full} {coarse}");
     }
 }
