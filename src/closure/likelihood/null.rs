@@ -221,4 +221,35 @@ mod tests {
         assert!((full - 4.2).abs() < 0.4, "{full}");
         assert!((0.0..0.7).contains(&(coarse - full)), "{full} {coarse}");
     }
+
+    #[test]
+    fn the_factor_reproduces_the_gram_matrix() {
+        let mut columns: Vec<Vec<f64>> = (0..6).map(|k| Stream::new(13, k).normals(50)).collect();
+        for k in 0..30usize {
+            let mut mixed = Stream::new(14, k as u64).normals(50);
+            add_scaled(&mut mixed, 3.0, &columns[k % 6]);
+            columns.push(mixed);
+        }
+        for column in &mut columns {
+            let norm = dot(column, column).sqrt();
+            column.iter_mut().for_each(|v| *v /= norm);
+        }
+        let Factor { rank, rows, left } = sparse_factor(&columns, LEFT);
+        assert!(rank < 36, "{rank}");
+        for (i, a) in columns.iter().enumerate() {
+            for (j, b) in columns.iter().enumerate() {
+                let dense = |row: &[(u32, f64)]| {
+                    let mut out = vec![0.0; rank];
+                    row.iter().for_each(|(k, f)| out[*k as usize] = *f);
+                    out
+                };
+                let mut product = dot(&dense(&rows[i]), &dense(&rows[j]));
+                if i == j {
+                    product += left[i];
+                    assert!((product - 1.0).abs() < 1e-9);
+                }
+                assert!((product - dot(a, b)).abs() < 2.0 * LEFT, "{i} {j}");
+            }
+        }
+    }
 }

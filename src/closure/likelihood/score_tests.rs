@@ -1,7 +1,7 @@
 //! Scores against dense generalised least squares, and what they say of columns that the record does
 //! not excite or cannot tell apart.
 
-use super::candidates::{AtShape, Group};
+use super::candidates::{AtShape, Grid, Group};
 use super::noise::Shape;
 use super::reml::{self, Options};
 use super::score;
@@ -130,4 +130,31 @@ fn what_is_not_excited_or_not_separable_is_said() {
     assert!(scores.correlation(0, 3) < 0.5);
     assert_eq!(scores.correlation(0, 2), 0.0);
     assert_eq!(scores.leader(), Some(0));
+}
+
+#[test]
+fn null_and_candidate_each_choose_their_shape() {
+    let mut simulated = record(1, 200, (1.0, 0.3, 0.0));
+    let truth = lag(&simulated.p, 30.0);
+    for (y, c) in simulated.y.iter_mut().zip(&truth) {
+        *y += 10.0 * c;
+    }
+    let fit = fit(&simulated);
+    let groups = groups(&simulated);
+    let (mut null, mut with) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
+    let grid = Grid::new(&fit);
+    for shape in &grid.shapes {
+        let signal = std::slice::from_ref(&fit.problem.y);
+        let at = AtShape::new(&fit, &groups, signal, *shape);
+        null = null.max(at.null(0));
+        with = with.max(at.with_point(1, 0));
+    }
+    let scores = score::score(&fit, &groups, &score::Options::default());
+    assert!((scores.groups[0].gain - (with - null)).abs() < 1e-9);
+    assert!(scores.groups.iter().all(|g| g.gain >= 0.0));
+    let weights: f64 = grid.weights.iter().sum();
+    assert!((weights - 1.0).abs() < 1e-12 && grid.weights[0] > 0.0);
+    // The effect, taken for drift by the null hypothesis, leaves whiter noise behind.
+    let whiter = |s: Shape| s.flicker + s.walk;
+    assert!(whiter(scores.groups[0].shape) < whiter(grid.shapes[0]));
 }
