@@ -4,11 +4,13 @@
 //! [`polynomial`] (algebra and least squares), [`weights`] (spikes, dwells), [`noise`] (its
 //! correlation, and the coefficients' covariance), [`folds`] (held-out blocks), [`order`] (its
 //! choice), [`sweep`] (heating against cooling) and [`checks`] (what a user should know of before
-//! believing the fit). Nothing here knows the plant (law 4).
+//! believing the fit). [`likelihood`] is what tells an effect from noise with a memory. Nothing
+//! here knows the plant (law 4).
 
 pub mod baseline;
 pub mod checks;
 pub mod folds;
+pub mod likelihood;
 pub mod noise;
 pub mod order;
 pub mod polynomial;

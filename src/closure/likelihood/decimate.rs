@@ -1,0 +1,195 @@
+//! Long records: the noise is estimated on means of consecutive rows.
+//!
+//! 1/f noise has no scale, so the means of m rows have the same h; the walk keeps its K; white noise
+//! falls to 1 / m. What the means have lost, the white variance of a row, comes from the scatter within
+//! the blocks, less what 1/f noise and walk put there.
+
+use super::lattice::Problem;
+use super::linear::{Basis, add_scaled, dot};
+use super::noise::{NoiseModel, Shape, Timeline};
+use super::{Unusable, robust};
+
+/// How rows were put together.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Blocks {
+    /// First row of each block, and the end of the last.
+    pub starts: Vec<usize>,
+    /// Weight of each row: 0 for rows that are not used.
+    pub weights: Vec<f64>,
+    /// Rows of a full block.
+    pub rows: usize,
+}
+
+impl Blocks {
+    /// The weighted mean of each block; 0 for a block without a used row.
+    pub fn means(&self, column: &[f64]) -> Vec<f64> {
+        self.each(|rows| {
+            let pairs = column[rows.clone()].iter().zip(&self.weights[rows]);
+            let used = pairs.filter(|(_, w)| **w > 0.0);
+            let (sum, weight) = used.fold((0.0, 0.0), |(s, t), (v, w)| (s + v * w, t + w));
+            if weight > 0.0 { sum / weight } else { 0.0 }
+        })
+    }
+
+    /// Variance factor of each mean: 1 over the weight in it.
+    fn white_factor(&self) -> Vec<f64> {
+        self.each(|rows| 1.0 / self.weights[rows].iter().sum::<f64>())
+    }
+
+    fn each(&self, of: impl Fn(std::ops::Range<usize>) -> f64) -> Vec<f64> {
+        let ends = self.starts.iter().zip(self.starts.iter().skip(1));
+        ends.map(|(a, b)| of(*a..*b)).collect()
+    }
+}
+
+/// A long problem, and what its block means are.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Decimated {
+    /// The blocks.
+    pub blocks: Blocks,
+    /// The problem in block means.
+    pub problem: Problem,
+    /// Mean square of rows about their block's mean, per degree of freedom, (deg/s)^2.
+    pub within: f64,
+}
+
+/// Blocks of `rows` rows (fewer where used rows are), and spikes by their distance from their
+/// block's median.
+///
+/// # Errors
+/// Times that do not advance from block to block.
+pub fn decimate(
+    times_s: &[f64],
+    plain: &Problem,
+    used: &[bool],
+    rows: usize,
+) -> Result<Decimated, Unusable> {
+    let n = times_s.len();
+    let rows = rows.max(2);
+    let mut starts: Vec<usize> = (0..n).step_by(rows).collect();
+    starts.push(n);
+    let mut blocks = Blocks {
+        starts,
+        weights: used.iter().map(|u| f64::from(u8::from(*u))).collect(),
+        rows,
+    };
+    let residual = plain_residual(plain, &blocks.weights);
+    let deviations = from_block_medians(&residual, &blocks);
+    let marked = deviations.iter().zip(used).filter(|(_, u)| **u);
+    let unit = robust::scale(marked.map(|(d, _)| *d));
+    if unit > 0.0 {
+        for (w, d) in blocks.weights.iter_mut().zip(&deviations) {
+            *w *= robust::weight(d.abs() / unit);
+        }
+    }
+    let line = Timeline::new(&blocks_times(times_s, &blocks), blocks.white_factor())?;
+    let problem = Problem {
+        line,
+        y: blocks.means(&plain.y),
+        columns: plain.columns.iter().map(|c| blocks.means(c)).collect(),
+    };
+    let within = within(&residual, &blocks);
+    Ok(Decimated {
+        blocks,
+        problem,
+        within,
+    })
+}
+
+/// Means of the times of all rows of a block, used or not.
+fn blocks_times(times_s: &[f64], blocks: &Blocks) -> Vec<f64> {
+    blocks.each(|rows| {
+        let start = times_s[rows.start];
+        let sum: f64 = times_s[rows.clone()].iter().map(|t| t - start).sum();
+        start + sum / rows.len() as f64
+    })
+}
+
+/// Ordinary least-squares residual over the rows with weight.
+fn plain_residual(plain: &Problem, weights: &[f64]) -> Vec<f64> {
+    let masked = |c: &[f64]| -> Vec<f64> {
+        let pairs = c.iter().zip(weights);
+        pairs
+            .map(|(v, w)| if *w > 0.0 { *v } else { 0.0 })
+            .collect()
+    };
+    let columns: Vec<Vec<f64>> = plain.columns.iter().map(|c| masked(c)).collect();
+    let basis = Basis::new(&columns);
+    let mut residual = masked(&plain.y);
+    let z: Vec<f64> = basis.q.iter().map(|q| dot(q, &residual)).collect();
+    for (column, b) in columns.iter().zip(basis.solve(&z)) {
+        add_scaled(&mut residual, -b, column);
+    }
+    residual
+}
+
+fn from_block_medians(residual: &[f64], blocks: &Blocks) -> Vec<f64> {
+    let mut out = vec![0.0; residual.len()];
+    for (a, b) in blocks.starts.iter().zip(blocks.starts.iter().skip(1)) {
+        let pairs = residual[*a..*b].iter().zip(&blocks.weights[*a..*b]);
+        let mut near: Vec<f64> = pairs.filter(|(_, w)| **w > 0.0).map(|(r, _)| *r).collect();
+        if near.len() < 3 {
+            continue;
+        }
+        let middle = near.len() / 2;
+        let median = *near.select_nth_unstable_by(middle, f64::total_cmp).1;
+        for (o, r) in out[*a..*b].iter_mut().zip(&residual[*a..*b]) {
+            *o = r - median;
+        }
+    }
+    out
+}
+
+fn within(residual: &[f64], blocks: &Blocks) -> f64 {
+    let means = blocks.means(residual);
+    let (mut sum, mut degrees) = (0.0, 0.0);
+    let ends = blocks.starts.iter().zip(blocks.starts.iter().skip(1));
+    for ((a, b), mean) in ends.zip(&means) {
+        let mut weight = 0.0;
+        for (r, w) in residual[*a..*b].iter().zip(&blocks.weights[*a..*b]) {
+            sum += w * (r - mean).powi(2);
+            weight += w;
+        }
+        degrees += f64::max(weight - 1.0, 0.0);
+    }
+    if degrees > 0.0 { sum / degrees } else { 0.0 }
+}
+
+/// The noise of a row, from the shape and white variance of the block means and the scatter within
+/// the blocks. `line` is the timeline of the rows.
+pub fn row_noise(
+    decimated: &Decimated,
+    shape: Shape,
+    white_variance: f64,
+    line: &Timeline,
+) -> NoiseModel {
+    // `white_variance` is that of a row as the means see it.
+    let h = shape.flicker * white_variance;
+    let per_period = shape.walk * white_variance * line.period_s / decimated.problem.line.period_s;
+    let m = decimated.blocks.rows;
+    let unit = Shape {
+        flicker: 1.0,
+        walk: 0.0,
+    };
+    let mut flicker = line.floor(unit);
+    for state in line.states(unit) {
+        flicker += state.variance * (1.0 - mean_correlation(m, state.tau));
+    }
+    let walk = per_period * (m as f64 + 1.0) / 6.0;
+    let white = decimated.within - h * flicker - walk;
+    let white = white.max(1e-3 * decimated.within).max(0.0);
+    NoiseModel {
+        white_rms_dps: white.sqrt(),
+        flicker_dps: h.sqrt(),
+        walk_dps_rts: (per_period / line.period_s).sqrt(),
+    }
+}
+
+/// Mean correlation of two different rows of a block of `m` for the time constant `tau` in rows.
+fn mean_correlation(m: usize, tau: f64) -> f64 {
+    let m = m as f64;
+    let a = (-1.0 / tau).exp();
+    // 2 sum_{k=1}^{m-1} (m - k) a^k / (m (m - 1)).
+    let sum = a * (m * (1.0 - a) - (1.0 - a.powf(m))) / (1.0 - a).powi(2);
+    2.0 * sum / (m * (m - 1.0))
+}

@@ -1,0 +1,55 @@
+//! Numbers that are functions of (seed, stream, index): surrogates that are the same in every run.
+
+const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
+
+/// The finaliser of splitmix64 (Steele, Lea, Flood 2014).
+const fn mix(z: u64) -> u64 {
+    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+/// One stream of numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Stream {
+    key: u64,
+}
+
+impl Stream {
+    /// The stream `stream` of `seed`.
+    pub const fn new(seed: u64, stream: u64) -> Self {
+        let key = mix(mix(seed.wrapping_add(GOLDEN)).wrapping_add(stream.wrapping_mul(GOLDEN)));
+        Stream { key }
+    }
+
+    /// Uniform within (0, 1).
+    pub fn uniform(&self, index: u64) -> f64 {
+        let bits = mix(mix(index.wrapping_mul(GOLDEN).wrapping_add(self.key)) ^ self.key);
+        ((bits >> 12) as f64 + 0.5) / (1u64 << 52) as f64
+    }
+
+    /// `count` independent standard normal numbers (Box and Muller 1958).
+    pub fn normals(&self, count: usize) -> Vec<f64> {
+        let mut out = Vec::with_capacity(count + 1);
+        let mut index = 0;
+        while out.len() < count {
+            let radius = (-2.0 * self.uniform(index).ln()).sqrt();
+            let (sine, cosine) = (std::f64::consts::TAU * self.uniform(index + 1)).sin_cos();
+            out.push(radius * cosine);
+            out.push(radius * sine);
+            index += 2;
+        }
+        out.truncate(count);
+        out
+    }
+}
+
+/// A chi-square number of `degrees` degrees of freedom made of one standard normal number, by
+/// Wilson and Hilferty's cube (1931); exact enough from ten degrees on.
+pub fn chi_square(degrees: f64, normal: f64) -> f64 {
+    if degrees < 1.0 {
+        return 0.0;
+    }
+    let c = 2.0 / (9.0 * degrees);
+    degrees * (1.0 - c + normal * c.sqrt()).max(0.0).powi(3)
+}

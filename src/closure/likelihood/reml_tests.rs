@@ -1,0 +1,175 @@
+//! The fit on records of the independent generator.
+
+use super::Unusable;
+use super::noise::Timeline;
+use super::random::Stream;
+use super::reml::{self, Options};
+use super::simulated::{declared, noise, record};
+
+fn fit(record: &super::simulated::Simulated, options: &Options) -> reml::Fit {
+    let columns = declared(&record.p);
+    let used = vec![true; record.y.len()];
+    reml::fit(&record.times, &record.y, &columns, &used, options).unwrap()
+}
+
+/// Geometric mean of an estimate over its truth, over some records.
+fn mean_ratio(strengths: (f64, f64, f64), n: usize, of: impl Fn(&reml::Fit) -> f64) -> f64 {
+    let logs = (0..24u64).map(|k| {
+        let found = of(&fit(&record(k, n, strengths), &Options::default()));
+        found.max(1e-6).ln()
+    });
+    (logs.sum::<f64>() / 24.0).exp()
+}
+
+#[test]
+fn strengths_of_the_noise_are_recovered() {
+    let white = mean_ratio((1.0, 0.0, 0.0), 800, |f| f.noise.white_rms_dps);
+    assert!((0.95..1.03).contains(&white), "{white}");
+    let flicker = mean_ratio((1.0, 0.5, 0.0), 800, |f| f.noise.flicker_dps) / 0.5;
+    assert!((0.75..1.15).contains(&flicker), "{flicker}");
+    let strong = mean_ratio((0.1, 1.0, 0.0), 800, |f| f.noise.flicker_dps);
+    assert!((0.85..1.12).contains(&strong), "{strong}");
+    let walk = mean_ratio((1.0, 0.0, 0.2), 800, |f| f.noise.walk_dps_rts) / 0.2;
+    assert!((0.75..1.25).contains(&walk), "{walk}");
+}
+
+#[test]
+fn coefficients_lie_within_their_covariance() {
+    let mut chi = 0.0;
+    for k in 0..40u64 {
+        let fit = fit(&record(k, 400, (1.0, 0.7, 0.0)), &Options::default());
+        for (i, truth) in [3.0, -2.0, 0.7].iter().enumerate().skip(1) {
+            chi += (fit.beta[i] - truth).powi(2) / fit.covariance[(i, i)] / 80.0;
+        }
+        let n = fit.residual_whitened.len() as f64;
+        let square: f64 = fit.residual_whitened.iter().map(|r| r * r).sum();
+        assert!((square / (n - 3.0) - 1.0).abs() < 1e-9);
+    }
+    assert!((0.6..1.6).contains(&chi), "{chi}");
+}
+
+#[test]
+fn spikes_lose_their_weight_and_steps_keep_it() {
+    let mut simulated = record(5, 500, (1.0, 0.3, 0.0));
+    let clean = fit(&simulated, &Options::default());
+    assert!(clean.row_weights.iter().filter(|w| **w < 1.0).count() <= 1);
+    for i in 300..500 {
+        simulated.y[i] += 6.0;
+    }
+    let step = fit(&simulated, &Options::default());
+    assert!(step.row_weights.iter().filter(|w| **w < 0.5).count() <= 1);
+    for i in [40usize, 41, 200, 333, 490] {
+        simulated.y[i] += 25.0;
+    }
+    let spiked = fit(&simulated, &Options::default());
+    for i in [40usize, 41, 200, 333, 490] {
+        assert_eq!(spiked.row_weights[i], 0.0, "row {i}");
+    }
+    assert!(spiked.row_weights.iter().filter(|w| **w < 0.5).count() <= 6);
+    let change = spiked.noise.white_rms_dps / step.noise.white_rms_dps;
+    assert!((0.9..1.1).contains(&change), "{change}");
+    let plain = Options {
+        robust: false,
+        ..Options::default()
+    };
+    assert!(fit(&simulated, &plain).noise.white_rms_dps > 1.5);
+}
+
+#[test]
+fn block_means_give_the_noise_of_the_rows() {
+    let n = 12_000;
+    for (white, flicker, walk) in [(1.0, 0.0, 0.0), (1.0, 0.2, 0.0), (1.0, 0.0, 0.02)] {
+        let mut simulated = record(6, 64, (1.0, 0.0, 0.0));
+        simulated.p = super::simulated::thermometer(n, 6.0);
+        simulated.times = (0..n).map(|i| i as f64).collect();
+        simulated.y = noise(9, n, white, flicker, walk);
+        simulated.y[777] += 50.0;
+        let long = fit(
+            &simulated,
+            &Options {
+                rows: 1000,
+                ..Options::default()
+            },
+        );
+        assert_eq!(long.problem.y.len(), 1000);
+        assert_eq!(long.row_weights[777], 0.0);
+        assert!(
+            (long.noise.white_rms_dps / white - 1.0).abs() < 0.05,
+            "{:?}",
+            long.noise
+        );
+        if flicker > 0.0 {
+            assert!(
+                (0.7..1.3).contains(&(long.noise.flicker_dps / flicker)),
+                "{:?}",
+                long.noise
+            );
+        }
+        if walk > 0.0 {
+            assert!(
+                (0.7..1.3).contains(&(long.noise.walk_dps_rts / walk)),
+                "{:?}",
+                long.noise
+            );
+        }
+    }
+}
+
+#[test]
+fn rows_that_are_not_used_do_not_count() {
+    let simulated = record(8, 300, (1.0, 0.5, 0.0));
+    let columns = declared(&simulated.p);
+    let used: Vec<bool> = (0..300).map(|i| !(60..120).contains(&i)).collect();
+    let mut spoiled = simulated.y.clone();
+    for y in &mut spoiled[60..120] {
+        *y = f64::NAN;
+    }
+    let options = Options::default();
+    let a = reml::fit(&simulated.times, &simulated.y, &columns, &used, &options).unwrap();
+    let b = reml::fit(&simulated.times, &spoiled, &columns, &used, &options).unwrap();
+    assert_eq!((a.beta, a.noise), (b.beta, b.noise));
+    assert_eq!(b.problem.line.used(), 240);
+    assert!(b.residual_whitened[60..120].iter().all(|r| *r == 0.0));
+}
+
+#[test]
+fn what_cannot_be_fitted_is_refused() {
+    let simulated = record(1, 100, (1.0, 0.0, 0.0));
+    let mut columns = declared(&simulated.p);
+    let used = vec![true; 100];
+    let options = Options::default();
+    let with = |columns: &[Vec<f64>], used: &[bool]| {
+        reml::fit(&simulated.times, &simulated.y, columns, used, &options).err()
+    };
+    let few: Vec<bool> = (0..100).map(|i| i < 6).collect();
+    assert_eq!(
+        with(&columns, &few),
+        Some(Unusable::TooFewRows {
+            rows: 6,
+            columns: 3
+        })
+    );
+    assert_eq!(with(&columns[1..], &used), Some(Unusable::NoConstant));
+    columns[2][50] = f64::INFINITY;
+    assert!(matches!(
+        with(&columns, &used),
+        Some(Unusable::NotFinite(_))
+    ));
+}
+
+#[test]
+fn a_noise_makes_its_own_whitener() {
+    let line = Timeline::new(&[0.0, 2.0, 4.0, 6.0], vec![1.0; 4]).unwrap();
+    let noise = super::noise::NoiseModel {
+        white_rms_dps: 3.0,
+        flicker_dps: 1.5,
+        walk_dps_rts: 0.3,
+    };
+    let (whitener, rms) = reml::whitener_of(&noise, &line);
+    assert!((rms - 3.0).abs() < 1e-12);
+    assert!((whitener.shape.flicker - 0.25).abs() < 1e-12);
+    assert!((whitener.shape.walk - 0.02).abs() < 1e-12);
+    let back = super::noise::NoiseModel::of_shape(whitener.shape, rms, 2.0);
+    assert!((back.walk_dps_rts - 0.3).abs() < 1e-12);
+    assert!(Stream::new(1, 2).uniform(3) != Stream::new(1, 3).uniform(3));
+}

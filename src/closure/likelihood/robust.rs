@@ -1,0 +1,66 @@
+//! Spikes: rows that do not fit to all others, before and after them.
+//!
+//! The test of a row is its auxiliary residual ([`super::whiten::Whitener::auxiliary`]): how far the row is
+//! from what all other rows predict for it under the noise's own memory. A step or a drift, which
+//! neighbours share, is no spike.
+
+use super::lattice::{Evaluated, Problem};
+use super::whiten::Whitener;
+
+/// Deviations, in robust standard deviations, from which a row's weight falls, and at which it is 0.
+/// One clean row in 16000 is beyond the first.
+pub const SPIKE: (f64, f64) = (4.0, 8.0);
+
+/// The weight of a row `deviation` robust standard deviations off: 1, falling linearly to 0.
+pub fn weight(deviation: f64) -> f64 {
+    ((SPIKE.1 - deviation) / (SPIKE.1 - SPIKE.0)).clamp(0.0, 1.0)
+}
+
+/// Standard deviation from the median of absolute values (for numbers around 0); 0 for none.
+pub fn scale(values: impl Iterator<Item = f64>) -> f64 {
+    let mut sizes: Vec<f64> = values.map(f64::abs).collect();
+    if sizes.is_empty() {
+        return 0.0;
+    }
+    let middle = sizes.len() / 2;
+    *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 / 0.674_489_75
+}
+
+/// The weights of the rows under a fitted shape. `plain` is the problem with every used row at full
+/// weight, `weighted` the one that was fitted: coefficients come from the latter, so that spikes do
+/// not bend them, and tests from the former.
+pub fn weights(plain: &Problem, weighted: &Problem, at: &Evaluated) -> Vec<f64> {
+    let (y, basis) = weighted.whiten(&Whitener::new(&weighted.line, at.shape));
+    let z: Vec<f64> = basis.q.iter().map(|q| super::linear::dot(q, &y)).collect();
+    let beta = basis.solve(&z);
+    let mut residual = plain.y.clone();
+    for (column, b) in plain.columns.iter().zip(&beta) {
+        super::linear::add_scaled(&mut residual, -b, column);
+    }
+    let whitener = Whitener::new(&plain.line, at.shape);
+    let tests: Vec<f64> = whitener
+        .auxiliary(&whitener.apply(&residual))
+        .into_iter()
+        .map(|(u, d)| if d > 0.0 { u / d.sqrt() } else { f64::NAN })
+        .collect();
+    let unit = scale(tests.iter().copied().filter(|t| t.is_finite()));
+    tests
+        .iter()
+        .map(|t| {
+            if unit > 0.0 && t.is_finite() {
+                weight(t.abs() / unit)
+            } else {
+                1.0
+            }
+        })
+        .collect()
+}
+
+/// White variance factors for weights; rows of weight 0 are not used.
+pub fn factors(plain: &[f64], weights: &[f64]) -> Vec<f64> {
+    plain
+        .iter()
+        .zip(weights)
+        .map(|(f, w)| if *w > 0.0 { f / w } else { f64::INFINITY })
+        .collect()
+}

@@ -1,0 +1,240 @@
+//! The Kalman filter as the inverse square root of a covariance.
+//!
+//! For a noise n with covariance V = L D L' (L unit lower triangular) the filter's innovations are
+//! L^-1 n and their variances D (Durbin & Koopman 2012, 4.3, 4.12). Divided by their standard deviation
+//! they are uncorrelated, so least squares on whitened columns is generalised least squares on
+//! the columns themselves, and ln det V is the sum of the logarithms of D. Gains do not depend on
+//! data: they are made once ([`Whitener::new`], rows times states^2) and used for any number of
+//! columns (rows times states each).
+
+use super::noise::{Shape, State, Timeline};
+
+/// Columns that are filtered side by side.
+const LANES: usize = 4;
+
+/// Gains of the filter for one timeline and one shape of the noise, the white variance being 1.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Whitener {
+    /// The shape.
+    pub shape: Shape,
+    /// ln det V over the used rows.
+    pub log_det: f64,
+    /// Rows that are used.
+    pub used: usize,
+    /// One over the innovation's standard deviation, row by row; 0 for rows that are not used.
+    pub inverse_std: Vec<f64>,
+    /// Number of states, rounded up to a size that the filter is compiled for.
+    width: usize,
+    /// For each row the `width` decays, then the `width` gains.
+    coefficients: Vec<f64>,
+}
+
+/// Calls a function of the compiled size that holds `$width` states.
+macro_rules! sized {
+    ($width:expr, $call:ident ( $($argument:expr),* )) => {
+        match $width {
+            0 => $call::<0>($($argument),*),
+            1 => $call::<1>($($argument),*),
+            2..=4 => $call::<4>($($argument),*),
+            5..=6 => $call::<6>($($argument),*),
+            7..=8 => $call::<8>($($argument),*),
+            _ => $call::<12>($($argument),*),
+        }
+    };
+}
+
+impl Whitener {
+    /// The gains for a timeline and a shape.
+    pub fn new(line: &Timeline, shape: Shape) -> Self {
+        let states = line.states(shape);
+        sized!(states.len(), gains(line, shape, &states))
+    }
+
+    /// One column, whitened; 0 in rows that are not used, whatever the column has there.
+    pub fn apply(&self, column: &[f64]) -> Vec<f64> {
+        self.apply_all(&[column]).pop().unwrap_or_default()
+    }
+
+    /// Several columns, whitened.
+    pub fn apply_all<C: AsRef<[f64]>>(&self, columns: &[C]) -> Vec<Vec<f64>> {
+        let mut out: Vec<Vec<f64>> = columns
+            .iter()
+            .map(|_| vec![0.0; self.inverse_std.len()])
+            .collect();
+        for (inputs, outputs) in columns.chunks(LANES).zip(out.chunks_mut(LANES)) {
+            sized!(self.width, filter(self, inputs, outputs));
+        }
+        out
+    }
+
+    /// The inverse of [`Whitener::apply`]: white numbers of unit variance become noise of this
+    /// covariance. Rows that are not used get the prediction from the used ones before them.
+    pub fn colour(&self, white: &[f64]) -> Vec<f64> {
+        let mut state = vec![0.0; self.width];
+        let mut out = Vec::with_capacity(white.len());
+        for ((w, inverse), row) in white
+            .iter()
+            .zip(&self.inverse_std)
+            .zip(0..self.inverse_std.len())
+        {
+            let (decays, gains) = self.row(row);
+            let mut predicted = 0.0;
+            for (m, a) in state.iter_mut().zip(decays) {
+                *m *= a;
+                predicted += *m;
+            }
+            let innovation = if *inverse > 0.0 { w / inverse } else { 0.0 };
+            for (m, g) in state.iter_mut().zip(gains) {
+                *m += g * innovation;
+            }
+            out.push(predicted + innovation);
+        }
+        out
+    }
+
+    /// For a whitened column e = V^(-1/2) r: the pair (V^-1 r, diagonal of V^-1), row by row.
+    ///
+    /// u = (V^-1 r)_t / sqrt((V^-1)_tt) is the test of row t as an additive outlier, against all
+    /// other rows before and after it; u / sqrt((V^-1)_tt) its size (de Jong 1988; Durbin & Koopman 2012,
+    /// 4.5, 7.5: auxiliary residuals by the backward recursion).
+    pub fn auxiliary(&self, whitened: &[f64]) -> Vec<(f64, f64)> {
+        let k = self.width;
+        let (mut r, mut n) = (vec![0.0; k], vec![0.0; k * k]);
+        let mut out = vec![(0.0, 0.0); whitened.len()];
+        let rows = whitened.iter().zip(&self.inverse_std).enumerate();
+        for (row, (e, inverse)) in rows.rev() {
+            // Here r and n stand for after this row's update: r+ = A' r, N+ = A' N A with the next
+            // row's decays, which the last lines of the loop have already multiplied in.
+            let (decays, gains) = self.row(row);
+            let weight = inverse * inverse;
+            let gr: f64 = gains.iter().zip(&r).map(|(g, r)| g * r).sum();
+            let ng: Vec<f64> = (0..k)
+                .map(|i| (0..k).map(|j| n[i * k + j] * gains[j]).sum())
+                .collect();
+            let gng: f64 = gains.iter().zip(&ng).map(|(g, v)| g * v).sum();
+            if *inverse > 0.0 {
+                out[row] = (e * inverse - gr, weight + gng);
+            }
+            // L = I - g 1': L' r = r - 1 (g' r); then 1 v / F, and the decays of this row.
+            let shift = e * inverse - gr;
+            for (r, a) in r.iter_mut().zip(decays) {
+                *r = (*r + shift) * a;
+            }
+            for i in 0..k {
+                for j in 0..k {
+                    let entry = &mut n[i * k + j];
+                    *entry = (*entry - ng[i] - ng[j] + gng + weight) * decays[i] * decays[j];
+                }
+            }
+        }
+        out
+    }
+
+    /// Decays and gains of a row.
+    fn row(&self, row: usize) -> (&[f64], &[f64]) {
+        let start = 2 * self.width * row;
+        let both = self.coefficients.get(start..start + 2 * self.width);
+        both.map_or((&[], &[]), |both| both.split_at(self.width))
+    }
+}
+
+/// The covariance recursion (Durbin & Koopman 2012, 4.3) for states that are observed as their
+/// sum.
+fn gains<const N: usize>(line: &Timeline, shape: Shape, states: &[State]) -> Whitener {
+    let mut out = Whitener {
+        shape,
+        log_det: 0.0,
+        used: 0,
+        inverse_std: Vec::with_capacity(line.len()),
+        width: N,
+        coefficients: Vec::with_capacity(2 * N * line.len()),
+    };
+    let (mut p, mut variance, mut walk) = ([[0.0f64; N]; N], [0.0f64; N], [0.0f64; N]);
+    for (i, state) in states.iter().enumerate().take(N) {
+        if state.tau.is_finite() {
+            variance[i] = state.variance;
+            p[i][i] = state.variance;
+        } else {
+            walk[i] = state.variance;
+        }
+    }
+    let relaxations = states.iter().filter(|s| s.tau.is_finite()).count();
+    let floor = line.floor(shape);
+    for (row, (step, factor)) in line.steps.iter().zip(&line.white_factor).enumerate() {
+        let mut a = [1.0f64; N];
+        for (a, decay) in a.iter_mut().zip(&line.decays(row)[..relaxations]) {
+            *a = *decay;
+        }
+        let mut z = [0.0f64; N];
+        for i in 0..N {
+            for j in 0..N {
+                p[i][j] *= a[i] * a[j];
+            }
+            p[i][i] += variance[i] * (1.0 - a[i] * a[i]) + walk[i] * step;
+            z[i] = p[i].iter().sum();
+        }
+        let f = z.iter().sum::<f64>() + factor + floor;
+        out.coefficients.extend_from_slice(&a);
+        if f.is_finite() && f > 0.0 {
+            let gain = z.map(|z| z / f);
+            for i in 0..N {
+                for j in 0..N {
+                    p[i][j] -= z[i] * gain[j];
+                }
+            }
+            out.coefficients.extend_from_slice(&gain);
+            out.inverse_std.push(1.0 / f.sqrt());
+            out.log_det += f.ln();
+            out.used += 1;
+        } else {
+            out.coefficients.extend_from_slice(&[0.0; N]);
+            out.inverse_std.push(0.0);
+        }
+    }
+    out
+}
+
+/// Filters up to [`LANES`] columns side by side.
+fn filter<const N: usize>(
+    whitener: &Whitener,
+    inputs: &[impl AsRef<[f64]>],
+    outputs: &mut [Vec<f64>],
+) {
+    let n = whitener.inverse_std.len();
+    let empty: &[f64] = &[];
+    let mut columns = [empty; LANES];
+    for (c, input) in columns.iter_mut().zip(inputs) {
+        *c = input.as_ref();
+    }
+    let mut m = [[0.0f64; LANES]; N];
+    for row in 0..n {
+        let inverse = whitener.inverse_std[row];
+        let (decays, gains) = whitener.coefficients[2 * N * row..2 * N * (row + 1)].split_at(N);
+        let mut v = [0.0f64; LANES];
+        if inverse > 0.0 {
+            for (v, c) in v.iter_mut().zip(&columns) {
+                *v = c.get(row).copied().unwrap_or(0.0);
+            }
+        }
+        let mut predicted = [0.0f64; LANES];
+        for (m, a) in m.iter_mut().zip(decays) {
+            for (m, p) in m.iter_mut().zip(&mut predicted) {
+                *m *= a;
+                *p += *m;
+            }
+        }
+        if inverse > 0.0 {
+            for (v, p) in v.iter_mut().zip(&predicted) {
+                *v -= p;
+            }
+            for (m, g) in m.iter_mut().zip(gains) {
+                for (m, v) in m.iter_mut().zip(&v) {
+                    *m += g * v;
+                }
+            }
+            for (out, v) in outputs.iter_mut().zip(&v) {
+                out[row] = v * inverse;
+            }
+        }
+    }
+}
