@@ -7,7 +7,7 @@
 //! neighbours at most r = 8 apart the ripple is below 2 / cosh(pi^2 / ln r) = 3.5 % (0.15 dB).
 //!
 //! Their shortest time constant is one row period and the longest four record lengths. What is faster
-//! than a row looks white to the record: [`FAST`] of h per row brings the sum to within 0.5 dB of
+//! than a row looks white to the record: `FAST` of h per row brings the sum to within 0.5 dB of
 //! Kasdin's discrete 1/f spectrum, h / (2 sin(pi f T) / (2 pi f T)) / f, from 1 / record length to
 //! half of the row rate (tested).
 //!
