@@ -64,6 +64,11 @@ fn every_setting_that_is_off_can_be_turned_on() {
         "proportional",
         "integra",
         "clamp_raw",
+        "outside",
+        "[compensation.fitted]",
+        "coefficients_dps",
+        "std_max_dps",
+        "heldout_rms_dps",
         "row_period_s",
         "thermometer",
         "[record.columns]",
@@ -84,6 +89,8 @@ fn every_setting_that_is_off_can_be_turned_on() {
     assert!(d.circuit.phase_loop.is_some());
     let low = d.compensation.as_ref().unwrap().clamp_raw.unwrap().0;
     assert_eq!(low, -5900000);
+    let fitted = d.compensation.as_ref().and_then(|c| c.fitted.as_ref());
+    assert_eq!(fitted.map(|f| f.coefficients_dps.len()), Some(3));
     assert_eq!(d.record.columns.len(), 12);
     assert_eq!(d.record.thermometer.as_deref(), Some("die_degc"));
 
