@@ -195,11 +195,20 @@ pub fn repairs(design: &Design, seen: &Seen, stimulus: Stimulus) -> (Vec<Repair>
         if repairs.len() == MOST_REPAIRS {
             return (repairs, false);
         }
-        let Some((repair, repaired)) = overflow::smallest_repair(&design, &seen) else {
+        let Some((mut repair, repaired)) = overflow::smallest_repair(&design, &seen) else {
             return (repairs, false);
         };
-        seen = run::run(&repaired, stimulus.drive, stimulus.sense);
-        design = repaired;
+        let run = |design: &Design| run::run(design, stimulus.drive, stimulus.sense);
+        (design, seen) = (repaired.clone(), run(&repaired));
+        while overflow::is_enough(&repair, &seen)
+            && let Some((shorter, less)) = overflow::one_bit_less(&repair, &design)
+        {
+            let tried = run(&less);
+            if !overflow::is_enough(&shorter, &tried) {
+                break;
+            }
+            (repair, design, seen) = (shorter, less, tried);
+        }
         repairs.push(repair);
     }
     (repairs, true)

@@ -1,9 +1,10 @@
 //! The first overflow: where it came from, where it goes, and the smallest format that removes it.
 
+use super::node::Node;
 use super::probe::Seen;
 use crate::design::{Design, limits};
 use crate::numeric::cast::Label;
-use crate::numeric::format::{Format, Overflow};
+use crate::numeric::format::{Format, Overflow, Quantizer};
 use serde::Serialize;
 
 /// A word that did not fit.
@@ -55,13 +56,7 @@ pub fn smallest_repair(design: &Design, seen: &Seen) -> Option<(Repair, Design)>
             (*bits <= 64).then(|| (from.to_string(), bits.to_string()))?
         }
         _ => {
-            let quantizer = match key {
-                "circuit.demodulator.product" => &mut repaired.circuit.demodulator.product,
-                "circuit.decimator.output" => &mut repaired.circuit.decimator.output,
-                "compensation.accumulator" => &mut repaired.compensation.as_mut()?.accumulator,
-                "compensation.output" => &mut repaired.compensation.as_mut()?.output,
-                _ => return None,
-            };
+            let quantizer = quantizer_mut(&mut repaired, key)?;
             let from = quantizer.format;
             let symmetric = quantizer.overflow == Overflow::SaturateSymmetric;
             quantizer.format = holding(from, words_before(seen, key), symmetric)?;
@@ -73,12 +68,49 @@ pub fn smallest_repair(design: &Design, seen: &Seen) -> Option<(Repair, Design)>
     Some((Repair { key, from, to }, repaired))
 }
 
+/// The same repair with one integer bit less: a word that saturated may have brought larger ones to its own
+/// format than the repaired design does. `None` if nothing is left to take away.
+pub fn one_bit_less(repair: &Repair, repaired: &Design) -> Option<(Repair, Design)> {
+    let mut design = repaired.clone();
+    let format = &mut quantizer_mut(&mut design, &repair.key)?.format;
+    format.integer_bits = format.integer_bits.checked_sub(1)?;
+    if format.integer_bits < u32::from(format.signed) || format.bits() == 0 {
+        return None;
+    }
+    let to = format.to_string();
+    let shorter = Repair {
+        to,
+        ..repair.clone()
+    };
+    (shorter.to != shorter.from).then_some((shorter, design))
+}
+
+/// True if no word overflowed in the format of a repair.
+pub fn is_enough(repair: &Repair, seen: &Seen) -> bool {
+    let first = seen.first_overflow.as_ref();
+    first.is_none_or(|e| e.label.key != repair.key)
+        && nodes_of(seen, &repair.key).all(|n| n.overflows == 0)
+}
+
+fn quantizer_mut<'a>(design: &'a mut Design, key: &str) -> Option<&'a mut Quantizer> {
+    match key {
+        "circuit.demodulator.product" => Some(&mut design.circuit.demodulator.product),
+        "circuit.decimator.output" => Some(&mut design.circuit.decimator.output),
+        "compensation.accumulator" => Some(&mut design.compensation.as_mut()?.accumulator),
+        "compensation.output" => Some(&mut design.compensation.as_mut()?.output),
+        _ => None,
+    }
+}
+
+fn nodes_of<'a>(seen: &'a Seen, key: &'a str) -> impl Iterator<Item = &'a Node> {
+    let of_key =
+        move |name: &str| name == key || name.strip_prefix(key).is_some_and(|r| r.starts_with(' '));
+    seen.nodes.iter().filter(move |n| of_key(&n.identity.name))
+}
+
 /// Greatest and least word before the overflow step, over all nodes of a key.
 fn words_before(seen: &Seen, key: &str) -> (i128, i128) {
-    let of_key =
-        |name: &str| name == key || name.strip_prefix(key).is_some_and(|r| r.starts_with(' '));
-    let nodes = seen.nodes.iter().filter(|n| of_key(&n.identity.name));
-    nodes.fold((0, 0), |(high, low), n| {
+    nodes_of(seen, key).fold((0, 0), |(high, low), n| {
         (high.max(n.before.0), low.min(n.before.1))
     })
 }
