@@ -15,6 +15,7 @@ pub mod noise;
 pub mod order;
 pub mod polynomial;
 pub mod sweep;
+pub mod verdict;
 pub mod weights;
 
 #[cfg(test)]
