@@ -13,6 +13,7 @@ macro_rules! say {
 }
 
 mod approx;
+mod close;
 mod emit;
 mod equiv;
 mod init;
@@ -37,6 +38,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Approx(approx::Arguments),
+    Close(close::Arguments),
     Emit(emit::Arguments),
     Equiv(equiv::Arguments),
     Init(init::Arguments),
@@ -61,6 +63,7 @@ pub fn main() -> ExitCode {
     let cli = Cli::parse();
     let result = match &cli.command {
         Command::Approx(arguments) => approx::run(arguments),
+        Command::Close(arguments) => close::run(arguments),
         Command::Emit(arguments) => emit::run(arguments),
         Command::Equiv(arguments) => equiv::run(arguments),
         Command::Init(arguments) => init::run(arguments),

@@ -8,12 +8,16 @@
 //! here knows the plant (law 4).
 
 pub mod baseline;
+pub mod channels;
 pub mod checks;
+pub mod close;
+pub mod effects;
 pub mod folds;
 pub mod likelihood;
 pub mod noise;
 pub mod order;
 pub mod polynomial;
+pub mod search;
 pub mod sweep;
 pub mod verdict;
 pub mod weights;

@@ -24,6 +24,9 @@ pub const RAMPS: usize = 15;
 /// Spans of equal length otherwise.
 pub const SPANS: usize = 15;
 
+/// Fewest rows.
+pub const LEAST: usize = 15;
+
 /// Segments that are held out, of 15, before the shift.
 const PATTERN: [usize; 4] = [1, 4, 8, 11];
 
@@ -40,25 +43,28 @@ pub struct Split {
 
 /// The split of a record.
 ///
+/// A record of less than three rows a span is cut into spans of three.
+///
 /// # Errors
-/// Fewer than 45 rows (three per span), lengths that differ.
+/// Fewer than [`LEAST`] rows, lengths that differ.
 pub fn split(times_s: &[f64], thermometer: &[f64]) -> Result<Split, Unusable> {
     let n = times_s.len();
     if thermometer.len() != n {
         return Err(Unusable::NotFinite("the thermometer"));
     }
-    if n < 3 * SPANS {
+    if n < LEAST {
         return Err(Unusable::TooFewRows {
             rows: n,
-            columns: SPANS,
+            columns: LEAST / 3,
         });
     }
+    let spans = SPANS.min(n / 3);
     let ramps = runs(thermometer);
     let count = ramps.last().map_or(0, |last| last + 1);
     let segment = if count >= RAMPS && evenly_long(&ramps, count) {
         ramps
     } else {
-        (0..n).map(|i| i * SPANS / n).collect()
+        (0..n).map(|i| i * spans / n).collect()
     };
     let segments = segment.last().map_or(0, |last| last + 1);
     let mut best: Option<(f64, Vec<bool>)> = None;

@@ -124,8 +124,8 @@ pub struct Grid {
 }
 
 /// Posterior that the grid may leave out, and most of its points.
-const LEFT_OUT: f64 = 0.02;
-const POSTERIOR_POINTS: usize = 14;
+const LEFT_OUT: f64 = 0.04;
+const POSTERIOR_POINTS: usize = 9;
 
 impl Grid {
     /// The grid of a fit: the likeliest lattice points, and shapes whiter than the best one.
@@ -152,8 +152,8 @@ impl Grid {
             *w /= sum.max(f64::MIN_POSITIVE);
         }
         let mode = out.shapes.first().copied().unwrap_or_default();
-        for flicker in [1.0, 0.2, 0.04, 0.0] {
-            for walk in [1.0, 0.1, 0.01, 0.0] {
+        for flicker in [1.0, 0.1, 0.0] {
+            for walk in [1.0, 0.05, 0.0] {
                 let whiter = Shape {
                     flicker: mode.flicker * flicker,
                     walk: mode.walk * walk,

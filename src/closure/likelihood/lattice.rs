@@ -88,6 +88,24 @@ impl Problem {
         all.into_iter().map(|s| self.evaluate(s)).collect()
     }
 
+    /// The lattice's points within a decade of a shape in flicker and a decade and a half in walk, and
+    /// the white one; the whole lattice without a shape.
+    pub fn lattice_near(&self, near: Option<Shape>) -> Vec<Evaluated> {
+        let Some(near) = near else {
+            return self.lattice();
+        };
+        let close = |a: f64, b: f64, decades: f64| match (a > 0.0, b > 0.0) {
+            (true, true) => (a / b).log10().abs() <= decades,
+            (a, b) => a == b,
+        };
+        let mut all = shapes(&self.line);
+        all.retain(|s| {
+            let is_white = s.flicker == 0.0 && s.walk == 0.0;
+            is_white || (close(s.flicker, near.flicker, 1.0) && close(s.walk, near.walk, 1.5))
+        });
+        all.into_iter().map(|s| self.evaluate(s)).collect()
+    }
+
     /// The most likely shape near the best of `start`, by Nelder and Mead's simplex (1965) in the
     /// logarithms of what is not 0; `evaluations` at most.
     pub fn refine(&self, start: &[Evaluated], evaluations: usize) -> Evaluated {

@@ -53,6 +53,9 @@ fn sampled(
     stream: impl Fn(u64) -> Stream,
     leave: f64,
 ) -> Vec<f64> {
+    if draws == 0 {
+        return Vec::new();
+    }
     let Factor { rank, rows, left } = sparse_factor(&directions.columns, leave);
     let width = directions.points.iter().map(|p| p.range.len()).max();
     let mut best = vec![0.0; width.unwrap_or(0) + 1];

@@ -23,6 +23,9 @@ pub struct Options {
     pub robust: bool,
     /// Evaluations of the likelihood after the lattice.
     pub evaluations: usize,
+    /// Where the shape of the noise is known to lie: only lattice points near it are tried. For
+    /// comparisons of models; [`Fit::lattice`] is then no posterior.
+    pub near: Option<Shape>,
 }
 
 impl Default for Options {
@@ -31,6 +34,7 @@ impl Default for Options {
             rows: 3000,
             robust: true,
             evaluations: 40,
+            near: None,
         }
     }
 }
@@ -151,9 +155,10 @@ fn check(times_s: &[f64], y: &[f64], columns: &[Vec<f64>], used: &[bool]) -> Res
 /// Weights and noise, by turns: each pass tests all rows again, at full weight.
 fn fit_rows(plain: &Problem, options: &Options) -> (Problem, Vec<Evaluated>, Evaluated, Vec<f64>) {
     let mut problem = plain.clone();
-    let mut lattice = problem.lattice();
+    let mut lattice = problem.lattice_near(options.near);
     let mut at = problem.refine(&lattice, options.evaluations);
     let mut weights = vec![1.0; plain.y.len()];
+    let mut weighed = false;
     for _ in 0..if options.robust { 3 } else { 0 } {
         let next = robust::weights(plain, &problem, &at);
         let moved = next.iter().zip(&weights).map(|(a, b)| (a - b).abs());
@@ -161,8 +166,15 @@ fn fit_rows(plain: &Problem, options: &Options) -> (Problem, Vec<Evaluated>, Eva
             break;
         }
         weights = next;
+        weighed = true;
         let factors = robust::factors(&plain.line.white_factor, &weights);
         problem.line = plain.line.with_white_factor(factors);
+        // The whole lattice was tried with every row at full weight; spikes look like white noise
+        // then, so that whiter shapes are far, and redder ones must be tried again at the end.
+        lattice = problem.lattice_near(Some(at.shape));
+        at = problem.refine(&lattice, options.evaluations / 2);
+    }
+    if weighed && options.near.is_none() {
         lattice = problem.lattice();
         at = problem.refine(&lattice, options.evaluations);
     }
@@ -171,7 +183,7 @@ fn fit_rows(plain: &Problem, options: &Options) -> (Problem, Vec<Evaluated>, Eva
 
 fn fit_long(line: &Timeline, decimated: Decimated, options: &Options) -> Fit {
     let problem = decimated.problem.clone();
-    let lattice = problem.lattice();
+    let lattice = problem.lattice_near(options.near);
     let at = problem.refine(&lattice, options.evaluations);
     let noise = decimate::row_noise(&decimated, at.shape, at.white_variance(), line);
     let weights = decimated.blocks.weights.clone();

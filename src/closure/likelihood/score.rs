@@ -24,7 +24,7 @@ use super::whiten::Whitener;
 /// How much to compute.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Options {
-    /// Draws of the dictionary's greatest score at known shape.
+    /// Draws of the dictionary's greatest score at known shape; 0 = no [`GroupScore::p_fast`] (it is 1).
     pub draws: usize,
     /// Surrogate records; 0 = no bootstrap. 200 resolve p = 0.01.
     pub surrogates: usize,

@@ -1,0 +1,391 @@
+//! What a record's rows say, ready for candidate effects: every channel whole, the thermometer smooth
+//! and scaled.
+
+use std::collections::BTreeMap;
+
+/// The channels of a record. All columns have one value a row, without holes: what was not measured
+/// is interpolated in time (an applied rate counts as none).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Channels {
+    /// s, never decreasing.
+    pub time_s: Vec<f64>,
+    /// Time since power-on, s; the record's time where it has no such column.
+    pub on_s: Vec<f64>,
+    /// Whether it has.
+    pub on_known: bool,
+    /// Output less applied rate, deg/s; NaN where not measured.
+    pub error_dps: Vec<f64>,
+    /// Name of the bias model's thermometer.
+    pub thermometer: String,
+    /// Its reading less `centre`, over `half`: -1..1.
+    pub u: Vec<f64>,
+    /// The same with its reading noise smoothed away, for lags, rates of change and thresholds.
+    pub smooth_u: Vec<f64>,
+    /// Middle of the thermometer's range, in its unit.
+    pub centre: f64,
+    /// Half of its range, in its unit; 1 if it did not move.
+    pub half: f64,
+    /// Temperature at u = 0, degC.
+    pub middle_degc: f64,
+    /// Change of temperature over one unit of u, K; negative for a thermometer that falls when
+    /// heated.
+    pub kelvin_per_u: f64,
+    /// For a phase: the temperature as a resonator without phase lag elsewhere has it, tan(p - p_r),
+    /// scaled to -1..1 and smooth; `None` for other thermometers, and for a phase far from resonance.
+    pub tangent: Option<Vec<f64>>,
+    /// All other columns but the output, by name.
+    pub columns: BTreeMap<String, Vec<f64>>,
+}
+
+impl Channels {
+    /// From a record's columns (NaN = not measured). `degc_of` turns a reading of the thermometer into
+    /// degC where no column says it.
+    ///
+    /// # Errors
+    /// The name of a column that is needed and is not there or has no value.
+    pub fn new(
+        time_s: &[f64],
+        columns: &BTreeMap<String, Vec<f64>>,
+        thermometer: &str,
+        degc_of: impl Fn(f64) -> f64,
+    ) -> Result<Self, String> {
+        let absent = |name: &str| name.to_owned();
+        let output = columns
+            .get("rate_out_dps")
+            .ok_or_else(|| absent("rate_out_dps"))?;
+        let reading = columns.get(thermometer).ok_or_else(|| absent(thermometer))?;
+        let reading = filled(time_s, reading).ok_or_else(|| absent(thermometer))?;
+        let mut others = BTreeMap::new();
+        for (name, values) in columns {
+            let whole = if name == "rate_dps" {
+                let at_rest = |v: &f64| if v.is_nan() { 0.0 } else { *v };
+                Some(values.iter().map(at_rest).collect())
+            } else {
+                filled(time_s, values)
+            };
+            if let Some(whole) = whole
+                && !["rate_out_dps", "time_since_power_on_s", thermometer].contains(&name.as_str())
+            {
+                others.insert(name.clone(), whole);
+            }
+        }
+        let rate = others.get("rate_dps");
+        let error_dps = output
+            .iter()
+            .enumerate()
+            .map(|(i, o)| o - rate.map_or(0.0, |r| r[i]))
+            .collect();
+        let (low, high) = range(&reading);
+        let centre = 0.5 * (low + high);
+        let half = if high > low { 0.5 * (high - low) } else { 1.0 };
+        let u: Vec<f64> = reading.iter().map(|r| (r - centre) / half).collect();
+        let on = columns
+            .get("time_since_power_on_s")
+            .and_then(|c| filled(time_s, c));
+        let mut out = Channels {
+            time_s: time_s.to_vec(),
+            on_known: on.is_some(),
+            on_s: on.unwrap_or_else(|| time_s.to_vec()),
+            error_dps,
+            thermometer: thermometer.to_owned(),
+            smooth_u: smoothed(time_s, &u),
+            u,
+            centre,
+            half,
+            middle_degc: 0.0,
+            kelvin_per_u: 1.0,
+            tangent: None,
+            columns: others,
+        };
+        out.tangent = out.tangent_of_phase();
+        (out.middle_degc, out.kelvin_per_u) = out.temperature(thermometer, degc_of);
+        Ok(out)
+    }
+
+    /// (temperature at u = 0, change per u): the thermometer itself, another one by regression, or
+    /// the given law.
+    fn temperature(&self, thermometer: &str, degc_of: impl Fn(f64) -> f64) -> (f64, f64) {
+        if thermometer.ends_with("_degc") {
+            return (self.centre, self.half);
+        }
+        for name in ["die_degc", "chamber_degc"] {
+            let Some(t) = self.columns.get(name) else { continue };
+            let n = t.len().max(1) as f64;
+            let (mu, mt) = (mean(&self.u), mean(t));
+            let pairs = || self.u.iter().zip(t);
+            let cov: f64 = pairs().map(|(u, t)| (u - mu) * (t - mt)).sum::<f64>() / n;
+            let var: f64 = self.u.iter().map(|u| (u - mu).powi(2)).sum::<f64>() / n;
+            if var > 0.0 && cov != 0.0 {
+                return (mt - cov / var * mu, cov / var);
+            }
+        }
+        let (low, high) = (
+            degc_of(self.centre - self.half),
+            degc_of(self.centre + self.half),
+        );
+        (0.5 * (low + high), 0.5 * (high - low))
+    }
+
+    fn tangent_of_phase(&self) -> Option<Vec<f64>> {
+        let resonance = self.resonance_rad();
+        let reach = (self.centre - resonance).abs() + self.half;
+        if self.thermometer != "phase_rad" || reach > 1.3 {
+            return None;
+        }
+        let of = |u: &f64| (self.centre + self.half * u - resonance).tan();
+        let raw: Vec<f64> = self.smooth_u.iter().map(of).collect();
+        Some(scaled(&raw).0)
+    }
+
+    /// The drive's phase at resonance (an odd multiple of a quarter turn) nearest to the middle of the
+    /// range, rad.
+    pub fn resonance_rad(&self) -> f64 {
+        use std::f64::consts::{FRAC_PI_2, PI};
+        FRAC_PI_2 + PI * ((self.centre - FRAC_PI_2) / PI).round()
+    }
+
+    /// How many readings of the temperature there are ([`Channels::heat`]).
+    pub fn heats(&self) -> usize {
+        1 + usize::from(self.tangent.is_some())
+    }
+
+    /// The temperature, smooth and scaled: by the reading itself (0), or by the phase's tangent (1).
+    pub fn heat(&self, which: usize) -> &[f64] {
+        match (&self.tangent, which) {
+            (Some(tangent), 1) => tangent,
+            _ => &self.smooth_u,
+        }
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.time_s.len()
+    }
+
+    /// True without rows.
+    pub fn is_empty(&self) -> bool {
+        self.time_s.is_empty()
+    }
+
+    /// A column other than time, thermometer and output.
+    pub fn column(&self, name: &str) -> Option<&[f64]> {
+        self.columns.get(name).map(Vec::as_slice)
+    }
+
+    /// The same if it moves at all.
+    pub fn moving(&self, name: &str) -> Option<&[f64]> {
+        self.column(name).filter(|c| {
+            let (low, high) = range(c);
+            high > low
+        })
+    }
+
+    /// A column scaled to -1..1; `None` if it does not move.
+    pub fn scaled(&self, name: &str) -> Option<Vec<f64>> {
+        self.moving(name).map(|c| scaled(c).0)
+    }
+
+    /// Duration, s.
+    pub fn span_s(&self) -> f64 {
+        match (self.time_s.first(), self.time_s.last()) {
+            (Some(a), Some(b)) => b - a,
+            _ => 0.0,
+        }
+    }
+
+    /// Median distance of rows, s.
+    pub fn period_s(&self) -> f64 {
+        let mut steps: Vec<f64> = self.time_s.windows(2).map(|w| w[1] - w[0]).collect();
+        steps.retain(|s| *s > 0.0);
+        if steps.is_empty() {
+            return 1.0;
+        }
+        let middle = steps.len() / 2;
+        *steps.select_nth_unstable_by(middle, f64::total_cmp).1
+    }
+}
+
+/// (least, greatest); (0, 0) of nothing.
+pub fn range(values: &[f64]) -> (f64, f64) {
+    values
+        .iter()
+        .filter(|v| v.is_finite())
+        .fold(None, |r: Option<(f64, f64)>, v| {
+            Some(r.map_or((*v, *v), |(a, b)| (a.min(*v), b.max(*v))))
+        })
+        .unwrap_or((0.0, 0.0))
+}
+
+/// Arithmetic mean; 0 of nothing.
+pub fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+/// Scaled to -1..1, with the middle and half of the range; all 0 if it does not move.
+pub fn scaled(values: &[f64]) -> (Vec<f64>, f64, f64) {
+    let (low, high) = range(values);
+    let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+    let of = |v: &f64| if half > 0.0 { (v - middle) / half } else { 0.0 };
+    (values.iter().map(of).collect(), middle, half)
+}
+
+/// Holes filled linearly in time, at the ends by the nearest value; `None` without any value.
+pub fn filled(time_s: &[f64], values: &[f64]) -> Option<Vec<f64>> {
+    let known: Vec<usize> = (0..values.len().min(time_s.len()))
+        .filter(|i| values[*i].is_finite())
+        .collect();
+    let (first, last) = (*known.first()?, *known.last()?);
+    if known.len() == time_s.len() {
+        return Some(values.to_vec());
+    }
+    let mut next = 0;
+    Some(
+        (0..time_s.len())
+            .map(|i| {
+                while next < known.len() && known[next] < i {
+                    next += 1;
+                }
+                if i <= first {
+                    return values[first];
+                }
+                if i >= last {
+                    return values[last];
+                }
+                let (a, b) = (known[next - 1], known[next]);
+                let width = time_s[b] - time_s[a];
+                let share = if width > 0.0 {
+                    (time_s[i] - time_s[a]) / width
+                } else {
+                    0.5
+                };
+                values[a] + share * (values[b] - values[a])
+            })
+            .collect(),
+    )
+}
+
+/// Half widths, in rows, that [`smoothed`] and [`slope`] choose from.
+const HALF_WIDTHS: [usize; 7] = [1, 2, 3, 4, 6, 9, 14];
+
+/// Noise of a slope over `k` rows to each side, relative to a reading's and per row.
+fn slope_noise(k: usize) -> f64 {
+    let k = k as f64;
+    (3.0 / (k * (k + 1.0) * (2.0 * k + 1.0))).sqrt()
+}
+
+/// White noise of a reading, from its third differences (a smooth course has none).
+pub fn reading_noise(values: &[f64]) -> f64 {
+    let mut sizes: Vec<f64> = values
+        .windows(4)
+        .map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs())
+        .collect();
+    if sizes.is_empty() {
+        return 0.0;
+    }
+    let middle = sizes.len() / 2;
+    // The four weights' squares add up to 20.
+    *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 / (0.674_489_75 * 20f64.sqrt())
+}
+
+/// The narrowest half width at which a slope's noise is small beside the slopes themselves.
+fn half_width(values: &[f64]) -> usize {
+    let noise = reading_noise(values);
+    for k in HALF_WIDTHS {
+        let steps: Vec<f64> = (k..values.len().saturating_sub(k))
+            .map(|i| (values[i + k] - values[i - k]) / (2 * k) as f64)
+            .collect();
+        let rms = (steps.iter().map(|s| s * s).sum::<f64>() / steps.len().max(1) as f64).sqrt();
+        if noise * slope_noise(k) <= 0.05 * rms {
+            return k;
+        }
+    }
+    HALF_WIDTHS[HALF_WIDTHS.len() - 1]
+}
+
+/// Local straight line or parabola through `k` rows to each side: (value, slope per second) at each row.
+fn local(time_s: &[f64], values: &[f64], k: usize) -> (Vec<f64>, Vec<f64>) {
+    let n = values.len();
+    let mut out = (Vec::with_capacity(n), Vec::with_capacity(n));
+    for i in 0..n {
+        let rows = i.saturating_sub(k)..(i + k + 1).min(n);
+        let centre_s = time_s[i];
+        let unit = (time_s[rows.end - 1] - time_s[rows.start]).max(f64::MIN_POSITIVE);
+        // Normal equations of 1, x, x^2; the parabola only where five rows carry it.
+        let mut sums = [0.0f64; 5];
+        let mut right = [0.0f64; 3];
+        for j in rows.clone() {
+            let x = (time_s[j] - centre_s) / unit;
+            let powers = [1.0, x, x * x, x * x * x, x * x * x * x];
+            for (s, p) in sums.iter_mut().zip(powers) {
+                *s += p;
+            }
+            for (r, p) in right.iter_mut().zip(powers) {
+                *r += p * values[j];
+            }
+        }
+        let (value, slope) = solved(sums, right, rows.len() >= 5);
+        out.0.push(value);
+        out.1.push(slope / unit);
+    }
+    out
+}
+
+/// Value and slope at 0 of the least-squares parabola (or line) with moments `s` and `r`.
+fn solved(s: [f64; 5], r: [f64; 3], parabola: bool) -> (f64, f64) {
+    let line = || {
+        let det = s[0] * s[2] - s[1] * s[1];
+        if det.abs() < 1e-12 {
+            return (r[0] / s[0], 0.0);
+        }
+        (
+            (r[0] * s[2] - r[1] * s[1]) / det,
+            (s[0] * r[1] - s[1] * r[0]) / det,
+        )
+    };
+    if !parabola {
+        return line();
+    }
+    let m = nalgebra::Matrix3::new(s[0], s[1], s[2], s[1], s[2], s[3], s[2], s[3], s[4]);
+    match m.try_inverse() {
+        Some(inverse) => {
+            let b = inverse * nalgebra::Vector3::new(r[0], r[1], r[2]);
+            if b.iter().all(|v| v.is_finite()) {
+                (b[0], b[1])
+            } else {
+                line()
+            }
+        }
+        None => line(),
+    }
+}
+
+/// A column without most of its reading noise: untouched where its noise is small.
+pub fn smoothed(time_s: &[f64], values: &[f64]) -> Vec<f64> {
+    match half_width(values) {
+        1 => values.to_vec(),
+        k => local(time_s, values, k).0,
+    }
+}
+
+/// Rate of change, per second, over `rows` rows to each side.
+pub fn slope(time_s: &[f64], values: &[f64], rows: usize) -> Vec<f64> {
+    local(time_s, values, rows.max(1)).1
+}
+
+/// First-order lag with time constant `tau_s`: tau y' = x - y, x straight between rows, y(0) = x(0).
+pub fn lag(time_s: &[f64], values: &[f64], tau_s: f64) -> Vec<f64> {
+    let mut out = Vec::with_capacity(values.len());
+    let mut y = values.first().copied().unwrap_or(0.0);
+    for i in 0..values.len() {
+        if i > 0 {
+            let dt = time_s[i] - time_s[i - 1];
+            let (x0, x1) = (values[i - 1], values[i]);
+            if dt > 0.0 {
+                let trail = (x1 - x0) / dt * tau_s;
+                y = x1 - trail + (y - x0 + trail) * (-dt / tau_s).exp();
+            }
+        }
+        out.push(y);
+    }
+    out
+}

@@ -1,0 +1,312 @@
+//! A thermal record closed: from its rows to `closure.json` (`docs/manual.md`, "Closing the loop").
+
+use super::channels::Channels;
+use super::effects::{Candidate, Missing};
+use super::likelihood::blocks::{self, Split};
+use super::search::judge::Round;
+use super::search::{Effort, Found, LEVEL, Model, Search};
+use super::verdict::{
+    Closure, Errors, Evidence, Fate, FirmwareErrors, SCHEMA, Step, Structure, Verdict,
+};
+use crate::design::{Design, Gyro, RecordMapping};
+use crate::error::{InputError, Result};
+use crate::record::columns::THERMOMETERS;
+use crate::record::{ThermalRecord, Warning, stats};
+use std::sync::Arc;
+
+/// A closed record, with what a report shows.
+pub struct Closed {
+    /// `closure.json`.
+    pub closure: Closure,
+    /// The record as candidates see it.
+    pub channels: Channels,
+    /// Which rows were fitted and which judged.
+    pub split: Split,
+    /// The declared model.
+    pub before: Model,
+    /// With the named terms.
+    pub after: Model,
+}
+
+/// The bias model's thermometer in a record, if it has one.
+///
+/// # Errors
+/// The design names one that is not there.
+fn thermometer(record: &ThermalRecord, mapping: &RecordMapping) -> Result<Option<String>> {
+    match &mapping.thermometer {
+        Some(name) if record.column(name).is_none() => Err(InputError::new(format!(
+            "the record has no column {name}, which the design names as thermometer"
+        ))
+        .in_file(&record.source)
+        .help(format!(
+            "the record has: {}",
+            record.columns.keys().cloned().collect::<Vec<_>>().join(", ")
+        ))
+        .into()),
+        Some(name) => Ok(Some(name.clone())),
+        None => Ok(THERMOMETERS
+            .into_iter()
+            .find(|t| record.measured(t) > 0)
+            .map(str::to_owned)),
+    }
+}
+
+/// Temperature of the declared gyro at a reading of its phase (rad) or frequency (Hz), degC: the
+/// resonance's law linearised at the reference temperature (eq. 1 to 8 of the seed paper).
+fn degc_of(gyro: &Gyro, thermometer: &str, reading: f64) -> f64 {
+    let reference = gyro.reference_temperature_k - 273.15;
+    if thermometer == "freq_hz" {
+        let slope = -0.5 * gyro.stiffness_tempco_per_k.abs() * gyro.drive_frequency_hz;
+        return reference + (reading - gyro.drive_frequency_hz) / slope;
+    }
+    let quarter = std::f64::consts::FRAC_PI_2;
+    let slope = -gyro.drive_q * gyro.stiffness_tempco_per_k.abs()
+        + gyro.electronics.phase_slope_rad_per_k;
+    reference + (reading + quarter) / slope
+}
+
+/// Closes a record.
+///
+/// # Errors
+/// A record that cannot be fitted: too few rows, no thermometer of the name that the design gives.
+pub fn close(
+    record: &ThermalRecord,
+    mut warnings: Vec<Warning>,
+    design: &Design,
+    command: &str,
+    effort: Effort,
+) -> Result<Closed> {
+    let start = std::time::Instant::now();
+    let name = thermometer(record, &design.record)?;
+    let mut columns = record.columns.clone();
+    let name = name.unwrap_or_else(|| {
+        warnings.push(Warning::general(
+            "no_thermometer",
+            "the record has no thermometer: the declared bias is a constant, and effects of temperature \
+             cannot be seen",
+        ));
+        columns.insert(NONE.to_owned(), vec![0.0; record.len()]);
+        NONE.to_owned()
+    });
+    let refuse = |why: String| -> crate::error::Error {
+        InputError::new(why)
+            .in_file(&record.source)
+            .help("record longer, or average less")
+            .into()
+    };
+    let degc = |reading: f64| degc_of(&design.gyro, &name, reading);
+    let channels = Channels::new(&record.time_s, &columns, &name, degc)
+        .map_err(|missing| refuse(format!("column {missing} holds no measured value")))?;
+    let split = blocks::split(&channels.time_s, &channels.u).map_err(|e| refuse(e.to_string()))?;
+    let (closure, before, after) = {
+        let search = Search::new(&channels, &split, effort, Vec::new());
+        let unusable = |e: super::likelihood::Unusable| refuse(e.to_string());
+        let found = search.run().map_err(unusable)?;
+        let before = search.model(&[]).map_err(unusable)?;
+        let after = search.model(&found.terms).map_err(unusable)?;
+        let told = Told {
+            search: &search,
+            found: &found,
+            before: &before,
+            after: &after,
+        };
+        let mut closure = told.closure().map_err(unusable)?;
+        told.warn(&mut warnings);
+        closure.warnings = warnings;
+        closure.command = command.to_owned();
+        closure.design_sha256 = crate::emit::manifest::sha256(design.source.text.as_bytes());
+        (closure, before, after)
+    };
+    let mut closed = Closed {
+        closure,
+        channels,
+        split,
+        before,
+        after,
+    };
+    closed.closure.seconds = start.elapsed().as_secs_f64();
+    Ok(closed)
+}
+
+/// Stands for the thermometer where there is none.
+const NONE: &str = "no_thermometer";
+
+/// A search put into words.
+struct Told<'a> {
+    search: &'a Search<'a>,
+    found: &'a Found,
+    before: &'a Model,
+    after: &'a Model,
+}
+
+impl Told<'_> {
+    fn errors(&self, model: &Model) -> Errors {
+        let residual = model.residual(self.search.channels);
+        let over = |rows: &[bool]| -> Vec<f64> {
+            let pairs = residual.iter().zip(rows).filter(|(_, m)| **m);
+            pairs.map(|(r, _)| *r).collect()
+        };
+        let held = over(&self.search.heldout);
+        Errors {
+            train_rms: stats::rms(&over(&self.search.used)),
+            heldout_rms: stats::rms(&held),
+            heldout_max_abs: held.iter().fold(0.0, |m, r| m.max(r.abs())),
+        }
+    }
+
+    fn closure(&self) -> std::result::Result<Closure, super::likelihood::Unusable> {
+        let left = self.found.left.is_some();
+        let residual = self.after.residual(self.search.channels);
+        let finite: Vec<f64> = residual.into_iter().filter(|r| r.is_finite()).collect();
+        let steps = self.steps()?;
+        Ok(Closure {
+            schema: SCHEMA,
+            version: env!("CARGO_PKG_VERSION"),
+            design_sha256: String::new(),
+            command: String::new(),
+            verdict: Verdict::of(steps.len(), left),
+            unit: "deg/s",
+            noise_floor_rms: stats::difference_noise(&finite),
+            before: self.errors(self.before),
+            after: self.errors(self.after),
+            firmware: FirmwareErrors {
+                compensable: self.compensable(),
+                heldout_rms: None,
+                heldout_max_abs: None,
+            },
+            residual_structure: Structure {
+                left,
+                strongest_channel: self.found.left.clone(),
+            },
+            evidence: self.evidence(&steps),
+            steps,
+            warnings: Vec::new(),
+            seconds: 0.0,
+        })
+    }
+
+    /// The steps in their order, each with the held-out error of itself and those before it.
+    fn steps(&self) -> std::result::Result<Vec<Step>, super::likelihood::Unusable> {
+        let terms = &self.found.terms;
+        let estimates = self.search.estimates(self.after);
+        let mut out = Vec::new();
+        for (k, (term, estimate)) in terms.iter().zip(&estimates).enumerate() {
+            let model = if k + 1 == terms.len() {
+                self.errors(self.after)
+            } else {
+                self.errors(&self.search.model(&terms[..=k])?)
+            };
+            let mut others = terms.clone();
+            others.remove(k);
+            let round: Round = self.search.judge(&self.search.model(&others)?, 0);
+            let reported = term.candidate.report(self.search.channels, estimate);
+            out.push(Step {
+                effect: term.id(),
+                channels: term.candidate.channels(self.search.channels).unwrap_or_default(),
+                parameters: reported.iter().map(|(n, v)| (n.clone(), v.0)).collect(),
+                parameter_std: reported.iter().map(|(n, v)| (n.clone(), v.1)).collect(),
+                heldout_rms: model.heldout_rms,
+                p_value: term.p_value.clamp(1e-300, 1.0),
+                selection_frequency: self.search.selection_frequency(self.after, k, &round),
+                indistinguishable_from: term.rivals.clone(),
+                separating_experiment: (!term.rivals.is_empty())
+                    .then(|| term.candidate.sheet().experiment.to_owned()),
+            });
+        }
+        Ok(out)
+    }
+
+    /// Whether firmware sees all that the bias model and the steps need.
+    fn compensable(&self) -> bool {
+        let seen = |name: &String| {
+            let sees = [
+                "time_s",
+                "time_since_power_on_s",
+                "rate_out_dps",
+                "phase_rad",
+                "freq_hz",
+                "die_degc",
+                "agc",
+                "quad_dps",
+                "supply_v",
+            ];
+            // A law of the applied rate is taken off by the corrected output itself.
+            sees.contains(&name.as_str()) || name == "rate_dps"
+        };
+        let thermometer = &self.search.channels.thermometer;
+        let declared = seen(thermometer) || thermometer == NONE;
+        declared
+            && self.found.terms.iter().all(|t| {
+                let channels = t.candidate.channels(self.search.channels).unwrap_or_default();
+                t.candidate.sheet().compensable && channels.iter().all(seen)
+            })
+    }
+
+    fn evidence(&self, steps: &[Step]) -> Vec<Evidence> {
+        let mut out: Vec<Evidence> = Vec::new();
+        let confounded: Vec<&String> =
+            steps.iter().flat_map(|s| &s.indistinguishable_from).collect();
+        for j in self.found.first.iter().filter(|j| j.candidate.named()) {
+            let id = j.candidate.id();
+            let (fate, remark) = if steps.iter().any(|s| s.effect == id) {
+                (Fate::Taken, "a step".to_owned())
+            } else if confounded.contains(&&id) || self.found.undecided.contains(&id) {
+                let remark = format!("explains as much; {}", j.candidate.sheet().experiment);
+                (Fate::Confounded, remark)
+            } else if j.p_value <= LEVEL {
+                let remark = "seen alone it helps, but what was taken explains more";
+                (Fate::Rejected, remark.to_owned())
+            } else {
+                let remark = "chance does as well among so many candidates";
+                (Fate::Rejected, remark.to_owned())
+            };
+            out.push(Evidence {
+                effect: id,
+                fate,
+                p_value: Some(j.p_value),
+                gain: Some(j.gain),
+                remark,
+            });
+        }
+        for (candidate, why) in self.found.missing.iter().filter(|(c, _)| c.named()) {
+            let (fate, remark) = match why {
+                Missing::Channel(name) => {
+                    (Fate::NoChannel, format!("the record has no column {name}"))
+                }
+                Missing::Excitation(remark) => (Fate::NotExcited, remark.clone()),
+            };
+            out.push(without(candidate, fate, remark));
+        }
+        let listed: Vec<String> = out.iter().map(|e| e.effect.clone()).collect();
+        for candidate in self.search.candidates() {
+            if candidate.named() && !listed.contains(&candidate.id()) {
+                let remark = "what it does lies within the declared model in this record";
+                out.push(without(candidate, Fate::NotExcited, remark.to_owned()));
+            }
+        }
+        out
+    }
+
+    fn warn(&self, warnings: &mut Vec<Warning>) {
+        if !self.found.undecided.is_empty() {
+            warnings.push(Warning::general(
+                "undecided",
+                format!(
+                    "the record decides nothing between {}: each explains it as well",
+                    self.found.undecided.join(", ")
+                ),
+            ));
+        }
+    }
+}
+
+fn without(candidate: &Arc<dyn Candidate>, fate: Fate, remark: String) -> Evidence {
+    Evidence {
+        effect: candidate.id(),
+        fate,
+        p_value: None,
+        gain: None,
+        remark,
+    }
+}
+

@@ -1,0 +1,151 @@
+//! Effects of the drive loop: damping and amplitude.
+
+use super::{
+    Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, gain, map, moving,
+};
+use crate::closure::channels::Channels;
+
+/// All of this file.
+pub fn all() -> Vec<Box<dyn Candidate>> {
+    vec![Box::new(Damping), Box::new(Coupling)]
+}
+
+/// Bias through damping, which the drive gain follows.
+struct Damping;
+
+const DAMPING: Sheet = Sheet {
+    id: "damping_bias",
+    physics: "anisotropic damping turns part of the drive's motion into the sense axis in phase with \
+              the rate: it goes as 1/Q, as the drive gain does; a changing Q also bends the phase",
+    equation: "k (g - 1), g = 1 / Q relative; and B(p) - B(p'), tan(p' - p_r) = g tan(p - p_r)",
+    parameters: &[
+        Parameter {
+            name: "gain_dps",
+            plausible: (0.01, 20.0),
+        },
+        Parameter {
+            name: "share_of_phase_bend",
+            plausible: (0.5, 1.5),
+        },
+    ],
+    compensable: true,
+    confounders: &["amplitude_phase_coupling", "bias_third_order"],
+    experiment: "ring the drive down: Q directly; or step the amplitude's set point at constant Q",
+    reference: "IEEE Std 1431, annex B; Weinberg & Kourepenis 2006",
+};
+
+impl Candidate for Damping {
+    fn sheet(&self) -> &Sheet {
+        &DAMPING
+    }
+
+    fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing> {
+        moving(c, "agc")?;
+        Ok(vec!["agc".to_owned()])
+    }
+
+    fn points(&self, c: &Channels) -> Vec<Point> {
+        let forms = if c.thermometer == "phase_rad" { 3 } else { 1 };
+        (0..forms).map(Point::form).collect()
+    }
+
+    fn columns(&self, c: &Channels, bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
+        let Some(g) = c.column("agc") else {
+            return Vec::new();
+        };
+        let plain = map(g, |g| g - 1.0);
+        if point.form == 0 {
+            return vec![plain];
+        }
+        let resonance = c.resonance_rad();
+        let bend = c
+            .u
+            .iter()
+            .zip(g)
+            .map(|(u, g)| {
+                let p = (c.centre + c.half * u - resonance).clamp(-1.5, 1.5);
+                let nominal = (g * p.tan()).atan();
+                bias.at((nominal + resonance - c.centre) / c.half) - bias.at(*u)
+            })
+            .collect();
+        if point.form == 1 {
+            vec![bend]
+        } else {
+            vec![plain, bend]
+        }
+    }
+
+    fn acts_on_bias(&self) -> bool {
+        true
+    }
+
+    fn report(&self, _c: &Channels, e: &Estimate) -> Reported {
+        let names: &[&str] = match e.point.form {
+            0 => &["gain_dps"],
+            1 => &["share_of_phase_bend"],
+            _ => &["gain_dps", "share_of_phase_bend"],
+        };
+        let each = names.iter().enumerate();
+        each.map(|(k, name)| gain(name, e, k, 1.0)).collect()
+    }
+}
+
+/// The drive's amplitude pulls the measured phase.
+struct Coupling;
+
+const COUPLING: Sheet = Sheet {
+    id: "amplitude_phase_coupling",
+    physics: "a stiffening spring moves the resonance with the drive's amplitude (Duffing), so the \
+              measured phase, the thermometer, errs with the drive gain",
+    equation: "-B'(p) k (g^n - 1), n = 1 or 2",
+    parameters: &[Parameter {
+        name: "pull_rad",
+        plausible: (1e-4, 0.3),
+    }],
+    compensable: true,
+    confounders: &["damping_bias"],
+    experiment: "step the amplitude's set point by 30 % at two temperatures: the error follows the \
+                 bias curve's slope, damping's does not",
+    reference: "(3/8)(k3/k1) A^2 of a Duffing resonator; Chen et al. 2004, eq. 7",
+};
+
+impl Candidate for Coupling {
+    fn sheet(&self) -> &Sheet {
+        &COUPLING
+    }
+
+    fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing> {
+        if c.thermometer != "phase_rad" {
+            return Err(Missing::Channel("phase_rad".to_owned()));
+        }
+        moving(c, "agc")?;
+        Ok(vec!["agc".to_owned(), "phase_rad".to_owned()])
+    }
+
+    fn points(&self, _c: &Channels) -> Vec<Point> {
+        vec![Point::form(0), Point::form(1), Point::form(2)]
+    }
+
+    fn columns(&self, c: &Channels, bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
+        let Some(g) = c.column("agc") else {
+            return Vec::new();
+        };
+        // Forms: the gain's first and second power, and the first power with the curve's own
+        // second-order answer, for large pulls.
+        let pull = map(g, |g| if point.form == 1 { g * g - 1.0 } else { g - 1.0 });
+        let slope: Vec<f64> = c.u.iter().zip(&pull).map(|(u, d)| bias.slope(*u) * d).collect();
+        if point.form < 2 {
+            return vec![slope];
+        }
+        let bent = bias.coefficients_dps.get(2).copied().unwrap_or(0.0);
+        vec![slope, map(&pull, |d| bent * d * d)]
+    }
+
+    fn acts_on_bias(&self) -> bool {
+        true
+    }
+
+    fn report(&self, c: &Channels, e: &Estimate) -> Reported {
+        [gain("pull_rad", e, 0, -c.half)].into_iter().collect()
+    }
+}

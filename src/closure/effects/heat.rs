@@ -1,0 +1,275 @@
+//! Effects of heat's history and of time.
+
+use super::{
+    Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, from_log, gain,
+    heated, map, spaced,
+};
+use crate::closure::channels::{Channels, lag, slope};
+
+/// All of this file.
+pub fn all() -> Vec<Box<dyn Candidate>> {
+    vec![
+        Box::new(ThermalLag),
+        Box::new(TemperatureRate),
+        Box::new(Warmup),
+        Box::new(Ageing),
+    ]
+}
+
+/// Part of the bias follows a temperature that lags the thermometer's.
+struct ThermalLag;
+
+const THERMAL_LAG: Sheet = Sheet {
+    id: "thermal_lag",
+    physics: "part of the bias (electronics, package) follows a temperature that lags the \
+              structure's: a loop between heating and cooling that closes in dwells",
+    equation: "k (T - T_l), tau dT_l/dt = T - T_l",
+    parameters: &[
+        Parameter {
+            name: "gain_dps_per_k",
+            plausible: (0.01, 3.0),
+        },
+        Parameter {
+            name: "tau_s",
+            plausible: (5.0, 2000.0),
+        },
+    ],
+    compensable: true,
+    confounders: &["temperature_rate", "stress_jump", "warmup_transient"],
+    experiment: "ramps at three rates with dwells between them: a lag's loop widens with the rate \
+                 and closes in a dwell",
+    reference: "two-node thermal network; Chen et al. 2004 (circuit and structure at different \
+                temperatures)",
+};
+
+impl Candidate for ThermalLag {
+    fn sheet(&self) -> &Sheet {
+        &THERMAL_LAG
+    }
+
+    fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing> {
+        Ok(vec![heated(c)?, "time_s".to_owned()])
+    }
+
+    fn points(&self, c: &Channels) -> Vec<Point> {
+        let fastest = (1.5 * c.period_s()).max(1e-3);
+        let slowest = (c.span_s() / 2.5).max(2.0 * fastest);
+        let taus = spaced(fastest, slowest, 18);
+        // Forms: the whole bias curve lags, with the declared curve's own shape; a temperature lags.
+        let forms = if c.span_s() > 0.0 { 1 + c.heats() } else { 0 };
+        (0..forms)
+            .flat_map(|form| taus.iter().map(move |t| Point::at(form, &[t.ln()])))
+            .collect()
+    }
+
+    fn columns(&self, c: &Channels, bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
+        // Shorter ones are a rate of change.
+        let tau_s = point.theta[0].exp().max(c.period_s());
+        let now = if point.form == 0 {
+            map(&c.smooth_u, |u| bias.at(u))
+        } else {
+            c.heat(point.form - 1).to_vec()
+        };
+        let late = lag(&c.time_s, &now, tau_s);
+        vec![now.iter().zip(&late).map(|(u, l)| u - l).collect()]
+    }
+
+    fn spacing(&self, c: &Channels, _point: &Point) -> Vec<f64> {
+        vec![((c.span_s() / c.period_s()).max(4.0)).ln() / 18.0]
+    }
+
+    fn acts_on_bias(&self) -> bool {
+        true
+    }
+
+    fn report(&self, c: &Channels, e: &Estimate) -> Reported {
+        let per_k = if e.point.form > 0 {
+            gain("gain_dps_per_k", e, 0, 1.0 / c.kelvin_per_u)
+        } else {
+            gain("share_of_bias", e, 0, 1.0)
+        };
+        [per_k, from_log("tau_s", e, 0)].into_iter().collect()
+    }
+}
+
+/// Bias proportional to dT/dt.
+struct TemperatureRate;
+
+const TEMPERATURE_RATE: Sheet = Sheet {
+    id: "temperature_rate",
+    physics: "a temperature gradient over the die bends it while the temperature changes",
+    equation: "k dT/dt",
+    parameters: &[Parameter {
+        name: "gain_dps_s_per_k",
+        plausible: (0.1, 1000.0),
+    }],
+    compensable: true,
+    confounders: &["thermal_lag"],
+    experiment: "ramps shorter than the suspected lag: a gradient follows dT/dt at once, a lag \
+                 after its time constant",
+    reference: "thermal gradients in MEMS gyroscopes; general knowledge",
+};
+
+impl Candidate for TemperatureRate {
+    fn sheet(&self) -> &Sheet {
+        &TEMPERATURE_RATE
+    }
+
+    fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing> {
+        Ok(vec![heated(c)?, "time_s".to_owned()])
+    }
+
+    fn points(&self, c: &Channels) -> Vec<Point> {
+        // Forms: how far the slope looks to both sides, for each reading of the temperature. Corners
+        // want it short, noise long.
+        (0..c.heats() * SLOPES.len()).map(Point::form).collect()
+    }
+
+    fn columns(&self, c: &Channels, _bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
+        // Per record length, so that the column is of order one.
+        let span = c.span_s().max(f64::MIN_POSITIVE);
+        let rows = SLOPES[point.form % SLOPES.len()];
+        let heat = match point.form / SLOPES.len() {
+            0 => &c.u,
+            k => c.heat(k),
+        };
+        vec![map(&slope(&c.time_s, heat, rows), |v| v * span)]
+    }
+
+    fn report(&self, c: &Channels, e: &Estimate) -> Reported {
+        let factor = c.span_s() / c.kelvin_per_u;
+        [gain("gain_dps_s_per_k", e, 0, factor)].into_iter().collect()
+    }
+}
+
+/// Rows to each side of a slope.
+const SLOPES: [usize; 5] = [1, 2, 3, 5, 9];
+
+/// Exponential in time since power-on.
+struct Warmup;
+
+const WARMUP: Sheet = Sheet {
+    id: "warmup_transient",
+    physics: "self-heating and settling of references after each power-on",
+    equation: "w exp(-t_on / tau)",
+    parameters: &[
+        Parameter {
+            name: "amplitude_dps",
+            plausible: (0.005, 5.0),
+        },
+        Parameter {
+            name: "tau_s",
+            plausible: (10.0, 3000.0),
+        },
+    ],
+    compensable: true,
+    confounders: &["ageing_drift", "thermal_lag", "stress_jump"],
+    experiment: "power cycles at constant ambient temperature: the transient repeats with each one",
+    reference: "Micromachines 12 (2021) 1329",
+};
+
+impl Candidate for Warmup {
+    fn sheet(&self) -> &Sheet {
+        &WARMUP
+    }
+
+    fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing> {
+        let clock = if c.on_known {
+            "time_since_power_on_s"
+        } else {
+            "time_s"
+        };
+        Ok(vec![clock.to_owned()])
+    }
+
+    fn points(&self, c: &Channels) -> Vec<Point> {
+        let (_, longest) = crate::closure::channels::range(&c.on_s);
+        let fastest = 1.5 * c.period_s();
+        spaced(fastest, (longest / 1.5).max(2.0 * fastest), 16)
+            .into_iter()
+            .map(|tau| Point::at(0, &[tau.ln()]))
+            .collect()
+    }
+
+    fn columns(&self, c: &Channels, _bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
+        let tau_s = point.theta[0].exp();
+        vec![map(&c.on_s, |t| (-t / tau_s).exp())]
+    }
+
+    fn spacing(&self, c: &Channels, _point: &Point) -> Vec<f64> {
+        vec![((c.span_s() / c.period_s()).max(4.0)).ln() / 16.0]
+    }
+
+    fn report(&self, _c: &Channels, e: &Estimate) -> Reported {
+        [gain("amplitude_dps", e, 0, 1.0), from_log("tau_s", e, 0)]
+            .into_iter()
+            .collect()
+    }
+}
+
+/// Slow drift in time, linear or logarithmic.
+struct Ageing;
+
+const AGEING: Sheet = Sheet {
+    id: "ageing_drift",
+    physics: "creep, outgassing and relaxing stress: a drift that does not come back",
+    equation: "k t, or k ln(1 + t / t0)",
+    parameters: &[
+        Parameter {
+            name: "drift_dps_per_h",
+            plausible: (1e-4, 10.0),
+        },
+        Parameter {
+            name: "t0_s",
+            plausible: (10.0, 1e6),
+        },
+    ],
+    compensable: false,
+    confounders: &["warmup_transient", "stress_jump"],
+    experiment: "a second run after power-off at the same temperatures: ageing goes on where it \
+                 stopped, a warm-up starts again",
+    reference: "general knowledge; IEEE Std 952 for rate random walk",
+};
+
+impl Candidate for Ageing {
+    fn sheet(&self) -> &Sheet {
+        &AGEING
+    }
+
+    fn channels(&self, _c: &Channels) -> Result<Vec<String>, Missing> {
+        Ok(vec!["time_s".to_owned()])
+    }
+
+    fn points(&self, c: &Channels) -> Vec<Point> {
+        let span = c.span_s();
+        let mut out = vec![Point::form(0)];
+        let starts = spaced(0.01 * span, 1.5 * span, 8);
+        out.extend(starts.into_iter().map(|t0| Point::at(1, &[t0.ln()])));
+        out
+    }
+
+    fn columns(&self, c: &Channels, _bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
+        let start = c.time_s.first().copied().unwrap_or(0.0);
+        if point.form == 0 {
+            let span = c.span_s().max(f64::MIN_POSITIVE);
+            return vec![map(&c.time_s, |t| (t - start) / span)];
+        }
+        let t0 = point.theta[0].exp();
+        vec![map(&c.time_s, |t| ((t - start) / t0).ln_1p())]
+    }
+
+    fn spacing(&self, _c: &Channels, point: &Point) -> Vec<f64> {
+        vec![0.7; point.theta.len()]
+    }
+
+    fn report(&self, c: &Channels, e: &Estimate) -> Reported {
+        if e.point.form == 0 {
+            let per_h = 3600.0 / c.span_s().max(f64::MIN_POSITIVE);
+            return [gain("drift_dps_per_h", e, 0, per_h)].into_iter().collect();
+        }
+        [gain("gain_dps_per_efold", e, 0, 1.0), from_log("t0_s", e, 0)]
+            .into_iter()
+            .collect()
+    }
+}
+

@@ -1,0 +1,254 @@
+//! The catalogue of candidate effects, one unit each: physics, equation, parameters with units and
+//! plausible ranges, the channels it needs, what it is confused with, the experiment that separates
+//! them.
+//!
+//! A candidate gives columns: shapes in time whose multiples, beside the declared model, explain the
+//! error. Its non-linear parameters (time constants, thresholds, crossing temperatures) make the
+//! shapes; [`Candidate::points`] is where the search for them starts, [`super::search`] ends it.
+
+pub mod covariate;
+pub mod demodulation;
+pub mod drive;
+pub mod field;
+pub mod heat;
+pub mod outside;
+pub mod rate;
+pub mod structure;
+pub mod tone;
+
+use super::channels::Channels;
+use std::collections::BTreeMap;
+
+/// A parameter of an effect.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Parameter {
+    /// With its unit, as in `closure.json`.
+    pub name: &'static str,
+    /// Magnitudes that such a gyro has; for a reader, not for the search.
+    pub plausible: (f64, f64),
+}
+
+/// What there is to know of an effect.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sheet {
+    /// Of `closure.json`.
+    pub id: &'static str,
+    /// What happens, in a sentence.
+    pub physics: &'static str,
+    /// The contribution to the output.
+    pub equation: &'static str,
+    /// Its parameters.
+    pub parameters: &'static [Parameter],
+    /// Whether firmware can take it off, if it sees the channels.
+    pub compensable: bool,
+    /// Ids that look alike in many experiments.
+    pub confounders: &'static [&'static str],
+    /// What tells it from them.
+    pub experiment: &'static str,
+    /// Where it is described.
+    pub reference: &'static str,
+}
+
+/// The declared bias as it stands: deg/s over powers of u. Some effects act on it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Bias {
+    /// Lowest first.
+    pub coefficients_dps: Vec<f64>,
+    /// What other effects add to the output before it can clip, deg/s, one value a row; empty: nothing.
+    pub others_dps: Vec<f64>,
+}
+
+impl Bias {
+    /// deg/s.
+    pub fn at(&self, u: f64) -> f64 {
+        self.coefficients_dps.iter().rev().fold(0.0, |s, c| s * u + c)
+    }
+
+    /// deg/s per unit of u.
+    pub fn slope(&self, u: f64) -> f64 {
+        let terms = self.coefficients_dps.iter().enumerate().skip(1);
+        terms.map(|(k, c)| k as f64 * c * u.powi(k as i32 - 1)).sum()
+    }
+}
+
+/// One shape of an effect.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Point {
+    /// Which of the effect's forms.
+    pub form: usize,
+    /// Its non-linear parameters, in the effect's own coordinates (logarithms of what is positive).
+    pub theta: Vec<f64>,
+}
+
+impl Point {
+    /// A form without non-linear parameters.
+    pub fn form(form: usize) -> Self {
+        Point {
+            form,
+            theta: Vec::new(),
+        }
+    }
+
+    /// A form with its parameters.
+    pub fn at(form: usize, theta: &[f64]) -> Self {
+        Point {
+            form,
+            theta: theta.to_vec(),
+        }
+    }
+}
+
+/// A value with its standard deviation.
+pub type Reported = BTreeMap<String, (f64, f64)>;
+
+/// What has been estimated of a candidate, for its report.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimate {
+    /// The shape.
+    pub point: Point,
+    /// Coefficients of its columns, deg/s per unit of the column.
+    pub beta: Vec<f64>,
+    /// Their standard deviations.
+    pub beta_std: Vec<f64>,
+    /// Standard deviations of `point.theta`.
+    pub theta_std: Vec<f64>,
+}
+
+/// A candidate effect.
+pub trait Candidate: Send + Sync {
+    /// What there is to know.
+    fn sheet(&self) -> &Sheet;
+
+    /// As reported.
+    fn id(&self) -> String {
+        self.sheet().id.to_owned()
+    }
+
+    /// False for a shape that has no name: it takes part in every comparison, and where it wins,
+    /// what is left has a channel but no cause.
+    fn named(&self) -> bool {
+        true
+    }
+
+    /// The columns of the record that it uses.
+    ///
+    /// # Errors
+    /// A channel that the record lacks, or that does not move: the remark.
+    fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing>;
+
+    /// Where the search starts.
+    fn points(&self, c: &Channels) -> Vec<Point>;
+
+    /// The columns of a shape, one value a row.
+    fn columns(&self, c: &Channels, bias: &Bias, point: &Point) -> Vec<Vec<f64>>;
+
+    /// Distance of neighbouring points in each non-linear parameter.
+    fn spacing(&self, _c: &Channels, point: &Point) -> Vec<f64> {
+        vec![0.2; point.theta.len()]
+    }
+
+    /// True if physics gives the column's coefficient, 1 (a clip has no gain): the threshold is then
+    /// estimated with it held.
+    fn is_whole(&self) -> bool {
+        false
+    }
+
+    /// What is paid for the non-linear parameters, in log-likelihood, beyond the usual price.
+    fn surcharge(&self, _c: &Channels) -> f64 {
+        0.0
+    }
+
+    /// True if it acts on the sum of all others (a clip), so that it adds nothing to that sum.
+    fn is_last(&self) -> bool {
+        false
+    }
+
+    /// True if the columns depend on the declared bias.
+    fn acts_on_bias(&self) -> bool {
+        false
+    }
+
+    /// Parameters in units.
+    fn report(&self, c: &Channels, estimate: &Estimate) -> Reported;
+}
+
+/// Why a candidate cannot be judged.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Missing {
+    /// The record has no such column.
+    Channel(String),
+    /// It has, and the column does not move (or the experiment lacks something else).
+    Excitation(String),
+}
+
+/// The named column if the record has it and it moves.
+///
+/// # Errors
+/// Otherwise.
+pub fn moving<'a>(c: &'a Channels, name: &str) -> Result<&'a [f64], Missing> {
+    if c.column(name).is_none() {
+        return Err(Missing::Channel(name.to_owned()));
+    }
+    c.moving(name)
+        .ok_or_else(|| Missing::Excitation(format!("{name} is constant in this record")))
+}
+
+/// The thermometer if it moves.
+///
+/// # Errors
+/// It does not.
+pub fn heated(c: &Channels) -> Result<String, Missing> {
+    let (low, high) = super::channels::range(&c.u);
+    if high > low {
+        return Ok(c.thermometer.clone());
+    }
+    Err(Missing::Excitation("the temperature is constant in this record".to_owned()))
+}
+
+/// The product of two columns.
+pub fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a * b).collect()
+}
+
+/// A function of a column.
+pub fn map(a: &[f64], f: impl Fn(f64) -> f64) -> Vec<f64> {
+    a.iter().map(|v| f(*v)).collect()
+}
+
+/// `count` numbers from `low` to `high` in equal ratios.
+pub fn spaced(low: f64, high: f64, count: usize) -> Vec<f64> {
+    let ratio = (high / low).max(1.0);
+    let last = count.saturating_sub(1).max(1) as f64;
+    (0..count).map(|k| low * ratio.powf(k as f64 / last)).collect()
+}
+
+/// A pair for a [`Reported`].
+pub fn entry(name: &str, value: f64, std: f64) -> (String, (f64, f64)) {
+    (name.to_owned(), (value, std))
+}
+
+/// The coefficient `k` of an estimate times a unit's factor, with its deviation.
+pub fn gain(name: &str, e: &Estimate, k: usize, factor: f64) -> (String, (f64, f64)) {
+    let at = |v: &[f64]| v.get(k).copied().unwrap_or(0.0);
+    entry(name, at(&e.beta) * factor, (at(&e.beta_std) * factor).abs())
+}
+
+/// The non-linear parameter `k`, which is a logarithm.
+pub fn from_log(name: &str, e: &Estimate, k: usize) -> (String, (f64, f64)) {
+    let at = |v: &[f64]| v.get(k).copied().unwrap_or(0.0);
+    let value = at(&e.point.theta).exp();
+    entry(name, value, value * at(&e.theta_std))
+}
+
+/// Every named candidate of the contract for a record, its auxiliary columns among them.
+pub fn catalogue(c: &Channels) -> Vec<Box<dyn Candidate>> {
+    let mut out: Vec<Box<dyn Candidate>> = Vec::new();
+    out.extend(heat::all());
+    out.extend(structure::all());
+    out.extend(drive::all());
+    out.extend(demodulation::all());
+    out.extend(rate::all());
+    out.extend(field::all());
+    out.extend(covariate::all(c));
+    out
+}

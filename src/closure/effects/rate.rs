@@ -1,0 +1,414 @@
+//! Effects of the applied rate and of the output stage.
+
+use super::{
+    Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, entry, from_log, gain,
+    heated, map, moving, product, spaced,
+};
+use crate::closure::channels::{Channels, range};
+
+/// All of this file.
+pub fn all() -> Vec<Box<dyn Candidate>> {
+    vec![
+        Box::new(ScaleTemperature),
+        Box::new(Nonlinearity),
+        Box::new(Asymmetry),
+        Box::new(Deadband),
+        Box::new(Saturation),
+    ]
+}
+
+/// Largest magnitude of the applied rate, deg/s; 1 without one.
+fn top(c: &Channels) -> f64 {
+    let (low, high) = range(c.column("rate_dps").unwrap_or(&[]));
+    let top = low.abs().max(high.abs());
+    if top > 0.0 { top } else { 1.0 }
+}
+
+/// The applied rate over its largest magnitude.
+fn relative(c: &Channels) -> Vec<f64> {
+    let top = top(c);
+    map(c.column("rate_dps").unwrap_or(&[]), |o| o / top)
+}
+
+fn rate_alone(c: &Channels) -> Result<Vec<String>, Missing> {
+    moving(c, "rate_dps")?;
+    Ok(vec!["rate_dps".to_owned()])
+}
+
+/// Scale factor linear in temperature.
+struct ScaleTemperature;
+
+const SCALE_TEMPERATURE: Sheet = Sheet {
+    id: "scale_factor_temperature",
+    physics: "the modes' split, the gap and the references move with temperature, and the scale \
+              factor with them",
+    equation: "rate s1 (T - T_0)",
+    parameters: &[
+        Parameter {
+            name: "slope_ppm_per_k",
+            plausible: (1.0, 3000.0),
+        },
+        Parameter {
+            name: "zero_degc",
+            plausible: (-40.0, 125.0),
+        },
+    ],
+    compensable: true,
+    confounders: &["scale_factor_nonlinearity"],
+    experiment: "three rates at three temperatures, both directions",
+    reference: "Chen et al. 2004 (4.3 % over the range); Cao et al.",
+};
+
+impl Candidate for ScaleTemperature {
+    fn sheet(&self) -> &Sheet {
+        &SCALE_TEMPERATURE
+    }
+
+    fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing> {
+        let mut out = rate_alone(c)?;
+        out.push(heated(c)?);
+        Ok(out)
+    }
+
+    fn points(&self, c: &Channels) -> Vec<Point> {
+        (0..c.heats()).map(Point::form).collect()
+    }
+
+    fn columns(&self, c: &Channels, _bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
+        let r = relative(c);
+        vec![product(&r, c.heat(point.form)), r]
+    }
+
+    fn report(&self, c: &Channels, e: &Estimate) -> Reported {
+        let (slope, constant) = (e.beta[0], e.beta.get(1).copied().unwrap_or(0.0));
+        let factor = 1e6 / (top(c) * c.kelvin_per_u);
+        let mut out: Reported = [gain("slope_ppm_per_k", e, 0, factor)].into_iter().collect();
+        if slope != 0.0 {
+            let zero = c.middle_degc - c.kelvin_per_u * constant / slope;
+            let std = e.beta_std.get(1).copied().unwrap_or(0.0);
+            let std = (c.kelvin_per_u * std / slope).abs();
+            out.insert("zero_degc".to_owned(), (zero, std));
+        }
+        out
+    }
+}
+
+/// Odd, cubic in rate.
+struct Nonlinearity;
+
+const NONLINEARITY: Sheet = Sheet {
+    id: "scale_factor_nonlinearity",
+    physics: "stiffening springs and converters bend the answer to rate, equally to both sides",
+    equation: "n3 rate_max (rate / rate_max)^3",
+    parameters: &[Parameter {
+        name: "cubic_ppm",
+        plausible: (10.0, 20_000.0),
+    }],
+    compensable: true,
+    confounders: &["output_saturation", "scale_factor_temperature"],
+    experiment: "a rate table with seven rates to each side",
+    reference: "IEEE Std 1431, 12.9",
+};
+
+impl Candidate for Nonlinearity {
+    fn sheet(&self) -> &Sheet {
+        &NONLINEARITY
+    }
+
+    fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing> {
+        rate_alone(c)
+    }
+
+    fn points(&self, _c: &Channels) -> Vec<Point> {
+        vec![Point::form(0), Point::form(1)]
+    }
+
+    fn columns(&self, c: &Channels, _bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
+        let r = relative(c);
+        let cube = map(&r, |x| x * x * x);
+        // The scale factor is exact at small rates, or as a mean over the range.
+        if point.form == 0 {
+            vec![cube]
+        } else {
+            vec![cube, r]
+        }
+    }
+
+    fn report(&self, c: &Channels, e: &Estimate) -> Reported {
+        let ppm = 1e6 / top(c);
+        let mut out: Reported = [
+            gain("cubic_ppm", e, 0, ppm),
+            entry("rate_max_dps", top(c), 0.0),
+        ]
+        .into_iter()
+        .collect();
+        if e.point.form == 1 {
+            out.extend([gain("linear_ppm", e, 1, ppm)]);
+        }
+        out
+    }
+}
+
+/// Even in rate.
+struct Asymmetry;
+
+const ASYMMETRY: Sheet = Sheet {
+    id: "scale_factor_asymmetry",
+    physics: "the answers to the two turning directions differ",
+    equation: "n2 rate^2 / rate_max, or n2 |rate|",
+    parameters: &[Parameter {
+        name: "even_ppm",
+        plausible: (10.0, 20_000.0),
+    }],
+    compensable: true,
+    confounders: &["output_saturation", "g_sensitivity"],
+    experiment: "a rate table with both directions, at two radii (centripetal acceleration)",
+    reference: "IEEE Std 1431, 12.9",
+};
+
+impl Candidate for Asymmetry {
+    fn sheet(&self) -> &Sheet {
+        &ASYMMETRY
+    }
+
+    fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing> {
+        rate_alone(c)
+    }
+
+    fn points(&self, _c: &Channels) -> Vec<Point> {
+        vec![Point::form(0), Point::form(1)]
+    }
+
+    fn columns(&self, c: &Channels, _bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
+        let r = relative(c);
+        vec![map(&r, |x| if point.form == 0 { x * x } else { x.abs() })]
+    }
+
+    fn report(&self, c: &Channels, e: &Estimate) -> Reported {
+        [
+            gain("even_ppm", e, 0, 1e6 / top(c)),
+            entry("two_slopes", e.point.form as f64, 0.0),
+        ]
+        .into_iter()
+        .collect()
+    }
+}
+
+/// Dead zone around rate zero.
+struct Deadband;
+
+const DEADBAND: Sheet = Sheet {
+    id: "output_deadband",
+    physics: "below a threshold the loop does not answer to rate; beyond it the full rate, or what \
+              is above the threshold, comes through",
+    equation: "-rate where |rate| <= d; beyond it 0, or -d sign(rate)",
+    parameters: &[Parameter {
+        name: "half_width_dps",
+        plausible: (1e-3, 10.0),
+    }],
+    compensable: false,
+    confounders: &["scale_factor_nonlinearity"],
+    experiment: "a slow sweep of the table through rate zero in both directions",
+    reference: "IEEE Std 1431 (threshold, dead zone)",
+};
+
+impl Candidate for Deadband {
+    fn sheet(&self) -> &Sheet {
+        &DEADBAND
+    }
+
+    fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing> {
+        rate_alone(c)
+    }
+
+    fn points(&self, c: &Channels) -> Vec<Point> {
+        // Half widths between neighbouring magnitudes that were applied.
+        let mut sizes: Vec<f64> = c.column("rate_dps").unwrap_or(&[]).iter().map(|r| r.abs()).collect();
+        sizes.retain(|s| *s > 0.0);
+        sizes.sort_by(f64::total_cmp);
+        let least = sizes.first().copied().unwrap_or(0.0).max(1e-4 * top(c));
+        let mut out = Vec::new();
+        for form in 0..2 {
+            // What subtracts shows at every rate, what jumps only at rates within the zone.
+            let from = if form == 0 {
+                1.001 * least
+            } else {
+                (1e-3 * top(c)).min(least)
+            };
+            let widths = spaced(from, 0.9 * top(c), 24);
+            out.extend(widths.into_iter().map(|d| Point::at(form, &[d.ln()])));
+        }
+        out
+    }
+
+    fn columns(&self, c: &Channels, _bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
+        let d = point.theta[0].exp();
+        let missing = |o: f64| {
+            if o.abs() <= d {
+                -o
+            } else if point.form == 0 {
+                0.0
+            } else {
+                -d * o.signum()
+            }
+        };
+        vec![map(c.column("rate_dps").unwrap_or(&[]), missing)]
+    }
+
+    fn spacing(&self, _c: &Channels, _point: &Point) -> Vec<f64> {
+        vec![0.25]
+    }
+
+    fn is_whole(&self) -> bool {
+        true
+    }
+
+    fn report(&self, _c: &Channels, e: &Estimate) -> Reported {
+        [
+            from_log("half_width_dps", e, 0),
+            entry("subtracts", e.point.form as f64, 0.0),
+        ]
+        .into_iter()
+        .collect()
+    }
+}
+
+/// Clipping of the total output.
+struct Saturation;
+
+const SATURATION: Sheet = Sheet {
+    id: "output_saturation",
+    physics: "amplifier, converter or output word clip the total of rate and bias",
+    equation: "clip(rate + bias) - (rate + bias)",
+    parameters: &[
+        Parameter {
+            name: "upper_dps",
+            plausible: (10.0, 3000.0),
+        },
+        Parameter {
+            name: "lower_dps",
+            plausible: (-3000.0, -10.0),
+        },
+    ],
+    compensable: false,
+    confounders: &["scale_factor_nonlinearity", "scale_factor_asymmetry"],
+    experiment: "look at the converter's codes; halve the front end's gain",
+    reference: "IEEE Std 1431 (full scale)",
+};
+
+/// What the output would be without clipping, deg/s.
+fn total(c: &Channels, bias: &Bias) -> Vec<f64> {
+    let rate = c.column("rate_dps");
+    (0..c.len())
+        .map(|i| {
+            let others = bias.others_dps.get(i).copied().unwrap_or(0.0);
+            rate.map_or(0.0, |r| r[i]) + bias.at(c.u[i]) + others
+        })
+        .collect()
+}
+
+/// What the output was, deg/s; NaN where not measured.
+fn observed(c: &Channels) -> Vec<f64> {
+    let rate = c.column("rate_dps");
+    let each = c.error_dps.iter().enumerate();
+    each.map(|(i, e)| e + rate.map_or(0.0, |r| r[i])).collect()
+}
+
+/// Levels from a far end of the output towards its middle, at rising shares of the rows beyond.
+fn levels(c: &Channels, upper: bool) -> Vec<f64> {
+    let mut sorted = observed(c);
+    sorted.retain(|v| v.is_finite());
+    sorted.sort_by(f64::total_cmp);
+    if upper {
+        sorted.reverse();
+    }
+    let n = sorted.len();
+    let middle = sorted.get(n / 2).copied().unwrap_or(0.0);
+    let end = sorted.first().copied().unwrap_or(0.0);
+    let mut out: Vec<f64> = [0.004, 0.01, 0.02, 0.04, 0.07, 0.11, 0.16, 0.22, 0.3, 0.4]
+        .iter()
+        .filter_map(|share| sorted.get((share * n as f64) as usize).copied())
+        .collect();
+    // Within the last readings: a hard clip gathers many of them.
+    out.extend([0.002, 0.01, 0.03].map(|s| end + s * (middle - end)));
+    out.sort_by(f64::total_cmp);
+    out.dedup();
+    out
+}
+
+impl Candidate for Saturation {
+    fn sheet(&self) -> &Sheet {
+        &SATURATION
+    }
+
+    fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing> {
+        let mut out = vec!["rate_out_dps".to_owned()];
+        if c.moving("rate_dps").is_some() {
+            out.push("rate_dps".to_owned());
+        }
+        Ok(out)
+    }
+
+    fn points(&self, c: &Channels) -> Vec<Point> {
+        let (high, low) = (levels(c, true), levels(c, false));
+        let mut out = Vec::new();
+        // Forms: both at one magnitude, upper, lower, two levels.
+        out.extend(high.iter().filter(|l| **l > 0.0).map(|l| Point::at(0, &[*l])));
+        out.extend(low.iter().filter(|l| **l < 0.0).map(|l| Point::at(0, &[-l])));
+        out.extend(high.iter().map(|l| Point::at(1, &[*l])));
+        out.extend(low.iter().map(|l| Point::at(2, &[*l])));
+        for upper in high.iter().step_by(3) {
+            for lower in low.iter().step_by(3).filter(|l| *l < upper) {
+                out.push(Point::at(3, &[*upper, *lower]));
+            }
+        }
+        out
+    }
+
+    fn columns(&self, c: &Channels, bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
+        let (low, high) = limits(point);
+        vec![map(&total(c, bias), |x| x.max(low).min(high) - x)]
+    }
+
+    fn spacing(&self, c: &Channels, point: &Point) -> Vec<f64> {
+        let (low, high) = range(&observed(c));
+        vec![0.04 * (high - low); point.theta.len()]
+    }
+
+    fn acts_on_bias(&self) -> bool {
+        true
+    }
+
+    fn is_whole(&self) -> bool {
+        true
+    }
+
+    fn is_last(&self) -> bool {
+        true
+    }
+
+    fn report(&self, _c: &Channels, e: &Estimate) -> Reported {
+        let (low, high) = limits(&e.point);
+        let std = |k: usize| e.theta_std.get(k).copied().unwrap_or(0.0);
+        let mut out = Reported::new();
+        if high.is_finite() {
+            out.insert("upper_dps".to_owned(), (high, std(0)));
+        }
+        if low.is_finite() {
+            let k = usize::from(e.point.form == 3);
+            out.insert("lower_dps".to_owned(), (low, std(k)));
+        }
+        out
+    }
+}
+
+/// (lower, upper) limit of a point.
+fn limits(point: &Point) -> (f64, f64) {
+    match (point.form, point.theta.as_slice()) {
+        (0, [l]) => (-l.abs(), l.abs()),
+        (1, [l]) => (f64::NEG_INFINITY, *l),
+        (2, [l]) => (*l, f64::INFINITY),
+        (_, [upper, lower]) => (*lower, *upper),
+        _ => (f64::NEG_INFINITY, f64::INFINITY),
+    }
+}

@@ -1,0 +1,272 @@
+//! Effects of the structure's temperature itself.
+
+use super::{
+    Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, entry, gain, heated, map,
+};
+use crate::closure::channels::Channels;
+
+/// All of this file.
+pub fn all() -> Vec<Box<dyn Candidate>> {
+    vec![
+        Box::new(ThirdOrder),
+        Box::new(ModeCrossing),
+        Box::new(StressJump),
+    ]
+}
+
+/// Third order of the thermometer.
+struct ThirdOrder;
+
+const THIRD_ORDER: Sheet = Sheet {
+    id: "bias_third_order",
+    physics: "the bias bends more than eq. 9 says: Q, the modes' split and the phase bend together",
+    equation: "c3 u^3, u the thermometer's reading scaled to -1..1",
+    parameters: &[Parameter {
+        name: "c3_dps",
+        plausible: (0.01, 30.0),
+    }],
+    compensable: true,
+    confounders: &["damping_bias", "demod_phase_drift", "mode_crossing"],
+    experiment: "record the drive gain and the quadrature: a Q or quadrature that moves with \
+                 temperature shows in its own channel",
+    reference: "Sensors 9 (2009) 8349 (piecewise and higher orders)",
+};
+
+impl Candidate for ThirdOrder {
+    fn sheet(&self) -> &Sheet {
+        &THIRD_ORDER
+    }
+
+    fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing> {
+        Ok(vec![heated(c)?])
+    }
+
+    fn points(&self, _c: &Channels) -> Vec<Point> {
+        vec![Point::form(0)]
+    }
+
+    fn columns(&self, c: &Channels, _bias: &Bias, _point: &Point) -> Vec<Vec<f64>> {
+        vec![map(&c.u, |u| u * u * u)]
+    }
+
+    fn report(&self, c: &Channels, e: &Estimate) -> Reported {
+        [
+            gain("c3_dps", e, 0, 1.0),
+            entry("u_zero", c.centre, 0.0),
+            entry("u_one", c.centre + c.half, 0.0),
+        ]
+        .into_iter()
+        .collect()
+    }
+}
+
+/// A parasitic mode crosses the drive's frequency.
+struct ModeCrossing;
+
+const MODE_CROSSING: Sheet = Sheet {
+    id: "mode_crossing",
+    physics: "at one temperature a parasitic mode has the drive's frequency and takes energy from \
+              it: a bump, or a swing to both sides, in temperature",
+    equation: "(a + d 2 x) / (1 + x^2), x = (T - T_c) / width",
+    parameters: &[
+        Parameter {
+            name: "centre_degc",
+            plausible: (-40.0, 125.0),
+        },
+        Parameter {
+            name: "width_k",
+            plausible: (0.3, 15.0),
+        },
+        Parameter {
+            name: "absorptive_dps",
+            plausible: (0.01, 20.0),
+        },
+        Parameter {
+            name: "dispersive_dps",
+            plausible: (0.01, 20.0),
+        },
+    ],
+    compensable: true,
+    confounders: &["bias_third_order", "stress_jump"],
+    experiment: "a slow sweep through the crossing in both directions: a crossing repeats at the \
+                 same temperature; a different drive amplitude or frequency moves it",
+    reference: "mode coupling in vibratory gyroscopes; general knowledge",
+};
+
+/// Widths of crossings that are tried, in u.
+const WIDTHS: [f64; 5] = [0.03, 0.06, 0.12, 0.22, 0.4];
+
+impl Candidate for ModeCrossing {
+    fn sheet(&self) -> &Sheet {
+        &MODE_CROSSING
+    }
+
+    fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing> {
+        Ok(vec![heated(c)?])
+    }
+
+    fn points(&self, _c: &Channels) -> Vec<Point> {
+        let mut out = Vec::new();
+        for width in WIDTHS {
+            let count = (1.4 / width).clamp(8.0, 24.0) as usize;
+            for k in 0..count {
+                let centre = -0.85 + 1.7 * k as f64 / (count - 1) as f64;
+                out.push(Point::at(0, &[centre, width.ln()]));
+            }
+        }
+        out
+    }
+
+    fn columns(&self, c: &Channels, _bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
+        let (centre, width) = (point.theta[0], point.theta[1].exp());
+        let at = |u: f64| (u - centre) / width;
+        vec![
+            map(&c.smooth_u, |u| 1.0 / (1.0 + at(u).powi(2))),
+            map(&c.smooth_u, |u| 2.0 * at(u) / (1.0 + at(u).powi(2))),
+        ]
+    }
+
+    fn spacing(&self, _c: &Channels, point: &Point) -> Vec<f64> {
+        vec![point.theta[1].exp(), 0.5]
+    }
+
+    fn report(&self, c: &Channels, e: &Estimate) -> Reported {
+        let k = c.kelvin_per_u;
+        let std = |i: usize| e.theta_std.get(i).copied().unwrap_or(0.0);
+        let width = e.point.theta[1].exp();
+        [
+            entry(
+                "centre_degc",
+                c.middle_degc + k * e.point.theta[0],
+                (k * std(0)).abs(),
+            ),
+            entry("width_k", (k * width).abs(), (k * width * std(1)).abs()),
+            gain("absorptive_dps", e, 0, 1.0),
+            gain("dispersive_dps", e, 1, k.signum()),
+        ]
+        .into_iter()
+        .collect()
+    }
+}
+
+/// A step at a temperature.
+struct StressJump;
+
+const STRESS_JUMP: Sheet = Sheet {
+    id: "stress_jump",
+    physics: "a joint (die attach, solder, lid) gives way at a temperature and comes back at the \
+              same or a lower one, or never",
+    equation: "h H(T - T_s), T_s higher by the gap on the way up than on the way down",
+    parameters: &[
+        Parameter {
+            name: "step_dps",
+            plausible: (0.01, 5.0),
+        },
+        Parameter {
+            name: "centre_degc",
+            plausible: (-40.0, 125.0),
+        },
+        Parameter {
+            name: "gap_k",
+            plausible: (0.0, 20.0),
+        },
+    ],
+    compensable: true,
+    confounders: &["mode_crossing", "thermal_lag", "ageing_drift"],
+    experiment: "repeat the cycle with turning points on both sides of the step: a jump repeats, \
+                 a drift does not",
+    reference: "InterPACK 2007 (lead frames); Polimi 2025 (strain-gauge gyroscope)",
+};
+
+/// Gaps of the hysteresis that are tried, in u.
+const GAPS: [f64; 8] = [0.0, 0.04, 0.08, 0.14, 0.21, 0.3, 0.41, 0.54];
+
+/// 0 below, 1 above `centre`, by half the gap later in each direction; `once`: it never comes back.
+pub fn step(u: &[f64], centre: f64, gap: f64, once: bool) -> Vec<f64> {
+    let mut above = u.first().is_some_and(|u| *u > centre);
+    u.iter()
+        .map(|u| {
+            if *u > centre + 0.5 * gap {
+                above = true;
+            } else if *u < centre - 0.5 * gap && !once {
+                above = false;
+            }
+            f64::from(u8::from(above))
+        })
+        .collect()
+}
+
+/// The same for falling temperature first: the mirror image of [`step`] with `once`.
+fn once(u: &[f64], centre: f64) -> Vec<f64> {
+    if u.first().is_some_and(|u| *u > centre) {
+        let mirrored = map(u, |u| -u);
+        return step(&mirrored, -centre, 0.0, true);
+    }
+    step(u, centre, 0.0, true)
+}
+
+impl Candidate for StressJump {
+    fn sheet(&self) -> &Sheet {
+        &STRESS_JUMP
+    }
+
+    fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing> {
+        Ok(vec![heated(c)?, "time_s".to_owned()])
+    }
+
+    fn points(&self, _c: &Channels) -> Vec<Point> {
+        let mut out = Vec::new();
+        let centres = |count: usize| {
+            (0..count).map(move |k| -0.85 + 1.7 * k as f64 / (count - 1) as f64)
+        };
+        for (k, gap) in GAPS.into_iter().enumerate() {
+            let form = usize::from(k > 0);
+            for centre in centres(if k == 0 { 40 } else { 30 }) {
+                let theta = [centre, gap];
+                out.push(Point::at(form, &theta[..1 + form]));
+            }
+        }
+        out.extend(centres(24).map(|centre| Point::at(2, &[centre])));
+        out
+    }
+
+    fn columns(&self, c: &Channels, _bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
+        let centre = point.theta[0];
+        vec![match point.form {
+            0 => step(&c.smooth_u, centre, 0.0, false),
+            1 => step(&c.smooth_u, centre, point.theta[1].abs(), false),
+            _ => once(&c.smooth_u, centre),
+        }]
+    }
+
+    fn spacing(&self, _c: &Channels, point: &Point) -> Vec<f64> {
+        let mut out = vec![0.05];
+        if point.theta.len() > 1 {
+            out.push(0.05);
+        }
+        out
+    }
+
+    fn report(&self, c: &Channels, e: &Estimate) -> Reported {
+        let k = c.kelvin_per_u;
+        let std = |i: usize| e.theta_std.get(i).copied().unwrap_or(0.0);
+        let mut out: Reported = [
+            gain("step_dps", e, 0, k.signum()),
+            entry(
+                "centre_degc",
+                c.middle_degc + k * e.point.theta[0],
+                (k * std(0)).abs(),
+            ),
+        ]
+        .into_iter()
+        .collect();
+        if e.point.form == 1 {
+            let gap = e.point.theta[1].abs();
+            out.insert("gap_k".to_owned(), ((k * gap).abs(), (k * std(1)).abs()));
+        }
+        if e.point.form == 2 {
+            out.insert("returns".to_owned(), (0.0, 0.0));
+        }
+        out
+    }
+}

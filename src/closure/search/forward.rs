@@ -1,0 +1,217 @@
+//! Forward steps.
+
+use super::judge::{EQUAL, Judged, Round};
+use super::{Found, LEVEL, MOST_RIVALS, Model, Search, Term};
+use crate::closure::likelihood::{Unusable, reml};
+
+/// By how much net gain a shape without a name has to be better than the best name.
+const STRANGER: f64 = 4.0;
+
+/// Most shapes without a name.
+const STRANGERS: usize = 3;
+
+/// Fewest spikes that are looked into.
+const FEW: usize = 2;
+
+/// Log-likelihood by which an explanation of spikes has to be better than none: two accidents near
+/// to each other are soon explained by a shape with a few parameters, less so by a threshold
+/// without a free coefficient.
+const WORTH: f64 = 20.0;
+const WORTH_WHOLE: f64 = 8.0;
+
+/// Most rounds of forward steps and sweeps.
+const ROUNDS: usize = 3;
+
+/// What comes next.
+pub enum Next {
+    /// A term, named or not.
+    Add(Term),
+    /// Too many names for one thing.
+    Undecided(Term),
+    /// Nothing.
+    Stop,
+}
+
+impl Search<'_> {
+    /// Runs the search.
+    ///
+    /// # Errors
+    /// Too few rows to fit anything.
+    pub fn run(&self) -> Result<Found, Unusable> {
+        let mut found = Found {
+            terms: Vec::new(),
+            strangers: Vec::new(),
+            left: None,
+            first: Vec::new(),
+            missing: Vec::new(),
+            undecided: Vec::new(),
+        };
+        let mut model = self.model(&[])?;
+        for _ in 0..ROUNDS {
+            model = self.forward(model, &mut found)?;
+            let before: Vec<String> = model.terms.iter().map(Term::id).collect();
+            model = self.swept(model)?;
+            if model.terms.iter().map(Term::id).eq(before) {
+                break;
+            }
+        }
+        let model = self.validated(model, &mut found)?;
+        if found.left.is_none() && self.coloured(&model) {
+            found.left = Some("time_s".to_owned());
+        }
+        for term in model.terms {
+            if term.candidate.named() {
+                found.terms.push(term);
+            } else {
+                found.strangers.push(term);
+            }
+        }
+        if let Some(stranger) = found.strangers.first() {
+            found.left = found.left.or_else(|| self.channel(stranger));
+        }
+        Ok(found)
+    }
+
+    /// Steps until nothing is called for.
+    fn forward(&self, mut model: Model, found: &mut Found) -> Result<Model, Unusable> {
+        loop {
+            let named = model.terms.iter().filter(|t| t.candidate.named()).count();
+            if named >= self.effort.steps || model.terms.len() - named >= STRANGERS {
+                return Ok(model);
+            }
+            let round = self.judge(&model, self.effort.surrogates);
+            if found.first.is_empty() {
+                found.first = round.judged.clone();
+            }
+            let next = self.next(&model, &round)?;
+            if found.missing.is_empty() {
+                found.missing = round.missing;
+            }
+            match next {
+                Next::Stop => return Ok(model),
+                Next::Undecided(term) => {
+                    found.left = self.channel(&term);
+                    found.undecided.push(term.id());
+                    found.undecided.extend(term.rivals);
+                    return Ok(model);
+                }
+                Next::Add(term) => {
+                    let mut terms = model.terms.clone();
+                    terms.push(term);
+                    model = self.polished(self.model(&terms)?)?;
+                }
+            }
+        }
+    }
+
+    /// The next step from a round.
+    fn next(&self, model: &Model, round: &Round) -> Result<Next, Unusable> {
+        let significant: Vec<&Judged> =
+            round.judged.iter().filter(|j| j.p_value <= LEVEL).collect();
+        let leader = significant.first();
+        if let Some(term) = self.of_spikes(model, &significant)? {
+            return Ok(Next::Add(term));
+        }
+        let Some(leader) = leader else {
+            return Ok(Next::Stop);
+        };
+        let name = significant.iter().find(|j| j.candidate.named());
+        if let Some(name) = name
+            && name.net > leader.net - STRANGER
+        {
+            return Ok(decided(Term::of(name, round.rivals(name))));
+        }
+        if let Some(first) = self.first_of_two(model, &significant, leader)? {
+            return Ok(Next::Add(Term::of(first, round.rivals(first))));
+        }
+        Ok(Next::Add(Term::of(leader, Vec::new())))
+    }
+
+    /// A name that explains rows which would else be spikes, if it explains the record better than all
+    /// that this round found. Judged with every row at full weight: a clipped peak or a short
+    /// transient is rare, but no accident.
+    fn of_spikes(&self, model: &Model, found: &[&Judged]) -> Result<Option<Term>, Unusable> {
+        if self.spikes(&model.fit) < FEW {
+            return Ok(None);
+        }
+        let plainly = reml::Options {
+            robust: false,
+            ..self.options()
+        };
+        let plain = self.model_with(&model.terms, &plainly)?;
+        let all = self.judge(&plain, self.effort.surrogates);
+        let value = |j: &Judged| -> Result<f64, Unusable> {
+            let mut terms = model.terms.clone();
+            terms.push(Term::of(j, Vec::new()));
+            Ok(self.model_with(&terms, &self.near(model))?.value - j.gain + j.net)
+        };
+        let mut best: Option<(&Judged, f64)> = None;
+        let mut others = Vec::new();
+        for j in all.judged.iter().filter(|j| j.is_found()).take(5) {
+            let value = value(j)?;
+            others.push((j.candidate.id(), value));
+            if best.is_none_or(|b| value > b.1) {
+                best = Some((j, value));
+            }
+        }
+        let Some((best, reached)) = best else {
+            return Ok(None);
+        };
+        let worth = if best.candidate.is_whole() {
+            WORTH_WHOLE
+        } else {
+            WORTH
+        };
+        if reached < model.value + worth {
+            return Ok(None);
+        }
+        for j in found.iter().take(2) {
+            if j.candidate.id() != best.candidate.id() && value(j)? >= reached {
+                return Ok(None);
+            }
+        }
+        others.retain(|(id, value)| *id != best.candidate.id() && *value > reached - EQUAL);
+        let rivals = others.into_iter().map(|(id, _)| id).collect();
+        Ok(Some(Term::of(best, rivals)))
+    }
+
+    /// A quick fit beside a model: the noise is looked for near its own.
+    pub fn near(&self, model: &Model) -> reml::Options {
+        reml::Options {
+            near: Some(model.fit.at.shape),
+            ..self.options()
+        }
+    }
+
+    /// Where a shape without a name leads: a name that, with another one, explains as much. Two
+    /// causes together often look like neither.
+    fn first_of_two<'j>(
+        &self,
+        model: &Model,
+        significant: &[&'j Judged],
+        leader: &Judged,
+    ) -> Result<Option<&'j Judged>, Unusable> {
+        let mut best: Option<(&Judged, f64)> = None;
+        for j in significant.iter().filter(|j| j.candidate.named()).take(4) {
+            let mut terms = model.terms.clone();
+            terms.push(Term::of(j, Vec::new()));
+            let with = self.model_with(&terms, &self.near(model))?;
+            let second = self.judge(&with, 0);
+            let second = second.judged.iter().find(|j| j.candidate.named());
+            let net = j.net + second.map_or(0.0, |s| s.net.max(0.0));
+            if net > leader.net - STRANGER && best.is_none_or(|b| net > b.1) {
+                best = Some((j, net));
+            }
+        }
+        Ok(best.map(|b| b.0))
+    }
+}
+
+/// A named term, unless too many others do as well.
+fn decided(term: Term) -> Next {
+    if term.rivals.len() > MOST_RIVALS {
+        Next::Undecided(term)
+    } else {
+        Next::Add(term)
+    }
+}

@@ -1,0 +1,89 @@
+//! How often a term is chosen again when the record is halved.
+
+use super::judge::{PRICE, Round};
+use super::{Model, Search, Term, declared};
+use crate::closure::likelihood::linear::{Basis, dot};
+use crate::closure::likelihood::random::Stream;
+use crate::closure::likelihood::whiten::Whitener;
+
+/// Pairs of complementary halves.
+const PAIRS: usize = 15;
+
+impl Search<'_> {
+    /// Share of the halves of the record (whole segments, complementary pairs; Meinshausen & Buhlmann 2010,
+    /// Shah & Samworth 2013) in which the term explains more than every one of its competitors, the
+    /// other terms being in, and more than its price. `round` holds the competitors: everything beside
+    /// the other terms.
+    pub fn selection_frequency(&self, model: &Model, term: usize, round: &Round) -> f64 {
+        let c = self.channels;
+        let fit = &model.fit;
+        let reduce = |columns: Vec<Vec<f64>>| -> Vec<Vec<f64>> {
+            columns.iter().map(|c| fit.reduce(c)).collect()
+        };
+        let of = |t: &Term| reduce(t.candidate.columns(c, &model.bias, &t.point));
+        let mut base = reduce(declared(c));
+        for (k, other) in model.terms.iter().enumerate() {
+            if k != term {
+                base.extend(of(other));
+            }
+        }
+        let own = &model.terms[term];
+        let mut contenders = vec![(of(own), own.point.theta.len())];
+        for j in round.judged.iter().filter(|j| j.candidate.named()).take(6) {
+            if j.candidate.id() != own.id() {
+                let columns = reduce(j.candidate.columns(c, &model.bias, &j.point));
+                contenders.push((columns, j.point.theta.len()));
+            }
+        }
+        let whitener = Whitener::new(&fit.problem.line, fit.at.shape);
+        let base = whitener.apply_all(&base);
+        let contenders: Vec<(Vec<Vec<f64>>, usize)> = contenders
+            .into_iter()
+            .map(|(columns, theta)| (whitener.apply_all(&columns), theta))
+            .collect();
+        let signal = whitener.apply(&fit.reduce(&c.error_dps));
+        let rows = signal.len();
+        let variance = fit.at.white_variance().max(f64::MIN_POSITIVE);
+        let mut chosen = 0usize;
+        for pair in 0..PAIRS {
+            let first = half(rows, pair);
+            for side in [true, false] {
+                let take = |column: &Vec<f64>| -> Vec<f64> {
+                    let pairs = column.iter().zip(&first);
+                    pairs.filter(|(_, f)| **f == side).map(|(v, _)| *v).collect()
+                };
+                let declared = Basis::new(&base.iter().map(take).collect::<Vec<_>>());
+                let mut y = take(&signal);
+                declared.project_off(&mut y);
+                let gain = |(columns, theta): &(Vec<Vec<f64>>, usize)| {
+                    let mut basis = Basis::default();
+                    for mut column in columns.iter().map(take) {
+                        declared.project_off(&mut column);
+                        basis.push(&column);
+                    }
+                    let explained: f64 = basis.q.iter().map(|q| dot(q, &y).powi(2)).sum();
+                    0.5 * explained / variance - PRICE * (basis.rank() + theta) as f64
+                };
+                let gains: Vec<f64> = contenders.iter().map(gain).collect();
+                let best = gains.iter().skip(1).fold(0.0, |m: f64, g| m.max(*g));
+                chosen += usize::from(gains[0] >= best && gains[0] > 0.0);
+            }
+        }
+        chosen as f64 / (2 * PAIRS) as f64
+    }
+}
+
+/// Which rows are in the first half: half of [`SEGMENTS`] stretches, drawn by the pair's number.
+fn half(rows: usize, pair: usize) -> Vec<bool> {
+    const SEGMENTS: usize = 16;
+    let stream = Stream::new(77, pair as u64);
+    let mut order: Vec<(f64, usize)> = (0..SEGMENTS)
+        .map(|s| (stream.uniform(s as u64), s))
+        .collect();
+    order.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut first = [false; SEGMENTS];
+    for (_, s) in order.iter().take(SEGMENTS / 2) {
+        first[*s] = true;
+    }
+    (0..rows).map(|i| first[i * SEGMENTS / rows.max(1)]).collect()
+}

@@ -1,0 +1,177 @@
+//! One round: all candidates beside those that are taken, each at its best shape.
+
+use super::refine::{self, Bench, Profiled};
+use super::{LEVEL, Model, Search, tones};
+use crate::closure::effects::tone::Pickup;
+use crate::closure::effects::{Bias, Candidate, Missing, Point};
+use crate::closure::likelihood::candidates::{Grid, Group};
+use crate::closure::likelihood::reml::Fit;
+use crate::closure::likelihood::score::{self, Scores};
+use std::sync::Arc;
+
+/// What a coefficient or parameter costs in log-likelihood when explanations are compared.
+pub const PRICE: f64 = 2.0;
+
+/// Net gain within which two explanations are equally good.
+pub const EQUAL: f64 = 4.0;
+
+/// A candidate of one round, judged.
+#[derive(Clone)]
+pub struct Judged {
+    /// Which.
+    pub candidate: Arc<dyn Candidate>,
+    /// Its best shape.
+    pub point: Point,
+    /// Gain in log-likelihood.
+    pub gain: f64,
+    /// The same less the price of its coefficients and parameters.
+    pub net: f64,
+    /// Probability that the best of all does as well by chance; 1 where that was not asked.
+    pub p_value: f64,
+}
+
+impl Judged {
+    /// A name that is beyond chance.
+    pub fn is_found(&self) -> bool {
+        self.candidate.named() && self.p_value <= LEVEL
+    }
+}
+
+/// Candidates with their shapes, in order.
+type Running = Vec<(Arc<dyn Candidate>, Vec<Point>)>;
+
+/// A round's result.
+pub struct Round {
+    /// The best net gain first.
+    pub judged: Vec<Judged>,
+    /// What could not be judged.
+    pub missing: Vec<(Arc<dyn Candidate>, Missing)>,
+}
+
+impl Round {
+    /// Names that do as well as the given one, best first.
+    pub fn rivals(&self, chosen: &Judged) -> Vec<String> {
+        let id = chosen.candidate.id();
+        self.judged
+            .iter()
+            .filter(|j| j.candidate.named() && j.candidate.id() != id)
+            .filter(|j| j.net > chosen.net - EQUAL)
+            .map(|j| j.candidate.id())
+            .collect()
+    }
+}
+
+impl Search<'_> {
+    /// Judges all candidates that are not among the model's terms. `surrogates` = 0: gains alone.
+    pub fn judge(&self, model: &Model, surrogates: usize) -> Round {
+        let c = self.channels;
+        let (fit, bias) = (&model.fit, &model.bias);
+        let mut missing = Vec::new();
+        let mut running: Running = Vec::new();
+        let taken: Vec<String> = model.terms.iter().map(|t| t.id()).collect();
+        for candidate in &self.candidates {
+            if taken.contains(&candidate.id()) {
+                continue;
+            }
+            match candidate.channels(c) {
+                Ok(_) => running.push((candidate.clone(), candidate.points(c))),
+                Err(why) => missing.push((candidate.clone(), why)),
+            }
+        }
+        let groups: Vec<Group> = running
+            .iter()
+            .map(|(candidate, points)| Group {
+                points: points
+                    .iter()
+                    .map(|p| reduced(self, fit, candidate.as_ref(), bias, p))
+                    .collect(),
+            })
+            .collect();
+        let options = score::Options {
+            draws: 0,
+            surrogates,
+            seed: 1,
+        };
+        let scores = score::score(fit, &groups, &options);
+        let tone = tones::strongest(c, fit, &Grid::new(fit));
+        if let Some(tone) = tone {
+            let pickup: Arc<dyn Candidate> = Arc::new(Pickup {
+                frequency_hz: tone.frequency_hz,
+                further: taken.iter().any(|id| id == "periodic_pickup"),
+            });
+            if !taken.contains(&pickup.id()) {
+                let points = pickup.points(c);
+                running.push((pickup, points));
+            }
+        }
+        // Two tests, the tones' and all others', share the level.
+        let tone_p = tone.map_or(1.0, |t| (2.0 * t.p_value).min(1.0));
+        let mut judged = self.refined(model, &running, &scores, tone_p);
+        judged.sort_by(|a, b| b.net.total_cmp(&a.net));
+        Round { judged, missing }
+    }
+
+    /// The best shape of every group that is near the leader, its non-linear parameters
+    /// estimated; `scores` does not know the last one, a tone.
+    fn refined(
+        &self,
+        model: &Model,
+        running: &Running,
+        scores: &Scores,
+        tone_p: f64,
+    ) -> Vec<Judged> {
+        let c = self.channels;
+        let fit = &model.fit;
+        let best = scores.groups.iter().map(|g| g.gain).fold(0.0, f64::max);
+        let mut starts = Vec::new();
+        for (k, (candidate, points)) in running.iter().enumerate() {
+            let (point, shape, p_value, gain) = match scores.groups.get(k) {
+                Some(g) => {
+                    let point = g.point.and_then(|p| points.get(p));
+                    (point, g.shape, g.p_bootstrap.unwrap_or(1.0), g.gain)
+                }
+                None => (points.first(), fit.at.shape, tone_p, best),
+            };
+            let Some(point) = point else { continue };
+            let point = if gain > 0.5 * best - 10.0 {
+                let bench = Bench::new(fit, shape);
+                refine::refined(&bench, candidate.as_ref(), c, &model.bias, point, 0.5)
+            } else {
+                point.clone()
+            };
+            starts.push((candidate.clone(), point, p_value));
+        }
+        let columns: Vec<Vec<Vec<f64>>> = starts
+            .iter()
+            .map(|(candidate, point, _)| candidate.columns(c, &model.bias, point))
+            .collect();
+        let gains = refine::profiled(fit, &scores.grid, &columns);
+        starts
+            .into_iter()
+            .zip(gains)
+            .filter(|(_, g)| g.columns > 0)
+            .map(|((candidate, point, p_value), Profiled { gain, columns, .. })| {
+                let paid = PRICE * (columns + point.theta.len()) as f64;
+                Judged {
+                    net: gain - paid - candidate.surcharge(c),
+                    candidate,
+                    point,
+                    gain,
+                    p_value,
+                }
+            })
+            .collect()
+    }
+}
+
+/// Columns of a shape in the rows of the fit's problem.
+fn reduced(
+    search: &Search<'_>,
+    fit: &Fit,
+    candidate: &dyn Candidate,
+    bias: &Bias,
+    point: &Point,
+) -> Vec<Vec<f64>> {
+    let columns = candidate.columns(search.channels, bias, point);
+    columns.iter().map(|c| fit.reduce(c)).collect()
+}

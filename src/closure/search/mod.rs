@@ -1,0 +1,321 @@
+//! The search: which effects a record calls for.
+//!
+//! Forward steps over the whole catalogue and over shapes without a name ([`super::effects`]), each
+//! against the noise that the record itself shows ([`super::likelihood`]): a step must be beyond what
+//! chance makes of the best of all candidates ([`judge`]) and may have at most four rivals that do as
+//! well. Rows that stand out are spikes, unless a candidate explains them ([`forward`]). At the end every
+//! step is tried again with the others in, against all other names ([`sweep`]), and must lower the error of
+//! held-out rows ([`heldout`]). Where a shape without a name wins, it is kept as what is left.
+
+pub mod estimate;
+pub mod forward;
+pub mod halves;
+pub mod heldout;
+pub mod judge;
+pub mod refine;
+pub mod structure;
+pub mod sweep;
+pub mod tones;
+
+use super::channels::{Channels, range};
+use super::effects::{self, Bias, Candidate, Missing, Point};
+use super::likelihood::Unusable;
+use super::likelihood::blocks::Split;
+use super::likelihood::linear::{Basis, add_scaled, dot};
+use super::likelihood::reml::{self, Fit};
+use judge::Judged;
+use std::sync::Arc;
+
+/// How hard to search.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Effort {
+    /// Rows that the noise is estimated on.
+    pub rows: usize,
+    /// Surrogate records of a test.
+    pub surrogates: usize,
+    /// Most named steps.
+    pub steps: usize,
+}
+
+impl Default for Effort {
+    fn default() -> Self {
+        Effort {
+            rows: 700,
+            surrogates: 100,
+            steps: 5,
+        }
+    }
+}
+
+/// Family-wise probability below which a step is taken.
+pub const LEVEL: f64 = 0.01;
+
+/// Most rivals of a step.
+pub const MOST_RIVALS: usize = 4;
+
+/// An effect in the model.
+#[derive(Clone)]
+pub struct Term {
+    /// Which.
+    pub candidate: Arc<dyn Candidate>,
+    /// Its shape.
+    pub point: Point,
+    /// Probability at its step.
+    pub p_value: f64,
+    /// What does as well, best first.
+    pub rivals: Vec<String>,
+    /// Gain in log-likelihood with all other terms in.
+    pub gain: f64,
+}
+
+impl Term {
+    /// From a round's judgement.
+    pub fn of(judged: &Judged, rivals: Vec<String>) -> Self {
+        Term {
+            candidate: judged.candidate.clone(),
+            point: judged.point.clone(),
+            p_value: judged.p_value,
+            gain: judged.gain,
+            rivals,
+        }
+    }
+
+    /// Its id.
+    pub fn id(&self) -> String {
+        self.candidate.id()
+    }
+}
+
+/// The declared model with terms, fitted on training rows.
+pub struct Model {
+    /// Named and nameless terms.
+    pub terms: Vec<Term>,
+    /// Noise, weights, and coefficients by generalised least squares.
+    pub fit: Fit,
+    /// The declared coefficients for prediction ([`Model::beta`]).
+    pub bias: Bias,
+    /// Coefficients for prediction: those of the terms are the fit's; the declared ones are ordinary
+    /// (weighted) least squares of what the terms leave. Under a walk, generalised least squares
+    /// ties the constant to the first rows; a mean over all rows predicts held-out ones.
+    pub beta: Vec<f64>,
+    /// Regressors over all rows: declared ones, then the terms'.
+    pub columns: Vec<Vec<f64>>,
+    /// Log-likelihood of all training rows, spikes included: for models of the same rows.
+    pub value: f64,
+}
+
+/// Minus the log-density of a spike, in units of the white deviation.
+const ACCIDENT: f64 = 8.0;
+
+/// What the search found.
+pub struct Found {
+    /// Named effects, in the order of their steps.
+    pub terms: Vec<Term>,
+    /// Shapes without a name that the record calls for.
+    pub strangers: Vec<Term>,
+    /// Something is left, with the channel of the best try.
+    pub left: Option<String>,
+    /// The first round's candidates.
+    pub first: Vec<Judged>,
+    /// Candidates that could not be judged.
+    pub missing: Vec<(Arc<dyn Candidate>, Missing)>,
+    /// More than four explanations of one thing: no step.
+    pub undecided: Vec<String>,
+}
+
+/// A search over one record.
+pub struct Search<'a> {
+    /// The record.
+    pub channels: &'a Channels,
+    /// Rows to fit on.
+    pub used: Vec<bool>,
+    /// Rows to judge on.
+    pub heldout: Vec<bool>,
+    /// How hard.
+    pub effort: Effort,
+    candidates: Vec<Arc<dyn Candidate>>,
+}
+
+/// The regressors of the declared model: 1, u, u^2.
+pub fn declared(c: &Channels) -> Vec<Vec<f64>> {
+    let (low, high) = range(&c.u);
+    let order = if high > low { 3 } else { 1 };
+    (0..order)
+        .map(|k| c.u.iter().map(|u| u.powi(k)).collect())
+        .collect()
+}
+
+impl<'a> Search<'a> {
+    /// Over a record, with `extra` candidates beside the catalogue.
+    pub fn new(
+        channels: &'a Channels,
+        split: &Split,
+        effort: Effort,
+        extra: Vec<Arc<dyn Candidate>>,
+    ) -> Self {
+        let finite: Vec<bool> = channels.error_dps.iter().map(|e| e.is_finite()).collect();
+        let both = |rows: &[bool]| rows.iter().zip(&finite).map(|(a, b)| *a && *b).collect();
+        let mut candidates: Vec<Arc<dyn Candidate>> = effects::catalogue(channels)
+            .into_iter()
+            .map(Arc::from)
+            .collect();
+        candidates.extend(extra);
+        candidates.extend(effects::outside::all(channels).into_iter().map(Arc::from));
+        Search {
+            channels,
+            used: both(&split.train),
+            heldout: both(&split.heldout),
+            effort,
+            candidates,
+        }
+    }
+
+    /// All candidates but tones, named or not.
+    pub fn candidates(&self) -> &[Arc<dyn Candidate>] {
+        &self.candidates
+    }
+
+    /// The model with terms. Effects that act on the declared bias see the bias of this very fit (two
+    /// passes).
+    ///
+    /// # Errors
+    /// Too few rows.
+    pub fn model(&self, terms: &[Term]) -> Result<Model, Unusable> {
+        self.model_with(terms, &self.options())
+    }
+
+    /// The usual way to fit.
+    pub fn options(&self) -> reml::Options {
+        reml::Options {
+            rows: self.effort.rows,
+            ..reml::Options::default()
+        }
+    }
+
+    /// As [`Search::model`], in another way.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn model_with(&self, terms: &[Term], options: &reml::Options) -> Result<Model, Unusable> {
+        let mut bias = self.plain_bias();
+        let acting = terms.iter().any(|t| t.candidate.acts_on_bias());
+        let passes = match (acting, terms.len()) {
+            (false, _) => 0,
+            (true, 1) => 1,
+            (true, _) => 2,
+        };
+        for _ in 0..passes {
+            bias = self.model_once(terms, &bias, options)?.bias;
+        }
+        self.model_once(terms, &bias, options)
+    }
+
+    fn model_once(
+        &self,
+        terms: &[Term],
+        bias: &Bias,
+        options: &reml::Options,
+    ) -> Result<Model, Unusable> {
+        let c = self.channels;
+        let mut columns = declared(c);
+        let order = columns.len();
+        let mut free: Vec<Vec<f64>> = columns.clone();
+        let mut whole = Vec::new();
+        let mut last = Vec::new();
+        let mut y = c.error_dps.clone();
+        for term in terms {
+            for column in term.candidate.columns(c, bias, &term.point) {
+                if term.candidate.is_whole() {
+                    add_scaled(&mut y, -1.0, &column);
+                } else {
+                    free.push(column.clone());
+                }
+                whole.push(term.candidate.is_whole());
+                last.push(term.candidate.is_last());
+                columns.push(column);
+            }
+        }
+        let fit = reml::fit(&c.time_s, &y, &free, &self.used, options)?;
+        let mut given = fit.beta.iter().skip(order);
+        let gains: Vec<f64> = whole
+            .iter()
+            .map(|whole| if *whole { 1.0 } else { given.next().copied().unwrap_or(0.0) })
+            .collect();
+        let mut rest = c.error_dps.clone();
+        for (column, b) in columns.iter().skip(order).zip(&gains) {
+            add_scaled(&mut rest, -b, column);
+        }
+        let mut beta = weighted(&columns[..order], &rest, &fit.row_weights);
+        let mut others = vec![0.0; c.len()];
+        for ((column, b), last) in columns.iter().skip(order).zip(&gains).zip(&last) {
+            if !last {
+                add_scaled(&mut others, *b, column);
+            }
+        }
+        let bias = Bias {
+            coefficients_dps: beta.clone(),
+            others_dps: others,
+        };
+        beta.extend(gains);
+        let spikes = self.spikes(&fit);
+        // A row that is left out has the density of something that may lie anywhere within some
+        // twenty deviations, and happens once in a hundred rows.
+        let accident = -ACCIDENT - fit.noise.white_rms_dps.max(f64::MIN_POSITIVE).ln();
+        Ok(Model {
+            terms: terms.to_vec(),
+            value: fit.loglik_ml + spikes as f64 * accident,
+            fit,
+            bias,
+            beta,
+            columns,
+        })
+    }
+
+    /// Ordinary least squares, for a start.
+    fn plain_bias(&self) -> Bias {
+        let weights: Vec<f64> = self.used.iter().map(|u| f64::from(u8::from(*u))).collect();
+        let columns = declared(self.channels);
+        Bias {
+            coefficients_dps: weighted(&columns, &self.channels.error_dps, &weights),
+            others_dps: Vec::new(),
+        }
+    }
+
+    /// Rows that stand out from a fit: those of less than half weight.
+    pub fn spikes(&self, fit: &Fit) -> usize {
+        let pairs = fit.row_weights.iter().zip(&self.used);
+        pairs.filter(|(w, u)| **u && **w < 0.5).count()
+    }
+
+    /// The channel that stands for a term.
+    pub fn channel(&self, term: &Term) -> Option<String> {
+        let channels = term.candidate.channels(self.channels).ok()?;
+        channels.into_iter().next()
+    }
+}
+
+impl Model {
+    /// Error less what the model explains, deg/s, every row.
+    pub fn residual(&self, c: &Channels) -> Vec<f64> {
+        let mut out = c.error_dps.clone();
+        for (column, b) in self.columns.iter().zip(&self.beta) {
+            add_scaled(&mut out, -b, column);
+        }
+        out
+    }
+}
+
+/// Weighted least squares; rows of weight 0 may hold anything.
+fn weighted(columns: &[Vec<f64>], y: &[f64], weights: &[f64]) -> Vec<f64> {
+    let scaled = |c: &[f64]| -> Vec<f64> {
+        let pairs = c.iter().zip(weights);
+        pairs
+            .map(|(v, w)| if *w > 0.0 { v * w.sqrt() } else { 0.0 })
+            .collect()
+    };
+    let columns: Vec<Vec<f64>> = columns.iter().map(|c| scaled(c)).collect();
+    let basis = Basis::new(&columns);
+    let y = scaled(y);
+    let z: Vec<f64> = basis.q.iter().map(|q| dot(q, &y)).collect();
+    basis.solve(&z)
+}

@@ -1,0 +1,172 @@
+//! Non-linear parameters, and likelihoods of a few shapes under every noise of the grid.
+
+use crate::closure::channels::Channels;
+use crate::closure::effects::{Bias, Candidate, Point};
+use crate::closure::likelihood::candidates::{AtShape, Grid, Group};
+use crate::closure::likelihood::lattice::Problem;
+use crate::closure::likelihood::linear::{Basis, add_scaled, dot};
+use crate::closure::likelihood::noise::Shape;
+use crate::closure::likelihood::reml::Fit;
+use crate::closure::likelihood::whiten::Whitener;
+
+/// One noise, ready for many columns.
+pub struct Bench<'a> {
+    fit: &'a Fit,
+    whitener: Whitener,
+    declared: Basis,
+    /// The whitened signal without the declared regressors.
+    y: Vec<f64>,
+}
+
+impl<'a> Bench<'a> {
+    /// For a fit and a shape of its noise.
+    pub fn new(fit: &'a Fit, shape: Shape) -> Self {
+        Self::of_problem(fit, &fit.problem, shape)
+    }
+
+    /// For other regressors than the fit's own, on the fit's rows.
+    pub fn of_problem(fit: &'a Fit, problem: &Problem, shape: Shape) -> Self {
+        let whitener = Whitener::new(&problem.line, shape);
+        let (mut y, declared) = problem.whiten(&whitener);
+        declared.project_off(&mut y);
+        Bench {
+            fit,
+            whitener,
+            declared,
+            y,
+        }
+    }
+
+    /// -ln(1 - R^2) of columns over the record's rows, times half the contrasts: a gain in
+    /// log-likelihood at this noise.
+    pub fn gain(&self, columns: &[Vec<f64>]) -> f64 {
+        self.ratio(columns, false)
+    }
+
+    /// The same with the sum of the columns taken as it is, its coefficient being 1.
+    pub fn gain_whole(&self, columns: &[Vec<f64>]) -> f64 {
+        self.ratio(columns, true)
+    }
+
+    fn ratio(&self, columns: &[Vec<f64>], whole: bool) -> f64 {
+        let reduced: Vec<Vec<f64>> = columns.iter().map(|c| self.fit.reduce(c)).collect();
+        let white = self.whitener.apply_all(&reduced);
+        let mut own = Basis::default();
+        let mut rest = self.y.clone();
+        for mut column in white {
+            let before = dot(&column, &column).sqrt();
+            self.declared.project_off(&mut column);
+            if dot(&column, &column).sqrt() > 1e-4 * before {
+                add_scaled(&mut rest, -1.0, &column);
+                own.push(&column);
+            }
+        }
+        if !whole {
+            rest.clone_from(&self.y);
+            own.project_off(&mut rest);
+        }
+        let before = dot(&self.y, &self.y).max(f64::MIN_POSITIVE);
+        let after = dot(&rest, &rest).max(1e-12 * before);
+        let contrasts = self.whitener.used.saturating_sub(self.declared.rank());
+        0.5 * contrasts as f64 * (before / after).ln()
+    }
+}
+
+/// Halvings of the step.
+const HALVINGS: usize = 6;
+
+/// The likeliest point near `start` (the first steps are `reach` times the points' distance) at one noise, by a pattern search along the coordinates (Hooke &
+/// Jeeves 1961): thresholds make the likelihood a staircase, so no derivatives.
+pub fn refined(
+    bench: &Bench<'_>,
+    candidate: &dyn Candidate,
+    c: &Channels,
+    bias: &Bias,
+    start: &Point,
+    reach: f64,
+) -> Point {
+    let mut best = start.clone();
+    if best.theta.is_empty() {
+        return best;
+    }
+    let gain = |p: &Point| {
+        let columns = candidate.columns(c, bias, p);
+        if candidate.is_whole() {
+            bench.gain_whole(&columns)
+        } else {
+            bench.gain(&columns)
+        }
+    };
+    let mut reached = gain(&best);
+    let mut steps: Vec<f64> = candidate.spacing(c, start).iter().map(|s| reach * s).collect();
+    for _ in 0..HALVINGS {
+        let mut moved = true;
+        let mut turns = 0;
+        while moved && turns < 10 {
+            moved = false;
+            turns += 1;
+            for (k, step) in steps.iter().enumerate() {
+                for direction in [1.0, -1.0] {
+                    let mut next = best.clone();
+                    next.theta[k] += direction * step;
+                    let there = gain(&next);
+                    if there > reached + 1e-9 {
+                        (best, reached, moved) = (next, there, true);
+                        break;
+                    }
+                }
+            }
+        }
+        for s in &mut steps {
+            *s *= 0.5;
+        }
+    }
+    best
+}
+
+/// What a set of shapes comes to over all noises of the grid.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Profiled {
+    /// Gain in log-likelihood over the null hypothesis, noise free on both sides.
+    pub gain: f64,
+    /// The noise at which it is reached.
+    pub shape: Shape,
+    /// Columns that are excited.
+    pub columns: usize,
+}
+
+/// Profiled gains of single points.
+pub fn profiled(fit: &Fit, grid: &Grid, points: &[Vec<Vec<f64>>]) -> Vec<Profiled> {
+    let groups: Vec<Group> = points
+        .iter()
+        .map(|columns| Group {
+            points: vec![columns.iter().map(|c| fit.reduce(c)).collect()],
+        })
+        .collect();
+    let mut null = f64::NEG_INFINITY;
+    let mut out = vec![
+        Profiled {
+            gain: f64::NEG_INFINITY,
+            shape: Shape::default(),
+            columns: 0,
+        };
+        points.len()
+    ];
+    let signals = [fit.problem.y.clone()];
+    for shape in &grid.shapes {
+        let at = AtShape::new(fit, &groups, &signals, *shape);
+        null = null.max(at.null(0));
+        for (k, p) in out.iter_mut().enumerate() {
+            let with = at.with_point(k, 0);
+            if with > p.gain {
+                p.gain = with;
+                p.shape = *shape;
+                p.columns = at.directions.points.get(k).map_or(0, |p| p.range.len());
+            }
+        }
+    }
+    for p in &mut out {
+        p.gain -= null;
+    }
+    out
+}

@@ -1,0 +1,66 @@
+//! Is what is left noise? Tests of the whitened residual that need no candidate.
+
+use super::{Model, Search};
+use crate::closure::likelihood::noise::Shape;
+use rustfft::FftPlanner;
+use rustfft::num_complex::Complex;
+
+/// Probability below which a whitened residual is not white.
+pub const COLOURED: f64 = 1e-3;
+
+/// Periodogram ordinates that are added up to a band.
+const BANDS: [usize; 3] = [4, 10, 24];
+
+/// Probability that the greatest band of a white residual's periodogram is as great: narrow-band
+/// structure (a drifting tone, a relaxation that repeats) has no shape in time that a candidate
+/// could have, and no spectrum that 1/f noise has.
+pub fn band_p_value(whitened: &[f64]) -> f64 {
+    let n = whitened.len();
+    if n < 64 {
+        return 1.0;
+    }
+    let mut buffer: Vec<Complex<f64>> = whitened.iter().map(|v| Complex::new(*v, 0.0)).collect();
+    FftPlanner::new().plan_fft_forward(n).process(&mut buffer);
+    let power: Vec<f64> = buffer[1..n / 2].iter().map(|c| c.norm_sqr()).collect();
+    let total: f64 = power.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+    let mean = total / power.len() as f64;
+    let mut least = 1.0f64;
+    for width in BANDS {
+        if 3 * width > power.len() {
+            continue;
+        }
+        let tests = 2.0 * power.len() as f64 / width as f64;
+        let mut sum: f64 = power[..width].iter().sum();
+        let mut greatest = sum;
+        for k in width..power.len() {
+            sum += power[k] - power[k - width];
+            greatest = greatest.max(sum);
+        }
+        // Twice a sum of exponentials over their mean: chi-square with two degrees each.
+        let surprise = crate::closure::likelihood::tail::chi_square_surprise(
+            2 * width,
+            2.0 * greatest / mean,
+        );
+        least = least.min(tests * BANDS.len() as f64 * (-surprise).exp());
+    }
+    least.min(1.0)
+}
+
+/// The rms of slow noise over a record, in units of the white one.
+pub fn slowness(shape: Shape, rows: usize) -> f64 {
+    let n = rows.max(2) as f64;
+    (shape.flicker * n.ln() + shape.walk * n / 6.0).sqrt()
+}
+
+impl Search<'_> {
+    /// The channel in which a model leaves structure that no candidate has: always time.
+    pub fn coloured(&self, model: &Model) -> bool {
+        let white: Vec<f64> = model
+            .fit
+            .residual_whitened
+            .iter()
+            .map(|v| v.clamp(-4.0, 4.0))
+            .collect();
+        band_p_value(&white) < COLOURED
+    }
+}

@@ -1,0 +1,255 @@
+//! After the forward steps: every term again, with the others in.
+
+use super::judge::{Judged, PRICE};
+use super::refine::{self, Bench};
+use super::{Found, MOST_RIVALS, Model, Search, Term, structure};
+use crate::closure::effects::Point;
+use crate::closure::likelihood::Unusable;
+use crate::closure::likelihood::linear::add_scaled;
+use crate::closure::likelihood::noise::Timeline;
+
+/// Net gain by which another candidate takes a term's place.
+const BETTER: f64 = 3.0;
+
+/// Passes over all terms.
+const SWEEPS: usize = 2;
+
+/// Slow noise, in units of white noise over the record, from which on a single step is no evidence.
+const SLOW: f64 = 2.0;
+
+/// Probability that a step needs over slow noise of twice that strength.
+const WEAK: f64 = 1e-4;
+
+/// A sinusoid beside which another one of this share of its gain is needed is none: a drifting tone, or
+/// something else that repeats.
+const OVERTONE: f64 = 0.1;
+
+impl Search<'_> {
+    /// The non-linear parameters of every term again, with the other terms' columns in: with spikes at
+    /// their weights, and with every row at full weight (a threshold that is off makes spikes of
+    /// the very rows that would move it); the better model stays.
+    ///
+    /// # Errors
+    /// Too few rows.
+    pub fn polished(&self, mut model: Model) -> Result<Model, Unusable> {
+        for k in 0..model.terms.len() {
+            if model.terms[k].point.theta.is_empty() {
+                continue;
+            }
+            let mut lines = vec![model.fit.problem.line.clone()];
+            if self.spikes(&model.fit) > 0 && model.fit.decimated.is_none() {
+                let full = |u: &bool| if *u { 1.0 } else { f64::INFINITY };
+                let factors = self.used.iter().map(full).collect();
+                lines.push(lines[0].with_white_factor(factors));
+            }
+            for line in lines {
+                let point = self.repolished(&model, k, line);
+                if point == model.terms[k].point {
+                    continue;
+                }
+                let mut terms = model.terms.clone();
+                terms[k].point = point;
+                let next = self.model_with(&terms, &self.near(&model))?;
+                if next.value > model.value {
+                    model = next;
+                }
+            }
+        }
+        self.model(&model.terms)
+    }
+
+    /// The best point of one term on a timeline, the others held.
+    fn repolished(&self, model: &Model, k: usize, line: Timeline) -> Point {
+        let c = self.channels;
+        let mut problem = model.fit.problem.clone();
+        problem.line = line;
+        problem.y = model.fit.reduce(&c.error_dps);
+        problem.columns = super::declared(c).iter().map(|c| model.fit.reduce(c)).collect();
+        for (j, other) in model.terms.iter().enumerate() {
+            if j == k {
+                continue;
+            }
+            for column in other.candidate.columns(c, &model.bias, &other.point) {
+                let column = model.fit.reduce(&column);
+                if other.candidate.is_whole() {
+                    add_scaled(&mut problem.y, -1.0, &column);
+                } else {
+                    problem.columns.push(column);
+                }
+            }
+        }
+        let bench = Bench::of_problem(&model.fit, &problem, model.fit.at.shape);
+        let term = &model.terms[k];
+        let candidate = term.candidate.as_ref();
+        refine::refined(&bench, candidate, c, &model.bias, &term.point, 0.5)
+    }
+
+    /// Every term against all other candidates, the other terms being in: it is replaced by a better
+    /// one, dropped where it is not needed, and its rivals are those of the whole model.
+    ///
+    /// # Errors
+    /// Too few rows.
+    pub fn swept(&self, mut model: Model) -> Result<Model, Unusable> {
+        if model.terms.len() < 2 {
+            return Ok(model);
+        }
+        for _ in 0..SWEEPS {
+            let mut changed = false;
+            let mut k = 0;
+            while k < model.terms.len() {
+                let mut others = model.terms.clone();
+                let own = others.remove(k);
+                let own_spikes = self.spikes(&model.fit);
+                match self.again(&others, &own, own_spikes)? {
+                    Some(term) => {
+                        changed |= term.id() != own.id();
+                        others.insert(k, term);
+                        k += 1;
+                    }
+                    None => changed = true,
+                }
+                model = self.model(&others)?;
+            }
+            if !changed {
+                break;
+            }
+            model = self.polished(model)?;
+        }
+        Ok(model)
+    }
+
+    /// What takes a term's place beside the others; `None`: nothing is needed.
+    fn again(
+        &self,
+        others: &[Term],
+        own: &Term,
+        own_spikes: usize,
+    ) -> Result<Option<Term>, Unusable> {
+        let without = self.model(others)?;
+        let round = self.judge(&without, 0);
+        let same = round.judged.iter().find(|j| j.candidate.id() == own.id());
+        let kept = |j: &Judged| {
+            let mut term = Term::of(j, round.rivals(j));
+            term.p_value = own.p_value;
+            if term.rivals.len() > MOST_RIVALS {
+                term.rivals.truncate(MOST_RIVALS);
+            }
+            term
+        };
+        let needed = |j: &Judged| j.net > PRICE;
+        let best_name = round.judged.iter().find(|j| j.candidate.named());
+        let explains_spikes = self.spikes(&without.fit) > own_spikes + 1;
+        let Some(same) = same else {
+            return Ok(best_name.filter(|j| needed(j)).map(kept));
+        };
+        if let Some(name) = best_name
+            && name.candidate.id() != own.id()
+            && name.net > same.net + BETTER
+            && needed(name)
+            && !explains_spikes
+        {
+            return Ok(Some(kept(name)));
+        }
+        if needed(same) || explains_spikes {
+            let mut term = kept(same);
+            if explains_spikes {
+                // Judged with those rows out: the shape found with them in is the better one.
+                term.point = own.point.clone();
+                term.rivals = own.rivals.clone();
+            }
+            return Ok(Some(term));
+        }
+        Ok(None)
+    }
+
+    /// Drops terms that do not lower the held-out error, and tones that are none.
+    ///
+    /// # Errors
+    /// Too few rows.
+    pub fn validated(&self, mut model: Model, found: &mut Found) -> Result<Model, Unusable> {
+        let mut terms = model.terms.clone();
+        let tone = terms.iter().find(|t| t.id() == "periodic_pickup").map(|t| t.gain);
+        let further = terms.iter().find(|t| t.id() == "outside:tone").map(|t| t.gain);
+        if let (Some(tone), Some(further)) = (tone, further)
+            && further > OVERTONE * tone
+        {
+            terms.retain(|t| t.id() != "periodic_pickup");
+            found.left = Some("time_s".to_owned());
+            model = self.model(&terms)?;
+        }
+        model = self.without_likenesses(model)?;
+        model = self.without_accidents(model, found)?;
+        let mut k = 0;
+        while k < model.terms.len() {
+            let term = model.terms[k].clone();
+            if !term.candidate.named() {
+                k += 1;
+                continue;
+            }
+            let mut others = model.terms.clone();
+            others.remove(k);
+            let without = self.model(&others)?;
+            let (a, b) = (
+                self.heldout_error(&model, &model),
+                self.heldout_error(&without, &model),
+            );
+            if a.innovations >= b.innovations && a.square >= b.square {
+                found.left = found.left.take().or_else(|| self.channel(&term));
+                model = without;
+            } else {
+                k += 1;
+            }
+        }
+        Ok(model)
+    }
+
+    /// Without names that a greater nameless shape in the same channel has left over.
+    fn without_likenesses(&self, model: Model) -> Result<Model, Unusable> {
+        let mut terms = model.terms.clone();
+        let strangers: Vec<(Option<String>, f64)> = terms
+            .iter()
+            .filter(|t| !t.candidate.named())
+            .map(|t| (self.channel(t), t.gain))
+            .collect();
+        terms.retain(|t| {
+            let channel = self.channel(t);
+            !t.candidate.named() || !strangers.iter().any(|(c, g)| *c == channel && *g > t.gain)
+        });
+        if terms.len() == model.terms.len() {
+            return Ok(model);
+        }
+        self.model(&terms)
+    }
+
+    /// Without steps that happen once: they are no law of temperature unless everything else is clean,
+    /// for anything may happen once. And without weak names over strong slow noise.
+    fn without_accidents(&self, model: Model, found: &mut Found) -> Result<Model, Unusable> {
+        let rows = model.fit.problem.line.used();
+        let slow = structure::slowness(model.fit.at.shape, rows);
+        let more = model.terms.iter().any(|t| !t.candidate.named()) || self.coloured(&model);
+        let mut terms = model.terms.clone();
+        terms.retain(|t| {
+            if !t.candidate.named() {
+                return true;
+            }
+            let single = t.id() == "stress_jump" && self.switches(t, &model) < 2;
+            let accident = single && (more || slow > SLOW);
+            let weak = slow > 2.0 * SLOW && t.p_value > WEAK;
+            if accident || weak {
+                found.left = self.channel(t);
+            }
+            !(accident || weak)
+        });
+        if terms.len() == model.terms.len() {
+            return Ok(model);
+        }
+        self.model(&terms)
+    }
+
+    /// How often a term's column switches between 0 and 1.
+    fn switches(&self, term: &Term, model: &Model) -> usize {
+        let columns = term.candidate.columns(self.channels, &model.bias, &term.point);
+        let count = |c: &Vec<f64>| c.windows(2).filter(|w| w[0] != w[1]).count();
+        columns.iter().map(count).max().unwrap_or(0)
+    }
+}
