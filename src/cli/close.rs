@@ -103,7 +103,10 @@ fn sentence(c: &Closure) -> String {
         Verdict::Complete => "complete: nothing beyond noise is left".to_owned(),
         Verdict::Explained => format!("explained by {}", names.join(", ")),
         Verdict::PartlyExplained => {
-            format!("partly explained by {}; structure is left{channel}", names.join(", "))
+            format!(
+                "partly explained by {}; structure is left{channel}",
+                names.join(", ")
+            )
         }
         Verdict::Unexplained => {
             format!("unexplained: structure is left that no candidate earns{channel}")

@@ -53,7 +53,9 @@ impl Channels {
         let output = columns
             .get("rate_out_dps")
             .ok_or_else(|| absent("rate_out_dps"))?;
-        let reading = columns.get(thermometer).ok_or_else(|| absent(thermometer))?;
+        let reading = columns
+            .get(thermometer)
+            .ok_or_else(|| absent(thermometer))?;
         let reading = filled(time_s, reading).ok_or_else(|| absent(thermometer))?;
         let mut others = BTreeMap::new();
         for (name, values) in columns {
@@ -109,7 +111,9 @@ impl Channels {
             return (self.centre, self.half);
         }
         for name in ["die_degc", "chamber_degc"] {
-            let Some(t) = self.columns.get(name) else { continue };
+            let Some(t) = self.columns.get(name) else {
+                continue;
+            };
             let n = t.len().max(1) as f64;
             let (mu, mt) = (mean(&self.u), mean(t));
             let pairs = || self.u.iter().zip(t);

@@ -40,7 +40,12 @@ fn thermometer(record: &ThermalRecord, mapping: &RecordMapping) -> Result<Option
         .in_file(&record.source)
         .help(format!(
             "the record has: {}",
-            record.columns.keys().cloned().collect::<Vec<_>>().join(", ")
+            record
+                .columns
+                .keys()
+                .cloned()
+                .collect::<Vec<_>>()
+                .join(", ")
         ))
         .into()),
         Some(name) => Ok(Some(name.clone())),
@@ -60,8 +65,8 @@ fn degc_of(gyro: &Gyro, thermometer: &str, reading: f64) -> f64 {
         return reference + (reading - gyro.drive_frequency_hz) / slope;
     }
     let quarter = std::f64::consts::FRAC_PI_2;
-    let slope = -gyro.drive_q * gyro.stiffness_tempco_per_k.abs()
-        + gyro.electronics.phase_slope_rad_per_k;
+    let slope =
+        -gyro.drive_q * gyro.stiffness_tempco_per_k.abs() + gyro.electronics.phase_slope_rad_per_k;
     reference + (reading + quarter) / slope
 }
 
@@ -202,7 +207,10 @@ impl Told<'_> {
             let reported = term.candidate.report(self.search.channels, estimate);
             out.push(Step {
                 effect: term.id(),
-                channels: term.candidate.channels(self.search.channels).unwrap_or_default(),
+                channels: term
+                    .candidate
+                    .channels(self.search.channels)
+                    .unwrap_or_default(),
                 parameters: reported.iter().map(|(n, v)| (n.clone(), v.0)).collect(),
                 parameter_std: reported.iter().map(|(n, v)| (n.clone(), v.1)).collect(),
                 heldout_rms: model.heldout_rms,
@@ -237,15 +245,20 @@ impl Told<'_> {
         let declared = seen(thermometer) || thermometer == NONE;
         declared
             && self.found.terms.iter().all(|t| {
-                let channels = t.candidate.channels(self.search.channels).unwrap_or_default();
+                let channels = t
+                    .candidate
+                    .channels(self.search.channels)
+                    .unwrap_or_default();
                 t.candidate.sheet().compensable && channels.iter().all(seen)
             })
     }
 
     fn evidence(&self, steps: &[Step]) -> Vec<Evidence> {
         let mut out: Vec<Evidence> = Vec::new();
-        let confounded: Vec<&String> =
-            steps.iter().flat_map(|s| &s.indistinguishable_from).collect();
+        let confounded: Vec<&String> = steps
+            .iter()
+            .flat_map(|s| &s.indistinguishable_from)
+            .collect();
         for j in self.found.first.iter().filter(|j| j.candidate.named()) {
             let id = j.candidate.id();
             let (fate, remark) = if steps.iter().any(|s| s.effect == id) {
@@ -309,4 +322,3 @@ fn without(candidate: &Arc<dyn Candidate>, fate: Fate, remark: String) -> Eviden
         remark,
     }
 }
-

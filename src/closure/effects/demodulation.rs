@@ -44,7 +44,10 @@ impl Candidate for Leakage {
     }
 
     fn columns(&self, c: &Channels, _bias: &Bias, _point: &Point) -> Vec<Vec<f64>> {
-        c.column("quad_dps").map(<[f64]>::to_vec).into_iter().collect()
+        c.column("quad_dps")
+            .map(<[f64]>::to_vec)
+            .into_iter()
+            .collect()
     }
 
     fn report(&self, _c: &Channels, e: &Estimate) -> Reported {
@@ -94,7 +97,9 @@ impl Candidate for PhaseDrift {
 
     fn points(&self, c: &Channels) -> Vec<Point> {
         // The temperature at which the phase is trimmed is an ambient one; else two columns.
-        (0..TRIMMED_DEGC.len() + c.heats()).map(Point::form).collect()
+        (0..TRIMMED_DEGC.len() + c.heats())
+            .map(Point::form)
+            .collect()
     }
 
     fn columns(&self, c: &Channels, _bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
@@ -106,7 +111,10 @@ impl Candidate for PhaseDrift {
                 let zero = (trimmed - c.middle_degc) / c.kelvin_per_u;
                 vec![q.iter().zip(&c.u).map(|(q, u)| q * (u - zero)).collect()]
             }
-            None => vec![product(q, c.heat(point.form - TRIMMED_DEGC.len())), q.to_vec()],
+            None => vec![
+                product(q, c.heat(point.form - TRIMMED_DEGC.len())),
+                q.to_vec(),
+            ],
         }
     }
 

@@ -58,16 +58,15 @@ impl Candidate for Damping {
             return vec![plain];
         }
         let resonance = c.resonance_rad();
-        let bend = c
-            .u
-            .iter()
-            .zip(g)
-            .map(|(u, g)| {
-                let p = (c.centre + c.half * u - resonance).clamp(-1.5, 1.5);
-                let nominal = (g * p.tan()).atan();
-                bias.at((nominal + resonance - c.centre) / c.half) - bias.at(*u)
-            })
-            .collect();
+        let bend =
+            c.u.iter()
+                .zip(g)
+                .map(|(u, g)| {
+                    let p = (c.centre + c.half * u - resonance).clamp(-1.5, 1.5);
+                    let nominal = (g * p.tan()).atan();
+                    bias.at((nominal + resonance - c.centre) / c.half) - bias.at(*u)
+                })
+                .collect();
         if point.form == 1 {
             vec![bend]
         } else {
@@ -77,6 +76,10 @@ impl Candidate for Damping {
 
     fn acts_on_bias(&self) -> bool {
         true
+    }
+
+    fn surcharge(&self, _c: &Channels, point: &Point) -> f64 {
+        if point.form == 2 { 2.0 } else { 0.0 }
     }
 
     fn report(&self, _c: &Channels, e: &Estimate) -> Reported {
@@ -132,8 +135,18 @@ impl Candidate for Coupling {
         };
         // Forms: the gain's first and second power, and the first power with the curve's own
         // second-order answer, for large pulls.
-        let pull = map(g, |g| if point.form == 1 { g * g - 1.0 } else { g - 1.0 });
-        let slope: Vec<f64> = c.u.iter().zip(&pull).map(|(u, d)| bias.slope(*u) * d).collect();
+        let pull = map(g, |g| {
+            if point.form == 1 {
+                g * g - 1.0
+            } else {
+                g - 1.0
+            }
+        });
+        let slope: Vec<f64> =
+            c.u.iter()
+                .zip(&pull)
+                .map(|(u, d)| bias.slope(*u) * d)
+                .collect();
         if point.form < 2 {
             return vec![slope];
         }

@@ -1,6 +1,8 @@
 //! Effects of supply and acceleration: one channel, one column.
 
-use super::{Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, gain, map, moving};
+use super::{
+    Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, gain, map, moving,
+};
 use crate::closure::channels::Channels;
 
 /// All of this file.

@@ -1,8 +1,8 @@
 //! Effects of heat's history and of time.
 
 use super::{
-    Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, from_log, gain,
-    heated, map, spaced,
+    Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, from_log, gain, heated,
+    map, spaced,
 };
 use crate::closure::channels::{Channels, lag, slope};
 
@@ -138,7 +138,9 @@ impl Candidate for TemperatureRate {
 
     fn report(&self, c: &Channels, e: &Estimate) -> Reported {
         let factor = c.span_s() / c.kelvin_per_u;
-        [gain("gain_dps_s_per_k", e, 0, factor)].into_iter().collect()
+        [gain("gain_dps_s_per_k", e, 0, factor)]
+            .into_iter()
+            .collect()
     }
 }
 
@@ -267,9 +269,11 @@ impl Candidate for Ageing {
             let per_h = 3600.0 / c.span_s().max(f64::MIN_POSITIVE);
             return [gain("drift_dps_per_h", e, 0, per_h)].into_iter().collect();
         }
-        [gain("gain_dps_per_efold", e, 0, 1.0), from_log("t0_s", e, 0)]
-            .into_iter()
-            .collect()
+        [
+            gain("gain_dps_per_efold", e, 0, 1.0),
+            from_log("t0_s", e, 0),
+        ]
+        .into_iter()
+        .collect()
     }
 }
-

@@ -61,13 +61,18 @@ pub struct Bias {
 impl Bias {
     /// deg/s.
     pub fn at(&self, u: f64) -> f64 {
-        self.coefficients_dps.iter().rev().fold(0.0, |s, c| s * u + c)
+        self.coefficients_dps
+            .iter()
+            .rev()
+            .fold(0.0, |s, c| s * u + c)
     }
 
     /// deg/s per unit of u.
     pub fn slope(&self, u: f64) -> f64 {
         let terms = self.coefficients_dps.iter().enumerate().skip(1);
-        terms.map(|(k, c)| k as f64 * c * u.powi(k as i32 - 1)).sum()
+        terms
+            .map(|(k, c)| k as f64 * c * u.powi(k as i32 - 1))
+            .sum()
     }
 }
 
@@ -139,6 +144,11 @@ pub trait Candidate: Send + Sync {
     /// Where the search starts.
     fn points(&self, c: &Channels) -> Vec<Point>;
 
+    /// Further places from which the last refinement starts, where the likelihood has many tops.
+    fn fine(&self, _c: &Channels, _point: &Point) -> Vec<Point> {
+        Vec::new()
+    }
+
     /// The columns of a shape, one value a row.
     fn columns(&self, c: &Channels, bias: &Bias, point: &Point) -> Vec<Vec<f64>>;
 
@@ -153,8 +163,9 @@ pub trait Candidate: Send + Sync {
         false
     }
 
-    /// What is paid for the non-linear parameters, in log-likelihood, beyond the usual price.
-    fn surcharge(&self, _c: &Channels) -> f64 {
+    /// What a shape costs in log-likelihood beyond the usual price: for a choice among many, or for
+    /// a part that the effect does not need.
+    fn surcharge(&self, _c: &Channels, _point: &Point) -> f64 {
         0.0
     }
 
@@ -202,7 +213,9 @@ pub fn heated(c: &Channels) -> Result<String, Missing> {
     if high > low {
         return Ok(c.thermometer.clone());
     }
-    Err(Missing::Excitation("the temperature is constant in this record".to_owned()))
+    Err(Missing::Excitation(
+        "the temperature is constant in this record".to_owned(),
+    ))
 }
 
 /// The product of two columns.
@@ -219,7 +232,9 @@ pub fn map(a: &[f64], f: impl Fn(f64) -> f64) -> Vec<f64> {
 pub fn spaced(low: f64, high: f64, count: usize) -> Vec<f64> {
     let ratio = (high / low).max(1.0);
     let last = count.saturating_sub(1).max(1) as f64;
-    (0..count).map(|k| low * ratio.powf(k as f64 / last)).collect()
+    (0..count)
+        .map(|k| low * ratio.powf(k as f64 / last))
+        .collect()
 }
 
 /// A pair for a [`Reported`].

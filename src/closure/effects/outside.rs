@@ -201,4 +201,3 @@ pub fn play(x: &[f64], r: f64) -> Vec<f64> {
         })
         .collect()
 }
-

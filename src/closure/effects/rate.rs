@@ -82,7 +82,9 @@ impl Candidate for ScaleTemperature {
     fn report(&self, c: &Channels, e: &Estimate) -> Reported {
         let (slope, constant) = (e.beta[0], e.beta.get(1).copied().unwrap_or(0.0));
         let factor = 1e6 / (top(c) * c.kelvin_per_u);
-        let mut out: Reported = [gain("slope_ppm_per_k", e, 0, factor)].into_iter().collect();
+        let mut out: Reported = [gain("slope_ppm_per_k", e, 0, factor)]
+            .into_iter()
+            .collect();
         if slope != 0.0 {
             let zero = c.middle_degc - c.kelvin_per_u * constant / slope;
             let std = e.beta_std.get(1).copied().unwrap_or(0.0);
@@ -132,6 +134,11 @@ impl Candidate for Nonlinearity {
         } else {
             vec![cube, r]
         }
+    }
+
+    fn surcharge(&self, _c: &Channels, point: &Point) -> f64 {
+        // A scale factor that is wrong at small rates is another effect.
+        3.0 * point.form as f64
     }
 
     fn report(&self, c: &Channels, e: &Estimate) -> Reported {
@@ -223,7 +230,12 @@ impl Candidate for Deadband {
 
     fn points(&self, c: &Channels) -> Vec<Point> {
         // Half widths between neighbouring magnitudes that were applied.
-        let mut sizes: Vec<f64> = c.column("rate_dps").unwrap_or(&[]).iter().map(|r| r.abs()).collect();
+        let mut sizes: Vec<f64> = c
+            .column("rate_dps")
+            .unwrap_or(&[])
+            .iter()
+            .map(|r| r.abs())
+            .collect();
         sizes.retain(|s| *s > 0.0);
         sizes.sort_by(f64::total_cmp);
         let least = sizes.first().copied().unwrap_or(0.0).max(1e-4 * top(c));
@@ -353,8 +365,16 @@ impl Candidate for Saturation {
         let (high, low) = (levels(c, true), levels(c, false));
         let mut out = Vec::new();
         // Forms: both at one magnitude, upper, lower, two levels.
-        out.extend(high.iter().filter(|l| **l > 0.0).map(|l| Point::at(0, &[*l])));
-        out.extend(low.iter().filter(|l| **l < 0.0).map(|l| Point::at(0, &[-l])));
+        out.extend(
+            high.iter()
+                .filter(|l| **l > 0.0)
+                .map(|l| Point::at(0, &[*l])),
+        );
+        out.extend(
+            low.iter()
+                .filter(|l| **l < 0.0)
+                .map(|l| Point::at(0, &[-l])),
+        );
         out.extend(high.iter().map(|l| Point::at(1, &[*l])));
         out.extend(low.iter().map(|l| Point::at(2, &[*l])));
         for upper in high.iter().step_by(3) {
@@ -367,7 +387,13 @@ impl Candidate for Saturation {
 
     fn columns(&self, c: &Channels, bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
         let (low, high) = limits(point);
-        vec![map(&total(c, bias), |x| x.max(low).min(high) - x)]
+        let total = total(c, bias);
+        let beyond = total.iter().filter(|x| **x < low || **x > high).count();
+        if 2 * beyond > total.len() {
+            // An output that clips most of the time is no output.
+            return vec![vec![0.0; total.len()]];
+        }
+        vec![map(&total, |x| x.max(low).min(high) - x)]
     }
 
     fn spacing(&self, c: &Channels, point: &Point) -> Vec<f64> {

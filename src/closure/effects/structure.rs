@@ -130,6 +130,20 @@ impl Candidate for ModeCrossing {
         vec![point.theta[1].exp(), 0.5]
     }
 
+    fn fine(&self, _c: &Channels, _point: &Point) -> Vec<Point> {
+        let mut out = Vec::new();
+        for k in 0..10 {
+            let width = 0.02 * 1.45f64.powi(k);
+            for j in 0..30 {
+                out.push(Point::at(
+                    0,
+                    &[-0.9 + 1.8 * f64::from(j) / 29.0, width.ln()],
+                ));
+            }
+        }
+        out
+    }
+
     fn report(&self, c: &Channels, e: &Estimate) -> Reported {
         let k = c.kelvin_per_u;
         let std = |i: usize| e.theta_std.get(i).copied().unwrap_or(0.0);
@@ -216,9 +230,8 @@ impl Candidate for StressJump {
 
     fn points(&self, _c: &Channels) -> Vec<Point> {
         let mut out = Vec::new();
-        let centres = |count: usize| {
-            (0..count).map(move |k| -0.85 + 1.7 * k as f64 / (count - 1) as f64)
-        };
+        let centres =
+            |count: usize| (0..count).map(move |k| -0.85 + 1.7 * k as f64 / (count - 1) as f64);
         for (k, gap) in GAPS.into_iter().enumerate() {
             let form = usize::from(k > 0);
             for centre in centres(if k == 0 { 40 } else { 30 }) {
@@ -237,6 +250,18 @@ impl Candidate for StressJump {
             1 => step(&c.smooth_u, centre, point.theta[1].abs(), false),
             _ => once(&c.smooth_u, centre),
         }]
+    }
+
+    fn fine(&self, _c: &Channels, _point: &Point) -> Vec<Point> {
+        // Where the temperature wanders, a step that is a little off switches at other times.
+        let mut out = Vec::new();
+        for j in 0..75 {
+            let centre = -0.9 + 1.8 * f64::from(j) / 74.0;
+            out.push(Point::at(0, &[centre]));
+            out.push(Point::at(2, &[centre]));
+            out.extend((1..17).map(|k| Point::at(1, &[centre, 0.04 * f64::from(k)])));
+        }
+        out
     }
 
     fn spacing(&self, _c: &Channels, point: &Point) -> Vec<f64> {

@@ -76,7 +76,7 @@ impl Candidate for Pickup {
         vec![0.25 / c.span_s().max(f64::MIN_POSITIVE)]
     }
 
-    fn surcharge(&self, c: &Channels) -> f64 {
+    fn surcharge(&self, c: &Channels, _point: &Point) -> f64 {
         // As many frequencies were looked at as there are pairs of rows.
         (0.5 * c.len() as f64).max(1.0).ln()
     }

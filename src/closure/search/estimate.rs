@@ -15,8 +15,10 @@ impl Search<'_> {
     pub fn estimates(&self, model: &Model) -> Vec<Estimate> {
         let c = self.channels;
         let order = declared(c).len();
-        let mut columns: Vec<Vec<f64>> =
-            model.columns[..order].iter().map(|c| model.fit.reduce(c)).collect();
+        let mut columns: Vec<Vec<f64>> = model.columns[..order]
+            .iter()
+            .map(|c| model.fit.reduce(c))
+            .collect();
         let mut at = order;
         // For each term the places of its coefficients and derivatives among `columns`.
         let mut places = Vec::new();

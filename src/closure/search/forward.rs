@@ -191,16 +191,25 @@ impl Search<'_> {
         significant: &[&'j Judged],
         leader: &Judged,
     ) -> Result<Option<&'j Judged>, Unusable> {
+        let near = self.near(model);
+        let value = |added: &[&Judged]| -> Result<f64, Unusable> {
+            let mut terms = model.terms.clone();
+            terms.extend(added.iter().map(|j| Term::of(j, Vec::new())));
+            let price: f64 = added.iter().map(|j| j.gain - j.net).sum();
+            Ok(self.model_with(&terms, &near)?.value - price)
+        };
+        let alone = value(&[leader])?;
         let mut best: Option<(&Judged, f64)> = None;
         for j in significant.iter().filter(|j| j.candidate.named()).take(4) {
             let mut terms = model.terms.clone();
             terms.push(Term::of(j, Vec::new()));
-            let with = self.model_with(&terms, &self.near(model))?;
-            let second = self.judge(&with, 0);
-            let second = second.judged.iter().find(|j| j.candidate.named());
-            let net = j.net + second.map_or(0.0, |s| s.net.max(0.0));
-            if net > leader.net - STRANGER && best.is_none_or(|b| net > b.1) {
-                best = Some((j, net));
+            let second = self.judge(&self.model_with(&terms, &near)?, 0);
+            let Some(second) = second.judged.iter().find(|j| j.candidate.named()) else {
+                continue;
+            };
+            let both = value(&[j, second])?;
+            if both > alone - STRANGER && best.is_none_or(|b| both > b.1) {
+                best = Some((j, both));
             }
         }
         Ok(best.map(|b| b.0))

@@ -50,7 +50,10 @@ impl Search<'_> {
             for side in [true, false] {
                 let take = |column: &Vec<f64>| -> Vec<f64> {
                     let pairs = column.iter().zip(&first);
-                    pairs.filter(|(_, f)| **f == side).map(|(v, _)| *v).collect()
+                    pairs
+                        .filter(|(_, f)| **f == side)
+                        .map(|(v, _)| *v)
+                        .collect()
                 };
                 let declared = Basis::new(&base.iter().map(take).collect::<Vec<_>>());
                 let mut y = take(&signal);
@@ -85,5 +88,7 @@ fn half(rows: usize, pair: usize) -> Vec<bool> {
     for (_, s) in order.iter().take(SEGMENTS / 2) {
         first[*s] = true;
     }
-    (0..rows).map(|i| first[i * SEGMENTS / rows.max(1)]).collect()
+    (0..rows)
+        .map(|i| first[i * SEGMENTS / rows.max(1)])
+        .collect()
 }

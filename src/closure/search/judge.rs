@@ -150,16 +150,19 @@ impl Search<'_> {
             .into_iter()
             .zip(gains)
             .filter(|(_, g)| g.columns > 0)
-            .map(|((candidate, point, p_value), Profiled { gain, columns, .. })| {
-                let paid = PRICE * (columns + point.theta.len()) as f64;
-                Judged {
-                    net: gain - paid - candidate.surcharge(c),
-                    candidate,
-                    point,
-                    gain,
-                    p_value,
-                }
-            })
+            .map(
+                |((candidate, point, p_value), Profiled { gain, columns, .. })| {
+                    let paid = PRICE * (columns + point.theta.len()) as f64;
+                    let surcharge = candidate.surcharge(c, &point);
+                    Judged {
+                        net: gain - paid - surcharge,
+                        candidate,
+                        point,
+                        gain,
+                        p_value,
+                    }
+                },
+            )
             .collect()
     }
 }

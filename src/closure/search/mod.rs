@@ -201,8 +201,8 @@ impl<'a> Search<'a> {
         let acting = terms.iter().any(|t| t.candidate.acts_on_bias());
         let passes = match (acting, terms.len()) {
             (false, _) => 0,
-            (true, 1) => 1,
-            (true, _) => 2,
+            (true, 1) => 2,
+            (true, _) => 3,
         };
         for _ in 0..passes {
             bias = self.model_once(terms, &bias, options)?.bias;
@@ -219,44 +219,55 @@ impl<'a> Search<'a> {
         let c = self.channels;
         let mut columns = declared(c);
         let order = columns.len();
-        let mut free: Vec<Vec<f64>> = columns.clone();
-        let mut whole = Vec::new();
-        let mut last = Vec::new();
-        let mut y = c.error_dps.clone();
+        let mut kinds = vec![Kind::Free; order];
         for term in terms {
+            let kind = match (term.candidate.is_last(), term.candidate.is_whole()) {
+                (true, _) => Kind::Last,
+                (_, true) => Kind::Whole,
+                _ => Kind::Free,
+            };
             for column in term.candidate.columns(c, bias, &term.point) {
-                if term.candidate.is_whole() {
-                    add_scaled(&mut y, -1.0, &column);
-                } else {
-                    free.push(column.clone());
-                }
-                whole.push(term.candidate.is_whole());
-                last.push(term.candidate.is_last());
                 columns.push(column);
+                kinds.push(kind);
             }
+        }
+        let unclipped = columns.clone();
+        let clipped = clip(c, bias, &mut columns, &kinds);
+        let mut y = c.error_dps.clone();
+        let mut free = Vec::new();
+        for (column, kind) in columns.iter().zip(&kinds) {
+            match kind {
+                Kind::Free => free.push(column.clone()),
+                _ => add_scaled(&mut y, -1.0, column),
+            }
+        }
+        if clipped.contains(&1.0) {
+            // The noise needs a constant over all rows, clipped ones too.
+            free.push(clipped);
         }
         let fit = reml::fit(&c.time_s, &y, &free, &self.used, options)?;
-        let mut given = fit.beta.iter().skip(order);
-        let gains: Vec<f64> = whole
+        let mut given = fit.beta.iter();
+        let mut beta: Vec<f64> = kinds
             .iter()
-            .map(|whole| if *whole { 1.0 } else { given.next().copied().unwrap_or(0.0) })
+            .map(|kind| match kind {
+                Kind::Free => given.next().copied().unwrap_or(0.0),
+                _ => 1.0,
+            })
             .collect();
         let mut rest = c.error_dps.clone();
-        for (column, b) in columns.iter().skip(order).zip(&gains) {
-            add_scaled(&mut rest, -b, column);
-        }
-        let mut beta = weighted(&columns[..order], &rest, &fit.row_weights);
         let mut others = vec![0.0; c.len()];
-        for ((column, b), last) in columns.iter().skip(order).zip(&gains).zip(&last) {
-            if !last {
-                add_scaled(&mut others, *b, column);
+        for k in order..columns.len() {
+            add_scaled(&mut rest, -beta[k], &columns[k]);
+            if kinds[k] != Kind::Last {
+                add_scaled(&mut others, beta[k], &unclipped[k]);
             }
         }
+        let declared = weighted(&columns[..order], &rest, &fit.row_weights);
+        beta[..order].copy_from_slice(&declared);
         let bias = Bias {
-            coefficients_dps: beta.clone(),
+            coefficients_dps: declared,
             others_dps: others,
         };
-        beta.extend(gains);
         let spikes = self.spikes(&fit);
         // A row that is left out has the density of something that may lie anywhere within some
         // twenty deviations, and happens once in a hundred rows.
@@ -303,6 +314,42 @@ impl Model {
         }
         out
     }
+}
+
+/// How a column enters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    /// With a coefficient of its own.
+    Free,
+    /// As it is.
+    Whole,
+    /// As it is, after all others: where it is not 0, it alone says what the output is.
+    Last,
+}
+
+/// Puts clips after all other columns: in rows that are clipped these vanish, and the clip's own
+/// column is the whole error, limit less applied rate, instead of its distance from a total that
+/// depends on the very coefficients that are sought. 1 for each such row.
+fn clip(c: &Channels, bias: &Bias, columns: &mut [Vec<f64>], kinds: &[Kind]) -> Vec<f64> {
+    let mut clipped = vec![0.0; c.len()];
+    for k in 0..columns.len() {
+        if kinds[k] != Kind::Last {
+            continue;
+        }
+        for i in 0..c.len() {
+            if columns[k][i] == 0.0 {
+                continue;
+            }
+            let others = bias.others_dps.get(i).copied().unwrap_or(0.0);
+            let whole = columns[k][i] + bias.at(c.u[i]) + others;
+            for column in columns.iter_mut() {
+                column[i] = 0.0;
+            }
+            columns[k][i] = whole;
+            clipped[i] = 1.0;
+        }
+    }
+    clipped
 }
 
 /// Weighted least squares; rows of weight 0 may hold anything.

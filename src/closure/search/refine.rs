@@ -89,16 +89,13 @@ pub fn refined(
     if best.theta.is_empty() {
         return best;
     }
-    let gain = |p: &Point| {
-        let columns = candidate.columns(c, bias, p);
-        if candidate.is_whole() {
-            bench.gain_whole(&columns)
-        } else {
-            bench.gain(&columns)
-        }
-    };
+    let gain = |p: &Point| gain(bench, candidate, c, bias, p);
     let mut reached = gain(&best);
-    let mut steps: Vec<f64> = candidate.spacing(c, start).iter().map(|s| reach * s).collect();
+    let mut steps: Vec<f64> = candidate
+        .spacing(c, start)
+        .iter()
+        .map(|s| reach * s)
+        .collect();
     for _ in 0..HALVINGS {
         let mut moved = true;
         let mut turns = 0;
@@ -122,6 +119,22 @@ pub fn refined(
         }
     }
     best
+}
+
+/// Gain in log-likelihood of a shape at one noise, its coefficient being 1 where physics says so.
+pub fn gain(
+    bench: &Bench<'_>,
+    candidate: &dyn Candidate,
+    c: &Channels,
+    bias: &Bias,
+    point: &Point,
+) -> f64 {
+    let columns = candidate.columns(c, bias, point);
+    if candidate.is_whole() {
+        bench.gain_whole(&columns)
+    } else {
+        bench.gain(&columns)
+    }
 }
 
 /// What a set of shapes comes to over all noises of the grid.

@@ -37,10 +37,8 @@ pub fn band_p_value(whitened: &[f64]) -> f64 {
             greatest = greatest.max(sum);
         }
         // Twice a sum of exponentials over their mean: chi-square with two degrees each.
-        let surprise = crate::closure::likelihood::tail::chi_square_surprise(
-            2 * width,
-            2.0 * greatest / mean,
-        );
+        let surprise =
+            crate::closure::likelihood::tail::chi_square_surprise(2 * width, 2.0 * greatest / mean);
         least = least.min(tests * BANDS.len() as f64 * (-surprise).exp());
     }
     least.min(1.0)

@@ -9,7 +9,10 @@ use crate::closure::likelihood::linear::add_scaled;
 use crate::closure::likelihood::noise::Timeline;
 
 /// Net gain by which another candidate takes a term's place.
-const BETTER: f64 = 3.0;
+const BETTER: f64 = 1.5;
+
+/// Most polishes in a row.
+const POLISHES: usize = 3;
 
 /// Passes over all terms.
 const SWEEPS: usize = 2;
@@ -31,7 +34,21 @@ impl Search<'_> {
     ///
     /// # Errors
     /// Too few rows.
-    pub fn polished(&self, mut model: Model) -> Result<Model, Unusable> {
+    pub fn polished(&self, model: Model) -> Result<Model, Unusable> {
+        let mut model = model;
+        for _ in 0..POLISHES {
+            let before: Vec<Point> = model.terms.iter().map(|t| t.point.clone()).collect();
+            model = self.polished_once(model)?;
+            // A clip's level and the bias move each other; smooth shapes are done at once.
+            let acting = model.terms.iter().any(|t| t.candidate.is_last());
+            if !acting || model.terms.iter().map(|t| &t.point).eq(before.iter()) {
+                break;
+            }
+        }
+        self.model(&model.terms)
+    }
+
+    fn polished_once(&self, mut model: Model) -> Result<Model, Unusable> {
         for k in 0..model.terms.len() {
             if model.terms[k].point.theta.is_empty() {
                 continue;
@@ -55,7 +72,7 @@ impl Search<'_> {
                 }
             }
         }
-        self.model(&model.terms)
+        Ok(model)
     }
 
     /// The best point of one term on a timeline, the others held.
@@ -64,7 +81,10 @@ impl Search<'_> {
         let mut problem = model.fit.problem.clone();
         problem.line = line;
         problem.y = model.fit.reduce(&c.error_dps);
-        problem.columns = super::declared(c).iter().map(|c| model.fit.reduce(c)).collect();
+        problem.columns = super::declared(c)
+            .iter()
+            .map(|c| model.fit.reduce(c))
+            .collect();
         for (j, other) in model.terms.iter().enumerate() {
             if j == k {
                 continue;
@@ -81,7 +101,18 @@ impl Search<'_> {
         let bench = Bench::of_problem(&model.fit, &problem, model.fit.at.shape);
         let term = &model.terms[k];
         let candidate = term.candidate.as_ref();
-        refine::refined(&bench, candidate, c, &model.bias, &term.point, 0.5)
+        let gain = |p: &Point| refine::gain(&bench, candidate, c, &model.bias, p);
+        let mut start = term.point.clone();
+        let mut best = gain(&start);
+        for point in candidate.fine(c, &term.point) {
+            // A form with a parameter more has to be worth it.
+            let more = point.theta.len() as f64 - term.point.theta.len() as f64;
+            let there = gain(&point) - PRICE * more;
+            if there > best {
+                (start, best) = (point, there);
+            }
+        }
+        refine::refined(&bench, candidate, c, &model.bias, &start, 0.5)
     }
 
     /// Every term against all other candidates, the other terms being in: it is replaced by a better
@@ -168,8 +199,14 @@ impl Search<'_> {
     /// Too few rows.
     pub fn validated(&self, mut model: Model, found: &mut Found) -> Result<Model, Unusable> {
         let mut terms = model.terms.clone();
-        let tone = terms.iter().find(|t| t.id() == "periodic_pickup").map(|t| t.gain);
-        let further = terms.iter().find(|t| t.id() == "outside:tone").map(|t| t.gain);
+        let tone = terms
+            .iter()
+            .find(|t| t.id() == "periodic_pickup")
+            .map(|t| t.gain);
+        let further = terms
+            .iter()
+            .find(|t| t.id() == "outside:tone")
+            .map(|t| t.gain);
         if let (Some(tone), Some(further)) = (tone, further)
             && further > OVERTONE * tone
         {
@@ -248,7 +285,9 @@ impl Search<'_> {
 
     /// How often a term's column switches between 0 and 1.
     fn switches(&self, term: &Term, model: &Model) -> usize {
-        let columns = term.candidate.columns(self.channels, &model.bias, &term.point);
+        let columns = term
+            .candidate
+            .columns(self.channels, &model.bias, &term.point);
         let count = |c: &Vec<f64>| c.windows(2).filter(|w| w[0] != w[1]).count();
         columns.iter().map(count).max().unwrap_or(0)
     }
