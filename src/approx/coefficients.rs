@@ -24,6 +24,9 @@ const SPARE_BITS: i32 = 4;
 /// For the best coefficients under ideal evaluation.
 const BEST: Budget = Budget { nodes: 2_000_000 };
 
+/// What the best coefficients under ideal evaluation are called.
+pub const BEST_NAME: &str = "best under ideal evaluation";
+
 /// Coefficients with how they were found.
 #[derive(Debug, Clone)]
 pub struct Chosen {
@@ -232,7 +235,7 @@ fn shown(judged: &Judged) -> Compared {
         name: match judged.name {
             "rounded" => "rounded minimax",
             "babai" => "nearest plane of the lattice (as fpminimax)",
-            "ideal" => "best under ideal evaluation",
+            "ideal" => BEST_NAME,
             other => other,
         },
         raw: judged.raw.clone(),

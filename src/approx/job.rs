@@ -9,6 +9,7 @@ use super::form::coefficient_formats::CoefficientFormats;
 use super::form::measure::{Effort, Measured, SAMPLE, measure};
 use super::form::polynomial::{self, Monomials, Polynomial, Scheme};
 use super::form::{Codes, Form, Settled, overflow};
+use super::ideal;
 use super::outcome::{ErrorBounds, Outcome};
 use super::reference::Function;
 use crate::emit::manifest::sha256;
@@ -159,6 +160,12 @@ pub fn approximate(
     let measured = measure(&settled, &function, &effort)?;
     let alternatives = candidates.map(|(all, chosen)| choice::alternatives(&all, chosen));
     let (coefficients, table) = describe::data(&settled.form);
+    let ideal = match (&settled.form, &search) {
+        (Form::Polynomial(p), Some(search)) => {
+            ideal::ideal(search, p, measured.data_only, &function)
+        }
+        _ => None,
+    };
     let outcome = Outcome {
         schema: "gyrogen.approx/1",
         version: env!("CARGO_PKG_VERSION"),
@@ -186,6 +193,7 @@ pub fn approximate(
         cost: Cost::of(&settled, request.target),
         target: request.target,
         search,
+        ideal,
         alternatives,
         bound: request.bound,
         holds: request

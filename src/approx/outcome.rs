@@ -54,6 +54,9 @@ pub struct Outcome {
     /// How the coefficients were found.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub search: Option<Search>,
+    /// The coefficients that are best by themselves.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ideal: Option<super::ideal::Ideal>,
     /// Where a bound was given: each form that meets it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub alternatives: Option<Vec<Alternative>>,

@@ -295,6 +295,14 @@ fn print(o: &Outcome, out: &std::path::Path) {
         (None, None) => {}
     }
     say!("data alone {}", shown(o.error.coefficients_only_max_abs));
+    if let Some(ideal) = o.ideal.as_ref().filter(|i| !i.emitted) {
+        say!(
+            "the best coefficients alone would have {}{}; they are `ideal` in approx.json, and not emitted, for their \
+             whole evaluation is not better",
+            shown(ideal.coefficients_only_max_abs),
+            if ideal.proved_best { " (proved)" } else { "" }
+        );
+    }
     say!(
         "{} bytes, {} multiplications, {} additions, about {} cycles on {}",
         o.cost.rom_bytes,
