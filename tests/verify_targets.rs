@@ -30,9 +30,7 @@ fn is_there(programs: [&[&str]; 2]) -> bool {
         let run = Command::new(name).arg("--version").output();
         run.is_ok_and(|o| o.status.success())
     };
-    programs
-        .iter()
-        .all(|names| names.iter().any(|n| answers(n)))
+    programs.iter().all(|names| names.iter().any(answers))
 }
 
 type Tools = [&'static [&'static str]; 2];

@@ -57,12 +57,12 @@ impl Scheme {
 pub(super) type Coefficient = (i128, i32);
 
 /// A word that a step reads.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 enum Operand {
     /// A coefficient, aligned.
     Constant(i128, i32),
-    /// t_j; aligned by appending zeros where there is a cast.
-    Word(usize, Option<Cast>),
+    /// t_j.
+    Word(usize),
 }
 
 /// t_j = cast(t_(j+s) v^s + t_j).
@@ -75,6 +75,8 @@ struct Step {
     low: Operand,
     /// Appends zeros to a product with fewer fraction bits than what is added.
     align: Option<Cast>,
+    /// The same for a word that is added to a finer product.
+    align_low: Option<Cast>,
     cast: Cast,
 }
 
@@ -123,21 +125,23 @@ impl Plan {
                 let target = Target::signed(127, sum);
                 (sum > from).then(|| Cast::new(label, from, 0, target, Rounding::Floor, None))
             };
-            let low = match &words[j] {
+            let (low, align_low) = match words[j] {
                 Operand::Constant(raw, own) => {
-                    Operand::Constant(aligned(*raw, (sum - own) as u32)?, sum)
+                    let low = Operand::Constant(aligned(raw, (sum - own) as u32)?, sum);
+                    (low, None)
                 }
-                Operand::Word(..) => Operand::Word(j, zeros(bits[j])),
+                word => (word, zeros(bits[j])),
             };
             steps.push(Step {
                 level,
                 to: j,
-                high: words[other].clone(),
+                high: words[other],
                 low,
                 align: zeros(product),
+                align_low,
                 cast: quantise(label, sum),
             });
-            words[j] = Operand::Word(j, None);
+            words[j] = Operand::Word(j);
             bits[j] = inner;
         }
         let powers = (0..highest).map(|level| {
@@ -155,11 +159,8 @@ impl Plan {
 
     pub(super) fn casts_mut(&mut self) -> impl Iterator<Item = &mut Cast> {
         let steps = self.steps.iter_mut().flat_map(|s| {
-            let low = match &mut s.low {
-                Operand::Word(_, align) => align.as_mut(),
-                Operand::Constant(..) => None,
-            };
-            s.align.iter_mut().chain(low).chain([&mut s.cast])
+            let aligned = s.align.iter_mut().chain(&mut s.align_low);
+            aligned.chain([&mut s.cast])
         });
         self.powers.iter_mut().chain(steps)
     }
@@ -174,9 +175,9 @@ impl Plan {
         }
         let mut words = [variable; HIGHEST_DEGREE + 1];
         for step in &self.steps {
-            let high = match &step.high {
-                Operand::Constant(raw, bits) => ar.constant(*raw, *bits),
-                Operand::Word(k, _) => words[*k],
+            let high = match step.high {
+                Operand::Constant(raw, bits) => ar.constant(raw, bits),
+                Operand::Word(k) => words[k],
             };
             let power = powers[step.level];
             let product = ar.mul(high, power);
@@ -184,10 +185,13 @@ impl Plan {
                 Some(cast) => ar.cast(product, cast, &[high, power]),
                 None => product,
             };
-            let (low, is_zero) = match &step.low {
-                Operand::Constant(raw, bits) => (ar.constant(*raw, *bits), *raw == 0),
-                Operand::Word(k, None) => (words[*k], false),
-                Operand::Word(k, Some(cast)) => (ar.cast(words[*k], cast, &[words[*k]]), false),
+            let (low, is_zero) = match step.low {
+                Operand::Constant(raw, bits) => (ar.constant(raw, bits), raw == 0),
+                Operand::Word(k) => (words[k], false),
+            };
+            let low = match &step.align_low {
+                Some(cast) => ar.cast(low, cast, &[low]),
+                None => low,
             };
             let sum = if is_zero {
                 product

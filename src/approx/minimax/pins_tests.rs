@@ -103,7 +103,8 @@ fn the_branches_are_everything_and_their_best_is_the_best() {
 fn plateaus_are_left_with_proof() {
     let power = |x: f64| x.powf(2.5);
     let bell = |x: f64| 1.0 / (1.0 + x * x);
-    let cases: [(&dyn Target, u32, (f64, f64), f64); 4] = [
+    type Plateau<'a> = (&'a dyn Target, u32, (f64, f64), f64);
+    let cases: [Plateau; 4] = [
         (&power, 5, (0.0, 1.0), 1.0224e-4),
         (&bell, 6, (-0.9, 0.2), 9.118e-5),
         (&bell, 6, (0.0, 1.0), 1.468e-5),
