@@ -159,6 +159,62 @@ fn random_polynomials_are_what_the_manual_says_and_within_their_bounds() {
     distribution("polynomials", ratios);
 }
 
+#[test]
+fn formats_of_their_own_and_estrins_scheme_are_what_the_manual_says() {
+    let mut random = Random(29);
+    let mut ratios = Vec::new();
+    for k in 0..30 {
+        let (function, domain, f) = CASES[random.below(CASES.len() as u64) as usize];
+        let folder = tempfile::tempdir().unwrap();
+        let kind = match function {
+            "sin(pi*x/2)" => "odd",
+            "cos(x)" => "even",
+            _ => "all",
+        };
+        let degree = 2 + random.below(9);
+        let count = match kind {
+            "all" => degree + 1,
+            "odd" => degree.div_ceil(2),
+            _ => degree / 2 + 1,
+        };
+        let formats: Vec<String> = (0..count)
+            .map(|_| format!("Q7.{}", 6 + random.below(14)))
+            .collect();
+        let list = match random.below(4) {
+            0 => formats[0].clone(),
+            _ => formats.join(","),
+        };
+        let scheme = ["horner", "estrin"][(k % 3).min(1)];
+        let arguments = [
+            format!("--function={function}"),
+            format!("--domain={domain}"),
+            format!("--degree={degree}"),
+            format!("--input=Q1.{}", 7 + random.below(9)),
+            format!("--output=Q2.{}", 9 + random.below(10)),
+            format!("--coefficients={list}"),
+            format!("--monomials={kind}"),
+            format!("--evaluation={scheme}"),
+            format!("--intermediate=Q9.{}", 8 + random.below(16)),
+        ];
+        let given = arguments.len() - usize::from(random.below(2) == 0);
+        let arguments: Vec<&str> = arguments[..given].iter().map(String::as_str).collect();
+        let json = approx(folder.path(), &arguments);
+        assert_eq!(json["evaluation"], scheme);
+        let one = list.split(',').all(|f| f == formats[0]);
+        let said = if one { &formats[0] } else { &list };
+        assert_eq!(
+            json["formats"]["coefficients"].as_str(),
+            Some(said.as_str())
+        );
+        let (exhaustive, certified) = agrees(folder.path(), &json, f);
+        ratios.push(certified / exhaustive);
+        if k % 5 == 0 {
+            verified(folder.path());
+        }
+    }
+    distribution("formats of their own, Estrin", ratios);
+}
+
 /// Prints how far above the greatest error the proved bound is; above 1.2 only rarely.
 fn distribution(what: &str, mut ratios: Vec<f64>) {
     ratios.sort_by(f64::total_cmp);

@@ -33,6 +33,14 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
         ["--degree=2", "--monomials=all", "--coefficients=Q1.15"],
     ]
     .map(|list| [&list[..], &["--output=Q2.14"]].concat());
+    let [mixed, mixed_bound, mixed_table, estrin_table] = [
+        ["--degree=3", "--coefficients=Q2.14,Q2.12"],
+        ["--bound=1e-3", "--coefficients=Q2.14,Q2.12"],
+        ["--form=table", "--coefficients=Q2.14,Q2.12"],
+        ["--form=table", "--evaluation=estrin"],
+    ]
+    .map(|list| [&list[..], &["--output=Q2.14", "--degree=1"]].concat());
+    let mixed = &mixed[..3];
     let cases: Vec<(Vec<&str>, &[&str])> = vec![
         (
             with(base("1/x", "--domain=-1,1"), &cubic),
@@ -119,6 +127,26 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
         (
             with(base("2.3*x^2", "--domain=0,0.9"), &quadratic),
             &["x^2", "2.3", "Q3.15"],
+        ),
+        (
+            with(base("sin(x)", "--domain=0,1"), mixed),
+            &[
+                "2 formats are given for 4",
+                "x^0, x^1, x^2, x^3",
+                "one for each",
+            ],
+        ),
+        (
+            with(base("sin(x)", "--domain=0,1"), &mixed_bound),
+            &["2 formats are given", "`--bound`"],
+        ),
+        (
+            with(base("sin(x)", "--domain=0,1"), &mixed_table),
+            &["2 formats are given", "table"],
+        ),
+        (
+            with(base("sin(x)", "--domain=0,1"), &estrin_table),
+            &["Estrin", "tables and segments"],
         ),
         (
             with(base("1e300*x", "--domain=0,1"), &cubic),

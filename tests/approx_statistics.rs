@@ -1,7 +1,7 @@
 //! The proved bound against the greatest error that is met, over random requests of every kind.
 
 use gyrogen::approx::cost::Target;
-use gyrogen::approx::form::polynomial::Monomials;
+use gyrogen::approx::form::polynomial::{Monomials, Scheme};
 use gyrogen::approx::job::{Asked, Request, Weight, approximate};
 use gyrogen::numeric::format::Format;
 
@@ -53,15 +53,29 @@ impl Random {
             _ => Monomials::All,
         };
         let narrow = self.below(3) == 0;
+        let degree = 1 + self.below(6) as usize;
+        // A third with fraction bits of their own.
+        let coefficients = match self.below(3) {
+            0 => {
+                let own = kind.exponents(degree).into_iter();
+                own.map(|_| Format::q(9, 8 + self.below(10))).collect()
+            }
+            _ => vec![Format::q(9, own)],
+        };
+        let evaluation = match self.below(3) {
+            0 if polynomial => Scheme::Estrin,
+            _ => Scheme::Horner,
+        };
         Request {
             function: function.into(),
             parameters: Default::default(),
             domain: [low.into(), high.into()],
-            degree: polynomial.then(|| 1 + self.below(6) as usize),
+            degree: polynomial.then_some(degree),
             monomials: Some(kind),
             input: Format::q(1, 6 + self.below(9)),
             output,
-            coefficients: polynomial.then(|| Format::q(9, own)),
+            coefficients: if polynomial { coefficients } else { Vec::new() },
+            evaluation,
             intermediate: (polynomial && narrow).then(|| Format::q(9, own + self.below(6))),
             form,
             bound: (!polynomial).then(|| output.lsb() * loose),

@@ -1,7 +1,8 @@
 //! What a request of `gyrogen approx` must be like.
 
+use super::form::coefficient_formats::CoefficientFormats;
 use super::form::measure::Reference;
-use super::form::polynomial::{self, Monomials};
+use super::form::polynomial::{self, Monomials, Scheme};
 use super::form::{Codes, piecewise};
 use super::job::{Asked, Request};
 use super::real::{Domain, Expression};
@@ -76,7 +77,29 @@ pub(super) fn request(request: &Request) -> Result<()> {
             );
         }
     }
-    if request.coefficients.is_none()
+    if request.coefficients.len() > 1 {
+        let polynomial = matches!(request.form, Asked::Polynomial | Asked::Auto);
+        if !polynomial || request.bound.is_some() {
+            return refuse(
+                format!(
+                    "{} formats are given for the coefficients, and only a polynomial of a given degree, without \
+                     `--bound`, has a format for each of them",
+                    request.coefficients.len()
+                ),
+                "give one format: the entries of a table or of segments share it, and forms for a bound are tried with it",
+            );
+        }
+    }
+    if request.evaluation == Scheme::Estrin
+        && !matches!(request.form, Asked::Polynomial | Asked::Auto)
+    {
+        return refuse(
+            "Estrin's scheme is for one polynomial; tables and segments have their own evaluation"
+                .into(),
+            "leave `--evaluation` out, or use `--form polynomial`",
+        );
+    }
+    if request.coefficients.is_empty()
         && request.bound.is_none()
         && matches!(request.form, Asked::Polynomial | Asked::Auto)
     {
@@ -222,6 +245,9 @@ pub(super) fn polynomial(request: &Request, function: &Function, codes: Codes) -
         ))
         .help("use a lower degree, or a plain table: `--form table --degree 0`")
         .into());
+    }
+    if !request.coefficients.is_empty() {
+        CoefficientFormats::new(&request.coefficients, kind, degree)?;
     }
     let (a, b) = function.domain();
     if kind == Monomials::Odd && a <= 0.0 && b >= 0.0 {

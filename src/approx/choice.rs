@@ -128,7 +128,7 @@ pub fn candidates(
         function,
         codes,
         output: request.output,
-        fraction_bits: request.coefficients.map(|f| f.fraction_bits),
+        fraction_bits: request.coefficients.first().map(|f| f.fraction_bits),
         symmetry: generate::symmetry(function, codes),
         target: request.target,
         bound,

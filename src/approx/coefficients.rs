@@ -1,6 +1,7 @@
 //! A polynomial's coefficients: from the search, with the bit-accurate evaluation in its loop.
 
 use super::datapath::Evaluation;
+use super::form::coefficient_formats::CoefficientFormats;
 use super::form::measure::Reference;
 use super::form::polynomial::{self, Monomials, Polynomial};
 use super::form::{Codes, Form};
@@ -22,6 +23,9 @@ const SPARE_BITS: i32 = 4;
 
 /// For the best coefficients under ideal evaluation.
 const BEST: Budget = Budget { nodes: 2_000_000 };
+
+/// What the best coefficients under ideal evaluation are called.
+pub const BEST_NAME: &str = "best under ideal evaluation";
 
 /// Coefficients with how they were found.
 #[derive(Debug, Clone)]
@@ -67,9 +71,11 @@ pub fn choose(
     request: &Request,
     kind: Monomials,
     degree: usize,
-    format: Format,
+    coefficients: CoefficientFormats,
 ) -> Result<Chosen> {
     let basis = basis(kind, degree)?;
+    let each = coefficients.each(kind, degree).into_iter();
+    let each: Vec<CoefficientFormat> = each.map(CoefficientFormat::from).collect();
     let (low, high) = (codes.real(codes.low), codes.real(codes.high));
     let lsb = codes.format.lsb();
     let nearest = |x: f64| (x / lsb).round().clamp(codes.low as f64, codes.high as f64) * lsb;
@@ -87,9 +93,9 @@ pub fn choose(
         false => Samples::on_codes(function, &basis, low, high, weight, &nearest)?,
     };
     let best_real = minimax::minimax(&samples)?;
-    let problem = Problem::new(&samples, &best_real, &[CoefficientFormat::from(format)])?;
+    let problem = Problem::new(&samples, &best_real, &each)?;
     let rounded = spread(&problem.rounded.raw, kind, degree);
-    let first = job::compiled(codes, request, kind, format, rounded.clone())?;
+    let first = job::compiled(codes, request, kind, coefficients, rounded.clone())?;
     let mut formats = first.formats;
     if request.intermediate.is_none() {
         // Words a little shorter than the widest, for coefficients a little larger.
@@ -108,7 +114,7 @@ pub fn choose(
         weight,
     )?;
     let whole_real = minimax::minimax(&whole)?;
-    let whole = Problem::new(&whole, &whole_real, &[CoefficientFormat::from(format)])?;
+    let whole = Problem::new(&whole, &whole_real, &each)?;
     let effort = Effort::default();
     let best = whole.best(BEST)?;
     let mut found = minimax::search_from(&problem, best, &path, effort)?;
@@ -229,7 +235,7 @@ fn shown(judged: &Judged) -> Compared {
         name: match judged.name {
             "rounded" => "rounded minimax",
             "babai" => "nearest plane of the lattice (as fpminimax)",
-            "ideal" => "best under ideal evaluation",
+            "ideal" => BEST_NAME,
             other => other,
         },
         raw: judged.raw.clone(),
@@ -255,15 +261,15 @@ pub fn within(
     if best_real.error >= room {
         return None;
     }
-    let tried: Vec<u32> = match request.coefficients {
+    let tried: Vec<u32> = match request.coefficients.first() {
         Some(format) => vec![format.fraction_bits],
         None => GUARD_BITS
             .map(|g| request.output.fraction_bits + g)
             .to_vec(),
     };
     tried.into_iter().find_map(|fraction_bits| {
-        let format = match request.coefficients {
-            Some(format) => CoefficientFormat::from(format),
+        let format = match request.coefficients.first() {
+            Some(format) => CoefficientFormat::from(*format),
             None => CoefficientFormat::unlimited(fraction_bits as i32),
         };
         let problem = Problem::new(&samples, &best_real, &[format]).ok()?;
@@ -277,9 +283,8 @@ pub fn within(
             .map(|raw| Interval::point(*raw))
             .reduce(Interval::join)?;
         let integer_bits = (range.bits() as i32 - fraction_bits as i32).max(1) as u32;
-        let format = request
-            .coefficients
-            .unwrap_or(Format::q(integer_bits, fraction_bits));
+        let given = request.coefficients.first().copied();
+        let format = given.unwrap_or(Format::q(integer_bits, fraction_bits));
         (format.bits() <= 64).then(|| (format, spread(&best.raw, kind, degree)))
     })
 }

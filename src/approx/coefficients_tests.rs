@@ -17,9 +17,10 @@ fn codes(format: Format, low: i128, high: i128) -> Codes {
 fn formats(codes: Codes, coefficients: Format, output: Format) -> Formats {
     Formats {
         codes,
-        coefficients,
+        coefficients: coefficients.into(),
         intermediate: Target::signed(40, 24),
         output,
+        scheme: Default::default(),
     }
 }
 
@@ -65,7 +66,7 @@ fn coefficients_are_in_the_slabs_of_their_own_error() {
         let basis = basis(kind, degree).unwrap();
         let samples = Samples::new(&f, &basis, a, b, minimax::Weight::Absolute).unwrap();
         let best = minimax::minimax(&samples).unwrap();
-        let problem = Problem::new(&samples, &best, &[formats.coefficients.into()]).unwrap();
+        let problem = Problem::new(&samples, &best, &[formats.coefficients.of(0).into()]).unwrap();
         let (mut looked_at, mut at_the_edge) = (0, 0);
         // Slabs that are narrower by this would leave some out: the test sees a wrong bound.
         let narrower = 0.1 * formats.output.lsb();
@@ -109,7 +110,8 @@ fn a_proved_least_error_is_that_of_trying_everything_nearby() {
                 monomials: Some(kind),
                 input: Format::q(1, input),
                 output: Format::q(2, output),
-                coefficients: Some(Format::q(3, own)),
+                coefficients: vec![Format::q(3, own)],
+                evaluation: Default::default(),
                 intermediate: None,
                 form: job::Asked::Polynomial,
                 bound: None,
@@ -123,7 +125,7 @@ fn a_proved_least_error_is_that_of_trying_everything_nearby() {
             let (low, high) = ((a / lsb).ceil() as i128, (b / lsb).floor() as i128);
             let codes = codes(request.input, low, high.min(request.input.max_raw()));
             let format = Format::q(3, own);
-            let chosen = choose(&f, codes, &request, kind, degree, format).unwrap();
+            let chosen = choose(&f, codes, &request, kind, degree, format.into()).unwrap();
             let formats = Formats {
                 intermediate: Target::signed(62, chosen.form.formats.intermediate.fraction_bits),
                 ..chosen.form.formats

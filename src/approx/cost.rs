@@ -104,14 +104,15 @@ fn rom_bytes(settled: &Settled) -> u64 {
         .sum();
     let constants = match &settled.form {
         Form::Polynomial(p) => {
-            let count = p.monomials.exponents(p.coefficients.len() - 1).len();
-            let bytes = match p.formats.coefficients.bits() {
+            let degree = p.coefficients.len().saturating_sub(1);
+            let formats = p.formats.coefficients.each(p.monomials, degree);
+            let bytes = formats.iter().map(|format| match format.bits() {
                 0..=8 => 1,
                 9..=16 => 2,
                 17..=32 => 4,
                 _ => 8,
-            };
-            count * bytes
+            });
+            bytes.sum()
         }
         _ => 0,
     };

@@ -25,6 +25,8 @@ pub(super) struct Evaluation {
     narrow: bool,
     /// Code, function, factor of the error.
     points: Vec<(i128, f64, f64)>,
+    /// The largest of the factors.
+    most_factor: f64,
     /// Places in `points` to look at first.
     worst: RefCell<Vec<usize>>,
 }
@@ -56,6 +58,7 @@ impl Evaluation {
             monomials,
             degree,
             narrow: settled.bits <= NARROW_BITS,
+            most_factor: points.iter().map(|p| p.2).fold(0.0, f64::max),
             points,
             worst: RefCell::new(Vec::new()),
         }
@@ -135,8 +138,7 @@ impl Datapath for Evaluation {
         };
         let codes = self.formats.codes;
         let steps = form.evaluation_bound(codes.low, codes.high);
-        let factor = self.points.iter().map(|p| p.2).fold(0.0, f64::max);
-        (steps + 0.5 * self.formats.output.lsb()) * factor
+        (steps + 0.5 * self.formats.output.lsb()) * self.most_factor
     }
 
     fn slabs(&self, raw: &[i128], limit: f64, count: usize) -> Slabs {

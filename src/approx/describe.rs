@@ -1,7 +1,7 @@
 //! A form for the report: in words, and its data.
 
 use super::form::Form;
-use super::form::polynomial::Monomials;
+use super::form::polynomial::{Monomials, Scheme};
 use super::form::split::{Spacing, Split};
 use super::form::table::Kind;
 use super::job::Request;
@@ -40,9 +40,13 @@ pub(super) fn detail(form: &Form) -> String {
                 Monomials::Odd => "odd ",
                 Monomials::Even => "even ",
             };
+            let estrin = match p.formats.scheme {
+                Scheme::Horner => "",
+                Scheme::Estrin => ", by Estrin's scheme",
+            };
             format!(
-                "{kind}polynomial of degree {degree}, coefficients {}",
-                p.formats.coefficients
+                "{kind}polynomial of degree {degree}, coefficients {}{estrin}",
+                p.formats.coefficients.name(p.monomials, degree)
             )
         }
         Form::Piecewise(p) => {
@@ -77,7 +81,9 @@ pub(super) fn formats(form: &Form, request: &Request) -> Formats {
     };
     let (coefficients, intermediate) = match form {
         Form::Polynomial(p) => (
-            p.formats.coefficients.to_string(),
+            p.formats
+                .coefficients
+                .name(p.monomials, p.coefficients.len().saturating_sub(1)),
             Some(signed(p.formats.intermediate)),
         ),
         Form::Piecewise(p) => {
@@ -114,12 +120,12 @@ pub(super) fn data(form: &Form) -> (Option<Vec<Word>>, Option<TableData>) {
     };
     match form {
         Form::Polynomial(p) => {
-            let lsb = p.formats.coefficients.lsb();
-            let word = |raw: &i128| Word {
+            let word = |(order, raw): (usize, &i128)| Word {
                 raw: *raw,
-                value: *raw as f64 * lsb,
+                value: *raw as f64 * p.formats.coefficients.of(order).lsb(),
             };
-            (Some(p.coefficients.iter().map(word).collect()), None)
+            let words = p.coefficients.iter().enumerate().map(word);
+            (Some(words.collect()), None)
         }
         Form::Piecewise(p) => {
             let tables: Vec<_> = p.tables.iter().collect();

@@ -5,9 +5,11 @@ use super::choice::{self, Candidate, Wanted};
 use super::coefficients::{self, Chosen};
 use super::cost::{Cost, Target};
 use super::describe;
+use super::form::coefficient_formats::CoefficientFormats;
 use super::form::measure::{Effort, Measured, SAMPLE, measure};
-use super::form::polynomial::{self, Monomials, Polynomial};
+use super::form::polynomial::{self, Monomials, Polynomial, Scheme};
 use super::form::{Codes, Form, Settled, overflow};
+use super::ideal;
 use super::outcome::{ErrorBounds, Outcome};
 use super::reference::Function;
 use crate::emit::manifest::sha256;
@@ -62,10 +64,12 @@ pub struct Request {
     pub input: Format,
     /// Of the output.
     pub output: Format,
-    /// Of coefficients or entries.
-    pub coefficients: Option<Format>,
+    /// Of coefficients or entries; of a polynomial one for all or one a monomial, lowest order first; none = chosen.
+    pub coefficients: Vec<Format>,
     /// Of the cast after each step.
     pub intermediate: Option<Format>,
+    /// The order of a polynomial's steps.
+    pub evaluation: Scheme,
     /// Which form.
     pub form: Asked,
     /// The most that the certified error may be.
@@ -92,9 +96,17 @@ impl Request {
             "domain = {}, {}\ndegree = {:?}\nmonomials = {:?}\ninput = {}\noutput = {}\n",
             self.domain[0], self.domain[1], self.degree, self.monomials, self.input, self.output
         );
+        let formats: Vec<String> = self.coefficients.iter().map(Format::to_string).collect();
+        let list = match formats.as_slice() {
+            [] => "chosen".to_owned(),
+            some => some.join(","),
+        };
+        if self.evaluation != Scheme::default() {
+            text += &format!("evaluation = {:?}\n", self.evaluation);
+        }
         text += &format!(
             "coefficients = {}\nintermediate = {}\nform = {:?}\nbound = {:?}\nweight = {:?}\ntarget = {:?}\nname = {}\n",
-            some(self.coefficients),
+            list,
             some(self.intermediate),
             self.form,
             self.bound,
@@ -148,6 +160,12 @@ pub fn approximate(
     let measured = measure(&settled, &function, &effort)?;
     let alternatives = candidates.map(|(all, chosen)| choice::alternatives(&all, chosen));
     let (coefficients, table) = describe::data(&settled.form);
+    let ideal = match (&settled.form, &search) {
+        (Form::Polynomial(p), Some(search)) => {
+            ideal::ideal(search, p, measured.data_only, &function)
+        }
+        _ => None,
+    };
     let outcome = Outcome {
         schema: "gyrogen.approx/1",
         version: env!("CARGO_PKG_VERSION"),
@@ -162,6 +180,10 @@ pub fn approximate(
             Form::Polynomial(p) => Some(p.monomials),
             _ => None,
         },
+        evaluation: match &settled.form {
+            Form::Polynomial(p) => Some(p.formats.scheme),
+            _ => None,
+        },
         formats: describe::formats(&settled.form, request),
         coefficients,
         table,
@@ -171,6 +193,7 @@ pub fn approximate(
         cost: Cost::of(&settled, request.target),
         target: request.target,
         search,
+        ideal,
         alternatives,
         bound: request.bound,
         holds: request
@@ -221,7 +244,7 @@ fn choose(request: &Request, function: &Function, codes: Codes) -> Result<Choice
     if let Form::Polynomial(p) = &form {
         let degree = p.coefficients.len() - 1;
         let asked = Request {
-            coefficients: Some(p.formats.coefficients),
+            coefficients: p.formats.coefficients.each(p.monomials, degree),
             ..request.clone()
         };
         let (better, found) = polynomial_as_asked(function, codes, &asked, p.monomials, degree)?;
@@ -257,10 +280,11 @@ fn polynomial_as_asked(
     kind: Monomials,
     degree: usize,
 ) -> Result<(Form, super::outcome::Search)> {
-    let format = request
-        .coefficients
-        .unwrap_or(Format::q(2, request.output.fraction_bits));
-    let chosen = coefficients::choose(function, codes, request, kind, degree, format)?;
+    let formats = match request.coefficients.as_slice() {
+        [] => Format::q(2, request.output.fraction_bits).into(),
+        some => CoefficientFormats::new(some, kind, degree)?,
+    };
+    let chosen = coefficients::choose(function, codes, request, kind, degree, formats)?;
     let Chosen { form, search } = chosen;
     Ok((Form::Polynomial(Box::new(form)), search))
 }
@@ -278,7 +302,7 @@ pub(super) fn polynomial_within(
     let room = bound - 0.5 * request.output.lsb();
     let (format, raw) = coefficients::within(function, request, kind, degree, room)?;
     Some(Form::Polynomial(Box::new(
-        compiled(codes, request, kind, format, raw).ok()?,
+        compiled(codes, request, kind, format.into(), raw).ok()?,
     )))
 }
 
@@ -287,18 +311,22 @@ pub(super) fn compiled(
     codes: Codes,
     request: &Request,
     kind: Monomials,
-    coefficients: Format,
+    coefficients: CoefficientFormats,
     raw: Vec<i128>,
 ) -> Result<Polynomial> {
     let intermediate = match request.intermediate {
         Some(format) => format,
-        None => polynomial::choose_intermediate(codes, coefficients, request.output, kind, &raw)?,
+        None => {
+            let to = (request.output, request.evaluation);
+            polynomial::choose_intermediate(codes, coefficients, to, kind, &raw)?
+        }
     };
     let formats = polynomial::Formats {
         codes,
         coefficients,
         intermediate: Quantised::from(intermediate),
         output: request.output,
+        scheme: request.evaluation,
     };
     Polynomial::new(formats, kind, raw)
 }

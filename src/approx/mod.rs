@@ -13,6 +13,7 @@ pub mod cost;
 mod datapath;
 mod describe;
 pub mod form;
+pub mod ideal;
 pub mod job;
 pub mod minimax;
 pub mod outcome;

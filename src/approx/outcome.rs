@@ -1,7 +1,7 @@
 //! `approx.json` (`gyrogen.approx/1`): what was made and how accurate it is.
 
 use super::cost::Cost;
-use super::form::polynomial::Monomials;
+use super::form::polynomial::{Monomials, Scheme};
 use super::form::split::{Spacing, Symmetry};
 use serde::Serialize;
 
@@ -29,6 +29,9 @@ pub struct Outcome {
     /// Of a polynomial: which orders it has.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub monomials: Option<Monomials>,
+    /// Of a polynomial: the order of its steps.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub evaluation: Option<Scheme>,
     /// Formats, as given or chosen.
     pub formats: Formats,
     /// Of a polynomial: from order 0 to the degree; zeros where the monomials have none.
@@ -51,6 +54,9 @@ pub struct Outcome {
     /// How the coefficients were found.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub search: Option<Search>,
+    /// The coefficients that are best by themselves.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ideal: Option<super::ideal::Ideal>,
     /// Where a bound was given: each form that meets it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub alternatives: Option<Vec<Alternative>>,

@@ -6,6 +6,7 @@ use super::compensation::{Bias, Rate};
 use super::cordic::Vectoring;
 use super::decimator::{Cic, CicState, Decimate, Integrate};
 use super::demodulator::Mixer;
+use super::in_range::InRange;
 use super::nco::{Detuning, Oscillator, OscillatorState, Retune};
 use super::phase_loop::{PhaseLoop, PhaseLoopState};
 use crate::design::{Circuit, Compensation, CompensationInput, Design};
@@ -31,6 +32,8 @@ pub struct Chain<const N: usize> {
     pub cordic: Vectoring,
     /// The compensation, where its thermometer is the chain's own.
     pub compensation: Option<(Bias, Rate)>,
+    /// Whether the thermometer is inside the calibrated range, where the design asks for it.
+    pub in_range: Option<InRange>,
     /// That thermometer is the tuning word (else the phase).
     by_tuning_word: bool,
     /// The phase loop.
@@ -70,6 +73,8 @@ pub struct Row<W> {
     pub magnitude: W,
     /// Bias and compensated rate.
     pub compensation: Option<[W; 2]>,
+    /// 1 where the thermometer is inside the calibrated range, else 0.
+    pub in_range: Option<W>,
     /// Drive gain.
     pub gain: Option<W>,
 }
@@ -129,6 +134,7 @@ impl<const N: usize> Chain<N> {
             by_tuning_word: of_chain
                 .is_some_and(|c| matches!(c.input, CompensationInput::TuningWord(_))),
             compensation: of_chain.map(|c| (Bias::new(circuit, c), Rate::new(circuit, c))),
+            in_range: of_chain.and_then(|c| InRange::new(circuit, c)),
             phase_loop: circuit
                 .phase_loop
                 .as_ref()
@@ -279,6 +285,7 @@ impl<const N: usize> Chain<N> {
         }
         let [drive_i, drive_q, sense_i, _] = channels;
         let [phase, magnitude] = ar.call(&self.cordic, "", &mut (), [drive_i, drive_q]);
+        let mut in_range = None;
         let compensation = self.compensation.as_ref().map(|(bias, rate)| {
             let thermometer = if self.by_tuning_word {
                 ar.call(&Detuning(&self.nco), "nco", &mut fast.oscillator, [])
@@ -287,6 +294,10 @@ impl<const N: usize> Chain<N> {
             };
             let [bias] = ar.call(bias, "", &mut (), thermometer);
             let [rate] = ar.call(rate, "", &mut (), [sense_i, bias]);
+            if let Some(block) = &self.in_range {
+                let [inside] = ar.call(block, "", &mut (), thermometer);
+                in_range = Some(inside);
+            }
             [bias, rate]
         });
         if let (Some(block), Some(state)) = (&self.phase_loop, &mut slow.phase_loop) {
@@ -310,6 +321,7 @@ impl<const N: usize> Chain<N> {
             phase,
             magnitude,
             compensation,
+            in_range,
             gain,
         }
     }
@@ -348,6 +360,13 @@ fn meanings(circuit: &Circuit, compensation: Option<&Compensation>) -> Vec<Port>
         Some(l) => Port::new(
             "gain",
             format!("drive gain in units of 2^-{}", l.gain_bits - 1),
+        ),
+        None => absent.clone(),
+    });
+    ports.push(match compensation.and_then(Compensation::flagged_range) {
+        Some((low, high)) => Port::new(
+            "in_range",
+            format!("1 if the thermometer is within {low} .. {high}, else 0"),
         ),
         None => absent,
     });
@@ -391,7 +410,7 @@ impl<A: Arithmetic, const N: usize> Block<A, 2, 0> for Sample<'_, N> {
     }
 }
 
-impl<A: Arithmetic, const N: usize> Block<A, 0, 9> for Period<'_, N> {
+impl<A: Arithmetic, const N: usize> Block<A, 0, 10> for Period<'_, N> {
     type State = ChainState<A::Residue, A::Word, N>;
     const NAME: &'static str = "period";
     const STATE: &'static str = "chain";
@@ -400,16 +419,18 @@ impl<A: Arithmetic, const N: usize> Block<A, 0, 9> for Period<'_, N> {
         []
     }
 
-    fn outputs(&self) -> [Port; 9] {
+    fn outputs(&self) -> [Port; 10] {
         std::array::from_fn(|k| self.0.meanings[k].clone())
     }
 
-    fn step(&self, ar: &A, state: &mut Self::State, []: [A::Word; 0]) -> [A::Word; 9] {
+    fn step(&self, ar: &A, state: &mut Self::State, []: [A::Word; 0]) -> [A::Word; 10] {
         let row = self.0.period(ar, &mut state.fast, &mut state.slow);
         let [a, b, c, d] = row.channels;
         let absent = row.phase;
         let [bias, rate] = row.compensation.unwrap_or([absent; 2]);
         let gain = row.gain.unwrap_or(absent);
-        [a, b, c, d, row.phase, row.magnitude, bias, rate, gain]
+        let in_range = row.in_range.unwrap_or(absent);
+        let (phase, magnitude) = (row.phase, row.magnitude);
+        [a, b, c, d, phase, magnitude, bias, rate, gain, in_range]
     }
 }

@@ -125,6 +125,17 @@ impl Bias {
 }
 
 impl Bias {
+    /// Fraction bits of the thermometer's word as it comes.
+    pub fn input_fraction_bits(&self) -> i32 {
+        self.input_fraction_bits
+    }
+
+    /// What the thermometer's word is, for emitted code.
+    pub fn input_meaning(&self) -> &str {
+        let [input, _] = &self.meanings;
+        input
+    }
+
     /// Every cast, in a fixed order.
     pub fn casts_mut(&mut self) -> Vec<&mut Cast> {
         let mut casts = vec![

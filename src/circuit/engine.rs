@@ -84,6 +84,9 @@ pub fn columns(design: &Design) -> Vec<&'static str> {
     if design.circuit.amplitude_loop.is_some() {
         columns.push("gain");
     }
+    if has_rate(design) && is_flagged(design) {
+        columns.push("in_range");
+    }
     columns
 }
 
@@ -92,6 +95,11 @@ fn has_rate(design: &Design) -> bool {
         .compensation
         .as_ref()
         .is_some_and(|c| c.input.is_of_chain())
+}
+
+fn is_flagged(design: &Design) -> bool {
+    let compensation = design.compensation.as_ref();
+    compensation.is_some_and(|c| c.flagged_range().is_some())
 }
 
 /// The engine of a design.
@@ -247,6 +255,7 @@ impl<W: HasKernel, R: Lane, const IDLE: bool> Ends for Fixed<W, R, IDLE> {
         rows.extend(row.compensation.map(|[_, rate]| rate.wide()));
         rows.extend(tuning.map(|t| t.wide() & ((1 << phase_bits) - 1)));
         rows.extend(row.gain.map(|g| g.wide()));
+        rows.extend(row.in_range.map(|w| w.wide()));
     }
 }
 
@@ -282,6 +291,7 @@ impl Ends for Float {
         // A turn is the whole 128-bit circle.
         rows.extend(tuning.map(|t| t as u128 as f64 * pow2(-128) * scale.sample_rate_hz));
         rows.extend(row.gain.map(|g| g * scale.gain_lsb));
+        rows.extend(row.in_range);
     }
 }
 

@@ -20,6 +20,7 @@ pub mod cordic;
 pub mod decimator;
 pub mod demodulator;
 pub mod engine;
+pub mod in_range;
 pub mod nco;
 pub mod phase_loop;
 

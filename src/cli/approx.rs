@@ -3,7 +3,7 @@
 use super::OutputFormat;
 use crate::approx::bundle;
 use crate::approx::cost::Target;
-use crate::approx::form::polynomial::Monomials;
+use crate::approx::form::polynomial::{Monomials, Scheme};
 use crate::approx::job::{self, Asked, Request, Weight};
 use crate::approx::outcome::{Outcome, Search};
 use crate::approx::selection::Reason;
@@ -37,12 +37,16 @@ pub struct Arguments {
     /// Format of the output.
     #[arg(long)]
     output: Format,
-    /// Format of the coefficients; with `--bound` chosen if left out.
-    #[arg(long)]
-    coefficients: Option<Format>,
+    /// Format of the coefficients, or one for each of a polynomial's, lowest order first (`Q1.15,Q1.17`); with
+    /// `--bound` chosen if left out.
+    #[arg(long, value_delimiter = ',')]
+    coefficients: Vec<Format>,
     /// Format of the cast after each Horner step; wide if left out.
     #[arg(long)]
     intermediate: Option<Format>,
+    /// The order of a polynomial's steps.
+    #[arg(long, value_enum, default_value = "horner")]
+    evaluation: Scheme,
     /// The form.
     #[arg(long, value_enum, default_value = "polynomial")]
     form: Asked,
@@ -154,7 +158,8 @@ fn request(arguments: &Arguments) -> Result<Request> {
         monomials: arguments.monomials,
         input: arguments.input,
         output: arguments.output,
-        coefficients: arguments.coefficients,
+        coefficients: arguments.coefficients.clone(),
+        evaluation: arguments.evaluation,
         intermediate: arguments.intermediate,
         form: arguments.form,
         bound: arguments.bound,
@@ -187,8 +192,16 @@ fn command(a: &Arguments) -> String {
     push("monomials", a.monomials.as_ref().map(spelled));
     push("input", Some(a.input.to_string()));
     push("output", Some(a.output.to_string()));
-    push("coefficients", a.coefficients.map(|f| f.to_string()));
+    let formats: Vec<String> = a.coefficients.iter().map(Format::to_string).collect();
+    push(
+        "coefficients",
+        (!formats.is_empty()).then(|| formats.join(",")),
+    );
     push("intermediate", a.intermediate.map(|f| f.to_string()));
+    push(
+        "evaluation",
+        (a.evaluation != Scheme::default()).then(|| spelled(&a.evaluation)),
+    );
     let form = (a.form != Asked::default()).then(|| spelled(&a.form));
     push("form", form);
     push("bound", a.bound.map(|b| b.to_string()));
@@ -282,6 +295,14 @@ fn print(o: &Outcome, out: &std::path::Path) {
         (None, None) => {}
     }
     say!("data alone {}", shown(o.error.coefficients_only_max_abs));
+    if let Some(ideal) = o.ideal.as_ref().filter(|i| !i.emitted) {
+        say!(
+            "the best coefficients alone would have {}{}; they are `ideal` in approx.json, and not emitted, for their \
+             whole evaluation is not better",
+            shown(ideal.coefficients_only_max_abs),
+            if ideal.proved_best { " (proved)" } else { "" }
+        );
+    }
     say!(
         "{} bytes, {} multiplications, {} additions, about {} cycles on {}",
         o.cost.rom_bytes,

@@ -3,6 +3,7 @@
 use super::OutputFormat;
 use crate::error::{Error, Result};
 use crate::verify::bundle::{self, Verification};
+use crate::verify::target::Target;
 use std::path::PathBuf;
 
 /// Rebuild a firmware bundle from its own files, run its self-test and vectors.
@@ -21,19 +22,16 @@ pub struct Arguments {
     format: OutputFormat,
 }
 
-#[derive(Debug, Clone, Copy, clap::ValueEnum)]
-enum Target {
-    Host,
-}
-
 /// Runs the command.
 ///
 /// # Errors
-/// A folder that holds no bundle (exit 2); a difference (exit 1).
+/// A folder that holds no bundle, no compiler for the target (exit 2); a difference (exit 1).
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let Target::Host = arguments.target;
-    let command = format!("gyrogen verify {}", arguments.bundle.display());
-    let verification = bundle::verify(&arguments.bundle, &command)?;
+    let mut command = format!("gyrogen verify {}", arguments.bundle.display());
+    if arguments.target != Target::Host {
+        command += &format!(" --target {}", arguments.target.name());
+    }
+    let verification = bundle::verify(&arguments.bundle, arguments.target, &command)?;
     let json = super::json(&verification);
     let folder = arguments.out.as_ref().unwrap_or(&arguments.bundle);
     super::make_folder(folder)?;

@@ -252,9 +252,9 @@ fn outside(t: &Table, c: &Compensation, circuit: &Circuit) -> Result<Outside> {
     let Some(value) = t.get("outside") else {
         return Ok(Outside::Clamp);
     };
-    let kinds = [Outside::Clamp, Outside::HoldSlope].map(|o| (o.name(), o));
+    let kinds = [Outside::Clamp, Outside::HoldSlope, Outside::Flag].map(|o| (o.name(), o));
     let outside = value.choice(&kinds)?;
-    if outside == Outside::Clamp {
+    if outside != Outside::HoldSlope {
         return Ok(outside);
     }
     // Without a calibrated range there is no outside; a fit sets both.

@@ -226,6 +226,8 @@ pub enum Outside {
     Clamp,
     /// The tangent of the nearer end goes on.
     HoldSlope,
+    /// The bias of the nearer end, and a word that says that the input was outside.
+    Flag,
 }
 
 impl Outside {
@@ -234,6 +236,7 @@ impl Outside {
         match self {
             Outside::Clamp => "clamp",
             Outside::HoldSlope => "hold_slope",
+            Outside::Flag => "flag",
         }
     }
 }
@@ -258,6 +261,11 @@ impl CompensationInput {
 }
 
 impl Compensation {
+    /// The calibrated range where the firmware says whether an input is inside (`outside = "flag"`).
+    pub fn flagged_range(&self) -> Option<(i128, i128)> {
+        self.clamp_raw.filter(|_| self.outside == Outside::Flag)
+    }
+
     /// log2 of `rate_full_scale_dps`, which is a power of two.
     pub fn rate_full_scale_exponent(&self) -> i32 {
         self.rate_full_scale_dps.log2().round() as i32

@@ -5,6 +5,7 @@ use super::lower::lower;
 use super::machine::{Lowered, Type, residue_type, word_type};
 use crate::circuit::compensation::{Bias, Rate};
 use crate::circuit::engine;
+use crate::circuit::in_range::InRange;
 use crate::design::Design;
 use crate::numeric::arithmetic::{Arithmetic, Block, Port};
 use crate::numeric::trace::Trace;
@@ -143,13 +144,22 @@ pub fn compensation_alone(design: &Design) -> Option<(Bias, Rate)> {
     Some((bias, rate))
 }
 
-/// The compensation alone as a program: `bias`, `rate`, `compensate`.
+/// The flag of the calibrated range, where the design asks for it.
+pub fn in_range(design: &Design) -> Option<InRange> {
+    let compensation = design.compensation.as_ref()?;
+    InRange::new(&design.circuit, compensation)
+}
+
+/// The compensation alone as a program: `bias`, `rate`, `compensate`, and `in_range` with `outside = "flag"`.
 pub fn trace_compensation(design: &Design) -> Program {
     let trace = Trace::new();
     if let Some((bias, rate)) = compensation_alone(design) {
         let block = Compensate { bias, rate };
         let ranges = [block.bias.input_range, block.rate.input_range];
         trace.record(&block, &(), ranges);
+        if let Some(flag) = in_range(design) {
+            trace.record(&flag, &(), [flag.input_range]);
+        }
     }
     trace.finish()
 }

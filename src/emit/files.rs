@@ -4,7 +4,7 @@ use super::bundle::{Bundle, Part};
 use super::machine::{Type, Width};
 use super::manifest::{self, Header, Manifest};
 use super::views::{self, FunctionView, Language, StateView, StructView, TableView, mix};
-use super::{c, rust};
+use super::{c, calibrated, rust};
 use crate::approx::bias::certainty;
 use crate::circuit::engine::{self, ArithmeticKind, Rows};
 use crate::design::Design;
@@ -106,6 +106,7 @@ pub fn emit(
             .help("add a [compensation] table, or emit `--part chain`")
             .into());
     }
+    calibrated::refuse_flag_without_range(design)?;
     let mut bundle = Bundle::new(design, part);
     // Words so long that the polynomial cannot be enclosed have no such line.
     if let Ok(Some(bounds)) = certainty::bounds(design) {
@@ -129,7 +130,8 @@ pub fn emit(
         has_code: part != Part::Tables,
         columns: &engine::columns(design),
     };
-    let manifest = Manifest::new(&header, &bundle, &view.tables, &view.functions, &files);
+    let mut manifest = Manifest::new(&header, &bundle, &view.tables, &view.functions, &files);
+    manifest.calibrated = calibrated::Calibrated::of(design);
     files.push(EmittedFile {
         path: manifest::NAME.into(),
         text: manifest.to_json(),
@@ -401,6 +403,7 @@ fn vectors(design: &Design, bundle: &Bundle, models: &[Model]) -> Vec<EmittedFil
         header.push("fault");
         let mut text = header.join(",") + "\n";
         let mut inputs = stimulus::inputs(&model.inputs, VECTORS, SEED);
+        inputs.extend(calibrated::about_the_ends(design, model));
         let candidates = stimulus::inputs(&model.inputs, CANDIDATES, SEED + 4);
         inputs.extend(model.near_ties(&candidates));
         inputs.extend(model.fault_edges(&candidates));

@@ -36,6 +36,9 @@ pub struct Manifest {
     pub chain: Option<ChainEntry>,
     /// Casts whose overflow is an error, by fault number.
     pub faults: Vec<FaultEntry>,
+    /// The compensation's calibrated range, where one is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibrated: Option<super::calibrated::Calibrated>,
     /// Every other file.
     pub files: Vec<FileEntry>,
 }
@@ -180,6 +183,7 @@ pub fn facts(design: &Design, bundle: &Bundle) -> Vec<String> {
                 let outside = match k.outside {
                     Outside::Clamp => "the input is clamped",
                     Outside::HoldSlope => "the slope of the nearer end is held",
+                    Outside::Flag => "the input is clamped and in_range is 0",
                 };
                 format!("calibrated for inputs {low} .. {high}; outside, {outside}")
             }
@@ -286,6 +290,7 @@ impl Manifest {
                     node: cast.label.to_string(),
                 })
                 .collect(),
+            calibrated: None,
             files: files
                 .iter()
                 .map(|f| FileEntry {

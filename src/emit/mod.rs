@@ -4,6 +4,7 @@
 
 pub mod bundle;
 pub mod c;
+pub mod calibrated;
 pub mod files;
 pub mod function;
 pub mod lower;

@@ -160,6 +160,9 @@ impl<'a, W: HasKernel, R: Lane, const N: usize> Running<'a, W, R, N> {
             raw.push(gain.raw);
             real.push(gain.real);
         }
+        // A word without a rounding: where float and fixed thermometers lie on both sides of an end, that of fixed.
+        raw.extend(row.in_range.map(|w| w.raw));
+        real.extend(row.in_range.map(|w| w.real));
         rows(&raw, &real);
     }
 

@@ -105,6 +105,7 @@ mod tests {
                 c.input = input;
                 c.coefficients_raw = vec![1, -2, 3, -4];
                 c.clamp_raw = Some((-5, 6));
+                c.outside = Outside::Flag;
                 c.fitted = Some(Fitted {
                     coefficients_dps: vec![1.5, -0.1, 1e-300, 4e9],
                     std_max_dps: 0.0,

@@ -1,6 +1,7 @@
 //! Verifies a bundle from its own files alone: checksums, build, self-test, tables, vectors.
 
 use super::compare::{self, Compared};
+use super::target::{self, Target};
 use super::toolchain;
 use crate::emit::manifest::{self, Manifest};
 use crate::emit::views::Language;
@@ -45,17 +46,25 @@ pub struct Vectors {
     pub mismatches: u64,
 }
 
-/// Verifies the bundle in `folder` on this machine.
+/// Verifies the bundle in `folder` on this machine, or for another processor under emulation.
 ///
 /// # Errors
-/// A folder that holds no bundle, vectors that cannot be read, no compiler; code that does not
-/// compile.
-pub fn verify(folder: &Path, command: &str) -> Result<Verification> {
+/// A folder that holds no bundle, vectors that cannot be read, no compiler or emulator; a bundle in Rust for another
+/// processor; code that does not compile.
+pub fn verify(folder: &Path, target: Target, command: &str) -> Result<Verification> {
     let manifest = read_manifest(folder)?;
     let language = match manifest.language.as_str() {
         "c" => Language::C,
         _ => Language::Rust,
     };
+    if language == Language::Rust && target != Target::Host {
+        return Err(InputError::new(format!(
+            "this bundle is in Rust, and {} is verified with the C bundle",
+            target.name()
+        ))
+        .help("verify the C bundle for this target (both are the same operations), or this one with `--target host`")
+        .into());
+    }
     let changed_files = changed(&manifest, folder);
     let mut functions = Vec::new();
     let mut toolchain_name = String::from("none: the part `tables` has nothing to run");
@@ -63,7 +72,10 @@ pub fn verify(folder: &Path, command: &str) -> Result<Verification> {
     let sources: Vec<String> = manifest.files.iter().map(|f| f.path.clone()).collect();
     let harness_source = |path: &String| path.contains("harness");
     if sources.iter().any(harness_source) {
-        let harness = toolchain::build(language, &manifest.prefix, folder, &sources)?;
+        let harness = match target::build(target, folder, &sources)? {
+            Some(emulated) => emulated,
+            None => toolchain::build(language, &manifest.prefix, folder, &sources)?,
+        };
         let status = harness.run(&["selftest".to_owned()], Vec::new(), 1, &mut |_| ())?;
         selftest = Some(status == Some(0));
         toolchain_name = harness.toolchain.clone();
@@ -120,7 +132,7 @@ pub fn verify(folder: &Path, command: &str) -> Result<Verification> {
         version: env!("CARGO_PKG_VERSION"),
         design_sha256: manifest.design_sha256,
         command: command.to_owned(),
-        target: "host".into(),
+        target: target.name().into(),
         toolchain: toolchain_name,
         holds: changed_files.is_empty() && selftest != Some(false) && vectors.mismatches == 0,
         changed_files,

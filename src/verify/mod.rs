@@ -6,4 +6,5 @@ pub mod bundle;
 pub mod compare;
 pub mod model;
 pub mod stimulus;
+pub mod target;
 pub mod toolchain;

@@ -218,6 +218,12 @@ fn of_chain<const N: usize>(chain: &Chain<N>, design: &Design, program: &Program
                 .with_damage(nudged(bias, Bias::casts_mut), narrow),
             ("rate", Some((_, rate))) => Model::new(function, rate.clone(), narrow)
                 .with_damage(nudged(rate, Rate::casts_mut), narrow),
+            ("in_range", _) => {
+                let Some(flag) = crate::emit::bundle::in_range(design) else {
+                    continue;
+                };
+                Model::new(function, flag, narrow)
+            }
             ("compensate", Some((bias, rate))) => {
                 let (bias, rate) = (bias.clone(), rate.clone());
                 // The callees' words count too.

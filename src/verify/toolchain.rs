@@ -26,6 +26,8 @@ pub const RUST_FLAGS: [&str; 5] = ["--edition", "2021", "-O", "-D", "warnings"];
 #[derive(Debug)]
 pub struct Harness {
     program: PathBuf,
+    /// Runs the program, where this machine does not.
+    emulator: Option<&'static str>,
     /// First line of the compiler's version and the flags.
     pub toolchain: String,
     // Removed with the harness.
@@ -86,6 +88,7 @@ pub fn build(
     };
     Ok(Harness {
         program,
+        emulator: None,
         toolchain,
         _folder: made,
     })
@@ -123,7 +126,7 @@ fn compiler(language: Language) -> Result<String> {
     }
 }
 
-fn version(compiler: &str) -> String {
+pub(super) fn version(compiler: &str) -> String {
     let output = Command::new(compiler).arg("--version").output();
     let text = output.map(|o| String::from_utf8_lossy(&o.stdout).into_owned());
     let line = text
@@ -139,7 +142,7 @@ fn version(compiler: &str) -> String {
     }
 }
 
-fn compile(mut command: Command, what: &str) -> Result<()> {
+pub(super) fn compile(mut command: Command, what: &str) -> Result<()> {
     let output = command
         .stdin(Stdio::null())
         .output()
@@ -156,6 +159,21 @@ fn compile(mut command: Command, what: &str) -> Result<()> {
 }
 
 impl Harness {
+    /// A driver that an emulator runs; `folder` is removed with it.
+    pub(super) fn emulated(
+        emulator: &'static str,
+        program: PathBuf,
+        toolchain: String,
+        folder: TempDir,
+    ) -> Harness {
+        Harness {
+            program,
+            emulator: Some(emulator),
+            toolchain,
+            _folder: folder,
+        }
+    }
+
     /// Runs the driver with these arguments and input; hands its output to `each`, record by record
     /// of `record` 64-bit words. Gives the exit status.
     ///
@@ -169,7 +187,15 @@ impl Harness {
         each: &mut dyn FnMut(&[u64]),
     ) -> Result<Option<i32>> {
         let failed = |e: std::io::Error| io_error(&self.program, "run the test driver", &e);
-        let mut child = Command::new(&self.program)
+        let mut command = match self.emulator {
+            Some(emulator) => {
+                let mut command = Command::new(emulator);
+                command.arg(&self.program);
+                command
+            }
+            None => Command::new(&self.program),
+        };
+        let mut child = command
             .args(arguments)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())

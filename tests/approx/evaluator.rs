@@ -21,9 +21,11 @@ struct Format {
 enum Shape {
     Polynomial {
         coefficients: Vec<i128>,
-        own: i32,
+        /// Fraction bits, one a coefficient.
+        own: Vec<i32>,
         inner: Format,
         kind: String,
+        estrin: bool,
     },
     Segments {
         kind: String,
@@ -49,6 +51,25 @@ fn format(text: &str) -> Format {
         bits: (m + n) as u32,
         fraction_bits: n,
     }
+}
+
+/// The fraction bits of every coefficient from order 0: one format for all, or one a monomial.
+fn own(formats: &str, json: &Value) -> Vec<i32> {
+    let count = json["coefficients"].as_array().unwrap().len();
+    let each: Vec<i32> = formats
+        .split(',')
+        .map(|f| format(f).fraction_bits)
+        .collect();
+    let (step, lowest) = match json["monomials"].as_str().unwrap() {
+        "all" => (1, 0),
+        "odd" => (2, 1),
+        _ => (2, 0),
+    };
+    let mut all = vec![each[0]; count];
+    for (k, order) in (lowest..count).step_by(step).enumerate() {
+        all[order] = each[k % each.len()];
+    }
+    all
 }
 
 impl Format {
@@ -84,7 +105,8 @@ impl Evaluator {
                     .iter()
                     .map(|c| number(&c["raw"]))
                     .collect(),
-                own: format(&text(&formats["coefficients"])).fraction_bits,
+                own: own(&text(&formats["coefficients"]), json),
+                estrin: text(&json["evaluation"]) == "estrin",
                 inner: format(&text(&formats["intermediate"])),
                 kind: text(&json["monomials"]),
             },
@@ -140,33 +162,63 @@ impl Evaluator {
                 own,
                 inner,
                 kind,
-            } => self.polynomial(x, coefficients, *own, *inner, kind),
+                estrin,
+            } => {
+                let words: Vec<(i128, i32)> = coefficients
+                    .iter()
+                    .copied()
+                    .zip(own.iter().copied())
+                    .collect();
+                self.polynomial(x, &words, *inner, kind, *estrin)
+            }
             Shape::Segments { .. } => self.segments(x),
         }
     }
 
-    fn polynomial(&self, x: i128, c: &[i128], own: i32, inner: Format, kind: &str) -> i128 {
+    /// `c`: each coefficient, from order 0, with its fraction bits.
+    fn polynomial(
+        &self,
+        x: i128,
+        c: &[(i128, i32)],
+        inner: Format,
+        kind: &str,
+        estrin: bool,
+    ) -> i128 {
         let n = self.input_bits;
         let (step, lowest) = match kind {
             "all" => (1, 0),
             "odd" => (2, 1),
             _ => (2, 0),
         };
-        let orders: Vec<usize> = (lowest..c.len()).step_by(step).collect();
-        let mut orders = orders.into_iter().rev();
-        let (z, z_bits) = match step {
+        let mut words: Vec<(i128, i32)> = c.iter().copied().skip(lowest).step_by(step).collect();
+        let mut v = match step {
             1 => (x, n),
             _ => (inner.cast(x * x, 2 * n), inner.fraction_bits),
         };
-        let mut t = c[orders.next().unwrap()];
-        let mut t_bits = own;
-        for order in orders {
-            // Both on the finer of the two scales: exact.
-            let bits = (t_bits + z_bits).max(own);
-            let product = (t * z) << (bits - t_bits - z_bits);
-            t = inner.cast(product + (c[order] << (bits - own)), bits);
-            t_bits = inner.fraction_bits;
+        // t v + c, both on the finer of the two scales: exact until the cast.
+        let next = |t: (i128, i32), v: (i128, i32), c: (i128, i32)| {
+            let bits = (t.1 + v.1).max(c.1);
+            let product = (t.0 * v.0) << (bits - t.1 - v.1);
+            let sum = product + (c.0 << (bits - c.1));
+            (inner.cast(sum, bits), inner.fraction_bits)
+        };
+        while words.len() > 1 {
+            if estrin {
+                let pairs = words.chunks(2);
+                words = pairs
+                    .map(|pair| match *pair {
+                        [low, high] => next(high, v, low),
+                        [one] => one,
+                        _ => unreachable!(),
+                    })
+                    .collect();
+                v = (inner.cast(v.0 * v.0, 2 * v.1), inner.fraction_bits);
+            } else {
+                let (t, c) = (words.pop().unwrap(), words.pop().unwrap());
+                words.push(next(t, v, c));
+            }
         }
+        let (t, t_bits) = words[0];
         match kind {
             "odd" => self.output.cast(t * x, t_bits + n),
             _ => self.output.cast(t, t_bits),

@@ -33,7 +33,7 @@ pub struct Bounds {
 /// What the firmware does outside the calibrated range.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Beyond {
-    /// `clamp` or `hold_slope`.
+    /// `clamp`, `hold_slope` or `flag`.
     pub contract: &'static str,
     /// Largest distance from the polynomial continued to every word that can come in, deg/s. Nothing was
     /// measured there: the polynomial is a guess itself.
@@ -211,7 +211,7 @@ fn beyond(evaluation: &Evaluation, wanted: &[f64]) -> Result<Option<Beyond>> {
         let value = evaluation.bias_dps(end);
         // The emitted word is on this line but for the rounding of the end's word, of the rise and of its own.
         let (slope, rounding) = match c.outside {
-            Outside::Clamp => (0.0, 0.0),
+            Outside::Clamp | Outside::Flag => (0.0, 0.0),
             Outside::HoldSlope => (
                 evaluation.slope_dps(end),
                 2.0 * evaluation.output_bound_dps() + evaluation.step_bound_dps(),
@@ -268,6 +268,12 @@ pub fn sentences(design: &Design, bounds: &Bounds) -> Vec<String> {
         lines.push(format!(
             "the fit itself: noise {:.3e} deg/s (one standard deviation), held-out rms {:.3e} deg/s",
             fitted.std_max_dps, fitted.heldout_rms_dps
+        ));
+    }
+    if let Some((low, high)) = c.flagged_range() {
+        lines.push(format!(
+            "guaranteed: in_range is 1 for the inputs {low} .. {high}, for which the bound above holds, and 0 for every \
+             other one, for which no error is promised: the bias is that of the nearer end"
         ));
     }
     if let Some(outside) = &bounds.outside {

@@ -1,6 +1,6 @@
 //! The bounds against the bias itself, on random polynomials in random formats.
 
-use super::certainty::{bounds, certainty};
+use super::certainty::{bounds, certainty, sentences};
 use super::{Evaluation, coefficients};
 use crate::design::{Design, Fitted, Outside, reader};
 use crate::numeric::format::{Format, Rounding};
@@ -119,6 +119,17 @@ fn beyond_the_range_the_slope_is_held_and_the_worst_is_stated() {
         let mut design = random(seed);
         let clamped = bounds(&design).unwrap().unwrap().outside.unwrap();
         assert_eq!(clamped.contract, "clamp");
+        let c = design.compensation.as_mut().unwrap();
+        c.outside = Outside::Flag;
+        let found = bounds(&design).unwrap().unwrap();
+        // The bias is that of `clamp`; what is promised is said.
+        let flagged = found.outside.clone().unwrap();
+        assert_eq!(
+            (flagged.contract, flagged.worst_dps),
+            ("flag", clamped.worst_dps)
+        );
+        let said = sentences(&design, &found).join("\n");
+        assert!(said.contains("in_range is 1 for the inputs"), "{said}");
         let c = design.compensation.as_mut().unwrap();
         c.outside = Outside::HoldSlope;
         c.coefficient_format.integer_bits += 6;

@@ -101,7 +101,7 @@ pub fn measure(settled: &Settled, reference: &dyn Reference, effort: &Effort) ->
                 loop {
                     let k = next.fetch_add(1, Ordering::Relaxed);
                     let Some(piece) = pieces.get(k) else { break };
-                    let end = ends(&pieces, k, settled, reference);
+                    let end = ends(&pieces, k, &settled.form, reference);
                     let result = of_piece(
                         settled, reference, piece, end, exhaustive, stride, may_exceed,
                     );
@@ -144,6 +144,16 @@ pub fn measure(settled: &Settled, reference: &dyn Reference, effort: &Effort) ->
     checked(all, settled, reference)
 }
 
+/// sup |f - p| of a form's data alone, proved.
+pub(crate) fn data_only(form: &Form, reference: &dyn Reference) -> f64 {
+    let pieces = form.pieces();
+    let of = |(k, piece): (usize, &Piece)| {
+        let (low, high) = ends(&pieces, k, form, reference);
+        reference.supremum(piece, low, high)
+    };
+    pieces.iter().enumerate().map(of).fold(0.0, f64::max)
+}
+
 /// The same pieces, none of much more than so many codes.
 fn divided(pieces: Vec<Piece>, most: i128) -> Vec<Piece> {
     let parts = |piece: Piece| {
@@ -176,12 +186,12 @@ fn checked(mut all: Measured, settled: &Settled, reference: &dyn Reference) -> R
 }
 
 /// The real interval of piece k.
-fn ends(pieces: &[Piece], k: usize, settled: &Settled, reference: &dyn Reference) -> (f64, f64) {
-    let codes = settled.form.codes();
+fn ends(pieces: &[Piece], k: usize, form: &Form, reference: &dyn Reference) -> (f64, f64) {
+    let codes = form.codes();
     let piece = &pieces[k];
     let (a, b) = reference.domain();
     let (low, high) = (codes.real(piece.low), codes.real(piece.high));
-    if !matches!(settled.form, Form::Polynomial(_)) {
+    if !matches!(form, Form::Polynomial(_)) {
         return (low.max(a), high.min(b));
     }
     // A polynomial goes on between the codes and up to the domain's ends.

@@ -4,10 +4,12 @@
 //! prints its trace. A form also says which exact piecewise polynomial its data stand for ([`Piece`]): what
 //! is left between the two is rounding.
 
+pub mod coefficient_formats;
 pub mod generate;
 pub mod measure;
 pub mod overflow;
 pub mod piecewise;
+pub mod plan;
 pub mod polynomial;
 pub mod split;
 pub mod table;

@@ -1,4 +1,4 @@
-//! One polynomial over the whole domain, by Horner's rule.
+//! One polynomial over the whole domain, by Horner's rule or by Estrin's scheme ([`super::plan`]).
 //!
 //! With x the limited input, c_k the coefficients, `cast_i` and `cast_o` the quantisers to the intermediate and
 //! the output format (half up, saturating):
@@ -10,14 +10,19 @@
 //! | odd | u = cast_i(x x); the same in u with c_n, c_(n-2), .. c_1; y = cast_o(t x) |
 //!
 //! One cast a step, after the multiplication and the addition, which are exact. With all monomials the last step's
-//! cast and the output's both happen.
+//! cast and the output's both happen. Coefficients may have fraction bits of their own: product and coefficient are
+//! aligned to the finer one by appending zeros.
 
+use super::coefficient_formats::CoefficientFormats;
+use super::plan::{Plan, half};
 use super::{Codes, Number, Piece, integer_bits_of};
 use crate::error::{InputError, Result};
 use crate::numeric::arithmetic::Arithmetic;
 use crate::numeric::cast::{Cast, Label, Target};
-use crate::numeric::format::{Format, Overflow, Quantizer, Rounding, pow2};
+use crate::numeric::format::{Format, Overflow, Quantizer, Rounding};
 use crate::numeric::trace::ir::Interval;
+
+pub use super::plan::Scheme;
 
 /// The highest degree.
 pub const HIGHEST_DEGREE: usize = 24;
@@ -25,12 +30,6 @@ pub const HIGHEST_DEGREE: usize = 24;
 const PIECES: i128 = 128;
 /// Covers the rounding of bounds that are computed in `f64`.
 pub(super) const SLACK: f64 = 1.0 + 1e-9;
-
-/// Names of the Horner steps, by the coefficient that they add.
-const STEPS: [&str; HIGHEST_DEGREE + 1] = [
-    "c0", "c1", "c2", "c3", "c4", "c5", "c6", "c7", "c8", "c9", "c10", "c11", "c12", "c13", "c14",
-    "c15", "c16", "c17", "c18", "c19", "c20", "c21", "c22", "c23", "c24",
-];
 
 /// Which monomials a polynomial has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, clap::ValueEnum)]
@@ -61,24 +60,14 @@ impl Monomials {
 pub struct Formats {
     /// The input's codes.
     pub codes: Codes,
-    /// Of every coefficient.
-    pub coefficients: Format,
+    /// Of the coefficients.
+    pub coefficients: CoefficientFormats,
     /// Of the cast after each step.
     pub intermediate: Target,
     /// Of the result.
     pub output: Format,
-}
-
-/// A Horner step.
-#[derive(Debug, Clone)]
-struct Step {
-    /// The coefficient, aligned to `fraction_bits`.
-    coefficient: i128,
-    /// Fraction bits of the sum.
-    fraction_bits: i32,
-    /// Appends zeros to a product with fewer fraction bits than the coefficients.
-    align: Option<Cast>,
-    cast: Cast,
+    /// The order of the steps.
+    pub scheme: Scheme,
 }
 
 /// The polynomial.
@@ -95,8 +84,7 @@ pub struct Polynomial {
     /// Raw coefficients from order 0 to the degree; 0 where the monomials have none.
     pub coefficients: Vec<i128>,
     square: Option<Cast>,
-    leading: i128,
-    steps: Vec<Step>,
+    plan: Plan,
     last: Cast,
 }
 
@@ -118,34 +106,19 @@ impl Polynomial {
         let q = Quantizer::default_of(formats.output);
         let input = formats.codes.format.fraction_bits as i32;
         let inner = formats.intermediate.fraction_bits;
-        let quantise = |label, from| {
-            let (half_up, saturate) = (Rounding::HalfUp, Some(Overflow::Saturate));
-            Cast::new(label, from, 0, formats.intermediate, half_up, saturate)
-        };
         let variable = if monomials == Monomials::All {
             input
         } else {
             inner
         };
-        let own = formats.coefficients.fraction_bits as i32;
-        let mut at = own;
-        let mut steps = Vec::new();
-        for order in exponents.iter().rev().skip(1) {
-            let product = at + variable;
-            let sum = product.max(own);
-            let label = Label::on("polynomial step", STEPS[*order]);
-            let align = (sum > product).then(|| {
-                let target = Target::signed(127, sum);
-                Cast::new(label, product, 0, target, Rounding::Floor, None)
-            });
-            steps.push(Step {
-                coefficient: aligned(coefficients[*order], (sum - own) as u32)?,
-                fraction_bits: sum,
-                align,
-                cast: quantise(label, sum),
-            });
-            at = inner;
-        }
+        let number = |order: &usize| {
+            let own = formats.coefficients.of(*order).fraction_bits as i32;
+            (coefficients[*order], own)
+        };
+        let numbers = exponents.iter().map(number).collect();
+        let (scheme, intermediate) = (formats.scheme, formats.intermediate);
+        let plan = Plan::new(scheme, numbers, &exponents, variable, intermediate)?;
+        let at = plan.fraction_bits;
         let squares = monomials != Monomials::All && exponents.len() > 1;
         let last = if monomials == Monomials::Odd {
             at + input
@@ -157,18 +130,19 @@ impl Polynomial {
             output: formats.output,
             formats,
             monomials,
-            square: squares.then(|| quantise(Label::of("square"), 2 * input)),
-            leading: exponents.last().map_or(0, |order| coefficients[*order]),
-            steps,
+            square: squares.then(|| {
+                let (half_up, saturate) = (Rounding::HalfUp, Some(Overflow::Saturate));
+                let label = Label::of("square");
+                Cast::new(label, 2 * input, 0, intermediate, half_up, saturate)
+            }),
+            plan,
             last: Cast::to(Label::of("output"), last, 0, q),
             coefficients,
         })
     }
 
     pub(super) fn casts_mut(&mut self) -> Vec<&mut Cast> {
-        let steps = self.steps.iter_mut();
-        let steps = steps.flat_map(|s| s.align.iter_mut().chain([&mut s.cast]));
-        let casts = self.square.iter_mut().chain(steps);
+        let casts = self.square.iter_mut().chain(self.plan.casts_mut());
         casts.chain([&mut self.last]).collect()
     }
 
@@ -180,21 +154,7 @@ impl Polynomial {
             Some(cast) => ar.cast(ar.mul(x, x), cast, &[x, x]),
             None => x,
         };
-        let own = self.formats.coefficients.fraction_bits as i32;
-        let mut t = ar.constant(self.leading, own);
-        for step in &self.steps {
-            let product = ar.mul(t, variable);
-            let product = match &step.align {
-                Some(cast) => ar.cast(product, cast, &[t, variable]),
-                None => product,
-            };
-            let c = ar.constant(step.coefficient, step.fraction_bits);
-            let sum = match step.coefficient {
-                0 => product,
-                _ => ar.add(product, c),
-            };
-            t = ar.cast(sum, &step.cast, &[product, c]);
-        }
+        let t = self.plan.evaluate(ar, variable);
         let last = match self.monomials {
             Monomials::Odd => ar.mul(t, x),
             _ => t,
@@ -204,12 +164,11 @@ impl Polynomial {
 
     /// The polynomial over sub-intervals of the domain, with the bound of its evaluation on each.
     pub(super) fn pieces(&self) -> Vec<Piece> {
-        let fraction_bits = self.formats.coefficients.fraction_bits as i32;
-        let number = |raw: &i128| Number {
+        let number = |(order, raw): (usize, &i128)| Number {
             raw: *raw,
-            fraction_bits,
+            fraction_bits: self.formats.coefficients.of(order).fraction_bits as i32,
         };
-        let terms: Vec<Number> = self.coefficients.iter().map(number).collect();
+        let terms: Vec<Number> = self.coefficients.iter().enumerate().map(number).collect();
         split(self.codes.low, self.codes.high, PIECES)
             .map(|(low, high)| Piece {
                 low,
@@ -228,23 +187,11 @@ impl Polynomial {
     /// follows it.
     pub(crate) fn evaluation_bound(&self, low: i128, high: i128) -> f64 {
         let x = self.codes.real(low).abs().max(self.codes.real(high).abs());
-        let half = |cast: &Cast| match cast.shift > 0 {
-            true => pow2(-cast.target.fraction_bits - 1),
-            false => 0.0,
-        };
         let (v, v_error) = match &self.square {
             Some(cast) => (x * x, half(cast)),
             None => (x, 0.0),
         };
-        let lsb = pow2(-(self.formats.coefficients.fraction_bits as i32));
-        let exponents = self.monomials.exponents(self.coefficients.len() - 1);
-        let mut orders = exponents.iter().rev().map(|k| &self.coefficients[*k]);
-        let mut size = orders.next().map_or(0.0, |c| c.unsigned_abs() as f64 * lsb);
-        let mut error = 0.0;
-        for (c, step) in orders.zip(&self.steps) {
-            error = error * (v + v_error) + size * v_error + half(&step.cast);
-            size = size * v + c.unsigned_abs() as f64 * lsb;
-        }
+        let error = self.plan.error_bound(v, v_error);
         let outer = if self.monomials == Monomials::Odd {
             x
         } else {
@@ -256,7 +203,7 @@ impl Polynomial {
     /// Fraction bits with which no step rounds at all.
     pub fn exact_fraction_bits(formats: &Formats, monomials: Monomials, degree: usize) -> i32 {
         let input = formats.codes.format.fraction_bits as i32;
-        let own = formats.coefficients.fraction_bits as i32;
+        let own = formats.coefficients.most_fraction_bits(monomials, degree) as i32;
         let factors = match monomials {
             Monomials::All => degree,
             _ => degree.saturating_sub(1),
@@ -272,22 +219,6 @@ pub(super) fn split(low: i128, high: i128, count: i128) -> impl Iterator<Item = 
     (0..count).map(move |k| (low + size * k / count, low + size * (k + 1) / count - 1))
 }
 
-fn aligned(raw: i128, shift: u32) -> Result<i128> {
-    let room = if raw < 0 {
-        raw.leading_ones()
-    } else {
-        raw.leading_zeros()
-    };
-    if raw != 0 && shift + 2 > room {
-        return Err(InputError::new(format!(
-            "coefficient {raw} aligned by {shift} bits needs more than 126 bits"
-        ))
-        .help("give input or intermediate fewer fraction bits")
-        .into());
-    }
-    Ok(if raw == 0 { 0 } else { raw << shift })
-}
-
 /// The widest intermediate whose products fit 64-bit words; 128-bit words only if nothing narrower keeps the
 /// evaluation's rounding below a thousandth of the output's LSB. Integer bits are those that the
 /// ranges need.
@@ -296,25 +227,27 @@ fn aligned(raw: i128, shift: u32) -> Result<i128> {
 /// No intermediate of up to 64 bits does.
 pub fn choose_intermediate(
     codes: Codes,
-    coefficient_format: Format,
-    output: Format,
+    coefficient_formats: CoefficientFormats,
+    (output, scheme): (Format, Scheme),
     monomials: Monomials,
     coefficients: &[i128],
 ) -> Result<Format> {
     let with = |fraction_bits: i32| {
         let formats = Formats {
             codes,
-            coefficients: coefficient_format,
+            coefficients: coefficient_formats,
             intermediate: Target::signed(127, fraction_bits),
             output,
+            scheme,
         };
         intermediate_with(formats, monomials, coefficients)
     };
     let formats = Formats {
         codes,
-        coefficients: coefficient_format,
+        coefficients: coefficient_formats,
         intermediate: Target::signed(127, 0),
         output,
+        scheme,
     };
     let degree = coefficients.len().saturating_sub(1);
     let exact = Polynomial::exact_fraction_bits(&formats, monomials, degree).clamp(0, 63);

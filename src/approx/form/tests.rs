@@ -108,14 +108,22 @@ fn a_polynomial_of_a_sine() {
         .iter()
         .map(|c| (c * 16384.0f64).round() as i128)
         .collect();
-    let wide = choose_intermediate(c, coefficients, output, Monomials::Odd, &raw).unwrap();
+    let wide = choose_intermediate(
+        c,
+        coefficients.into(),
+        (output, Default::default()),
+        Monomials::Odd,
+        &raw,
+    )
+    .unwrap();
     println!("intermediate {wide}");
     for intermediate in [wide, "Q2.14".parse().unwrap()] {
         let formats = Formats {
             codes: c,
-            coefficients,
+            coefficients: coefficients.into(),
             intermediate: Target::from(intermediate),
             output,
+            scheme: Default::default(),
         };
         let p = Polynomial::new(formats, Monomials::Odd, raw.clone()).unwrap();
         report(

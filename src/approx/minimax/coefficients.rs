@@ -90,18 +90,28 @@ impl Problem<'_, '_> {
         };
         let (mut nodes, mut proved) = (0, at_floor(&best));
         let mut share = 20_000;
-        while !proved && nodes < budget.nodes {
+        let mut most = budget.nodes / 2;
+        while !proved && nodes < most {
             let transform = Some(frame.transform.clone());
             frame = self
                 .frame(&best.raw, best.error, transform)
                 .ok_or_else(too_fine)?;
             let before = best.error;
-            let (spent, complete) =
-                self.improve(&frame, &mut best, share.min(budget.nodes - nodes));
+            let (spent, complete) = self.improve(&frame, &mut best, share.min(most - nodes));
             nodes += spent;
             proved = complete || at_floor(&best);
             if best.error > 0.98 * before {
                 share *= 10;
+            }
+            if !proved && nodes >= most && most < budget.nodes {
+                let left = Budget {
+                    nodes: budget.nodes - nodes,
+                };
+                let (spent, complete) = self.improve_by_branches(&mut best, left);
+                nodes += spent;
+                proved = complete || at_floor(&best);
+                // The rest, if any, is for all together.
+                most = budget.nodes;
             }
         }
         let rounded = self.exactly(&self.rounded);
@@ -204,7 +214,7 @@ impl Problem<'_, '_> {
     }
 
     /// Enumerates what is better than `best`; (nodes, whether that was all).
-    fn improve(&self, frame: &Frame, best: &mut Candidate, nodes: u64) -> (u64, bool) {
+    pub(super) fn improve(&self, frame: &Frame, best: &mut Candidate, nodes: u64) -> (u64, bool) {
         let mut scratch = vec![0.0; frame.errors.len()];
         let first = square(best.error);
         let mut cuts = Cuts::new(frame);
@@ -226,7 +236,7 @@ impl Problem<'_, '_> {
 
     /// Steps along reduced vectors, and sums and differences of two, while the error falls. `z` is where
     /// `start` is in the frame.
-    fn descend(&self, frame: &Frame, start: &Candidate, mut z: Vec<i64>) -> Candidate {
+    pub(super) fn descend(&self, frame: &Frame, start: &Candidate, mut z: Vec<i64>) -> Candidate {
         let mut best = start.clone();
         let mut scratch = vec![0.0; frame.errors.len()];
         let moves = moves(z.len());

@@ -44,6 +44,11 @@ impl<'f> Cuts<'f> {
     pub fn new(frame: &'f Frame) -> Self {
         let n = frame.transform.len();
         let mut points = frame.order.clone();
+        // Places where the coordinates change nothing tell nothing.
+        points.retain(|m| {
+            let row = frame.rows.get(*m);
+            row.is_some_and(|row| row.iter().any(|b| b.abs() > f64::MIN_POSITIVE))
+        });
         points.truncate(12 * n);
         points.sort_unstable();
         let mut density = vec![1.0, 2.0 / frame.ball.side(0)];

@@ -3,7 +3,7 @@
 //! In reading order: [`wide`] (arithmetic of some 32 digits), [`basis`] (which monomials), [`samples`]
 //! (function, interval and weight at points), [`extrema`], [`remez`] (real coefficients), [`fit`] (measured data),
 //! [`lattice`] (reduction and enumeration), [`problem`] (formats), [`coefficients`] (the best integers under ideal
-//! evaluation), [`mod@search`] (the best integers under the evaluation that will run).
+//! evaluation; `pins` where they are many), [`mod@search`] (the best integers under the evaluation that will run).
 //!
 //! Everything here is deterministic: budgets count steps, never seconds. Maxima are found on dense points
 //! with refinement, to about 1e-9 of their size; they are not proofs.
@@ -16,6 +16,7 @@ mod exchange;
 pub mod extrema;
 pub mod fit;
 pub mod lattice;
+mod pins;
 pub mod problem;
 pub mod proof;
 pub mod remez;
