@@ -26,6 +26,7 @@ mod npy_header;
 mod plausibility;
 pub mod rows;
 mod scale;
+mod shorten;
 pub mod stats;
 pub mod thermal;
 mod timing;

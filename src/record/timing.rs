@@ -69,7 +69,7 @@ fn clocks(record: &ThermalRecord) -> Option<Warning> {
     })
 }
 
-/// Minutes for seconds: the die moves faster than one can.
+/// Minutes for seconds: the die moves faster than one can. Once and in no time: two records.
 fn too_short(record: &ThermalRecord) -> Option<Warning> {
     let die = record.column("die_degc")?;
     // Medians of five rows, so that a glitch is no movement.
@@ -79,16 +79,34 @@ fn too_short(record: &ThermalRecord) -> Option<Warning> {
         .map(|(d, t)| (stats::median(t), stats::median(d)))
         .filter(|(_, d)| !d.is_nan())
         .collect();
-    let mut fastest = 0.0f64;
-    let mut lag = 1;
+    let (mut fastest, mut jump) = (0.0f64, None);
+    let mut lag = 2;
     while lag < points.len() {
-        for (a, b) in points.iter().zip(points.iter().skip(lag)) {
-            let (time, moved) = (b.0 - a.0, (b.1 - a.1).abs());
-            if moved >= LEAST_MOVE_K && time > 0.0 {
-                fastest = fastest.max(moved / time);
+        let middles = points.iter().skip(lag / 2);
+        for ((a, m), b) in points.iter().zip(middles).zip(points.iter().skip(lag)) {
+            let (time, moved) = (b.0 - a.0, b.1 - a.1);
+            if moved.abs() < LEAST_MOVE_K || moved.abs() <= FASTEST_K_PER_S * time {
+                continue;
+            }
+            // A ramp is half way in the middle, a jump is over or yet to come.
+            if (0.2..=0.8).contains(&((m.1 - a.1) / moved)) {
+                fastest = fastest.max(moved.abs() / time.max(f64::MIN_POSITIVE));
+            } else if lag == 2 {
+                jump = jump.or(Some((a, b)));
             }
         }
         lag *= 2;
+    }
+    if let (Some((a, b)), 0.0) = (jump, fastest) {
+        return Some(Warning::on(
+            "record_spliced",
+            "die_degc",
+            format!(
+                "die_degc jumps from {:.1} to {:.1} degC at {:.1} s, faster than a die can: were \
+                 two sessions joined? Give time_s the pause between them, or close them one by one",
+                a.1, b.1, b.0
+            ),
+        ));
     }
     (fastest > FASTEST_K_PER_S).then(|| {
         Warning::on(
@@ -128,6 +146,22 @@ mod tests {
         assert!(codes(header, row(10.0)).is_empty());
         assert_eq!(codes(header, row(10.0 / 60.0)), ["time_step_implausible"]);
         assert_eq!(codes(header, row(10_000.0)), ["time_step_implausible"]);
+    }
+
+    #[test]
+    fn two_sessions_without_their_pause_are_no_ramp() {
+        let header = "time_s,rate_out_dps,die_degc";
+        for at in 200..206 {
+            let die = |k: f64| if k < f64::from(at) { 13.0 } else { 47.0 };
+            let row = |pause: f64| {
+                move |k: f64| {
+                    let time = if k < f64::from(at) { k } else { k + pause };
+                    format!("{time},{},{}", (k * 1.7).sin(), die(k) + 0.01 * (k % 7.0))
+                }
+            };
+            assert_eq!(codes(header, row(0.0)), ["record_spliced"], "{at}");
+            assert!(codes(header, row(600.0)).is_empty(), "{at}");
+        }
     }
 
     #[test]
