@@ -155,7 +155,7 @@ impl<R: Read> Reader<'_, R> {
 
     /// Moves `head`, the three bytes that begin no message, on to the next that do. False at the
     /// file's end. Zeros and ones up to there are an erased sector, no damage.
-    fn resume(&mut self, head: &mut Vec<u8>, at: u64) -> Result<bool> {
+    fn resume(&mut self, head: &mut [u8], at: u64) -> Result<bool> {
         let mut erased = is_erased(head);
         while let Some(byte) = self.stream.byte()? {
             erased &= is_erased(&[byte]);

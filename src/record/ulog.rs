@@ -271,14 +271,12 @@ impl<R: Read> Reader<'_, R> {
     fn message(&mut self, kind: u8, body: &[u8], start: u64) -> Result<bool> {
         match kind {
             b'B' => self.flags(body, start)?,
-            b'F' => {
-                if !self.definitions.define(body) {
-                    return Err(self.stream.broken(
-                        start,
-                        "a format definition cannot be read",
-                        GIVE_UP,
-                    ));
-                }
+            b'F' if !self.definitions.define(body) => {
+                return Err(self.stream.broken(
+                    start,
+                    "a format definition cannot be read",
+                    GIVE_UP,
+                ));
             }
             b'A' => return self.subscribe(body, start),
             // Information, parameters, text, marks: nothing that a record holds.
