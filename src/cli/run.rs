@@ -12,7 +12,7 @@ use std::path::PathBuf;
 pub struct Arguments {
     /// Design file; the embedded default if left out.
     design: Option<PathBuf>,
-    /// A measured thermal record (CSV); the design's own thermal run if left out.
+    /// A measured thermal record (CSV, PX4 ULog, ArduPilot DataFlash); the design's own thermal run if left out.
     #[arg(long)]
     record: Option<PathBuf>,
     /// Folder for the results; made if it does not exist.

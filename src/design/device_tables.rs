@@ -356,12 +356,25 @@ pub(super) fn record(t: &Table, base: Option<&RecordMapping>) -> Result<RecordMa
         }
         None => base.thermometer,
     };
+    let axis = t.take("axis", Some(base.axis), |v| {
+        v.choice(&[("x", LogAxis::X), ("y", LogAxis::Y), ("z", LogAxis::Z)])
+    })?;
+    let instance = t.take("instance", Some(base.instance), |v| {
+        v.integer(0..=255, "the number of the gyro in a log")
+    })?;
+    let average_s = match t.get("average_s") {
+        Some(v) => Some(v.real(Real::Within(1e-3, 86_400.0), "s of samples in a row")?),
+        None => base.average_s,
+    };
     let mut columns = base.columns;
     columns.extend(record_columns(&t.section("columns")?)?);
     Ok(RecordMapping {
         columns,
         row_period_s,
         thermometer,
+        axis,
+        instance,
+        average_s,
     })
 }
 

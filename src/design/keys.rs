@@ -195,6 +195,9 @@ pub(super) const KEYS: &[(&str, &[(&str, &str)])] = &[
             ("columns", "["),
             ("row_period_s", "10.0"),
             ("thermometer", "\"die_degc\""),
+            ("axis", "\"x\""),
+            ("instance", "0"),
+            ("average_s", "10.0"),
         ],
     ),
     (

@@ -447,6 +447,41 @@ pub struct RecordMapping {
     /// `thermometer`: the column of the bias model; default: the first of phase_rad, freq_hz,
     /// die_degc, chamber_degc that the record has.
     pub thermometer: Option<String>,
+    /// `axis`: the gyro's axis that is read from an autopilot's log. Default z.
+    pub axis: LogAxis,
+    /// `instance`: the number of the gyro in an autopilot's log, from 0.
+    pub instance: u32,
+    /// `average_s`: s of samples that are averaged into a row; default: 1 s for an autopilot's
+    /// log, the rows as they are for CSV.
+    pub average_s: Option<f64>,
+}
+
+/// An axis of a gyro with three.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum LogAxis {
+    /// The first.
+    X,
+    /// The second.
+    Y,
+    /// The third.
+    #[default]
+    Z,
+}
+
+impl LogAxis {
+    /// 0, 1 or 2.
+    pub fn index(self) -> usize {
+        match self {
+            LogAxis::X => 0,
+            LogAxis::Y => 1,
+            LogAxis::Z => 2,
+        }
+    }
+
+    /// `x`, `y` or `z`.
+    pub fn name(self) -> &'static str {
+        ["x", "y", "z"][self.index()]
+    }
 }
 
 /// `[fit]`: how the compensation is fitted.

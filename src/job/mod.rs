@@ -56,7 +56,7 @@ pub fn run(
             Path::new("record.csv"),
             &Default::default(),
         )?,
-        (None, Some(path)) => record::read(path, &design.record)?,
+        (None, Some(path)) => record::read_any(path, &design.record)?,
         (None, None) => unreachable!("either a record or an own run"),
     };
 

@@ -1,7 +1,8 @@
 //! The clock of a thermal record: required, never backwards, repeated times averaged.
 
 use super::cells;
-use super::columns::{Line, Roles};
+use super::columns::Roles;
+use super::lines::Lines;
 use super::thermal::ThermalRecord;
 use super::warning::Warning;
 use crate::design::RecordMapping;
@@ -10,18 +11,19 @@ use crate::error::Result;
 /// Takes the clock out of the columns, or makes it, and checks that it never runs backwards.
 pub(super) fn take(
     record: &mut ThermalRecord,
-    rows: &[Line<'_>],
+    lines: &Lines<'_>,
     roles: &Roles,
     mapping: &RecordMapping,
     warnings: &mut Vec<Warning>,
 ) -> Result<()> {
     let Some(index) = roles.index_of("time_s") else {
         let period = mapping.row_period_s.unwrap_or(1.0);
-        record.time_s = (0..rows.len()).map(|i| i as f64 * period).collect();
+        record.time_s = (0..record.lines.len()).map(|i| i as f64 * period).collect();
         return Ok(());
     };
     let Some(time) = record.columns.remove("time_s") else {
-        return Err(rows[0]
+        return Err(lines
+            .at(record.lines.first().copied().unwrap_or(1))
             .error(
                 1,
                 "column time_s holds no measured value".to_owned(),
@@ -29,14 +31,16 @@ pub(super) fn take(
             )
             .into());
     };
+    let last_line = record.lines.last().copied().unwrap_or(1);
     let mut last: Option<(f64, usize)> = None;
-    for (t, line) in time.iter().zip(rows) {
+    for (t, number) in time.iter().zip(&record.lines) {
         if t.is_nan() {
             continue;
         }
         if let Some((before, at)) = last
             && *t < before
         {
+            let line = lines.at(*number);
             let column = cells::split(line.text)
                 .ok()
                 .and_then(|c| c.get(index).map(|c| c.column))
@@ -51,17 +55,18 @@ pub(super) fn take(
                 )
                 .into());
         }
-        last = Some((*t, line.number));
+        last = Some((*t, *number));
     }
     let keep: Vec<bool> = time.iter().map(|t| !t.is_nan()).collect();
     let dropped = keep.iter().filter(|k| !**k).count();
     record.time_s = time;
     if dropped > 0 {
-        let first = rows
+        let first = record
+            .lines
             .iter()
             .zip(&keep)
             .find(|(_, k)| !**k)
-            .map_or(0, |(l, _)| l.number);
+            .map_or(0, |(number, _)| *number);
         warnings.push(Warning::on(
             "rows_without_time",
             "time_s",
@@ -71,7 +76,8 @@ pub(super) fn take(
     }
     let advances = record.time_s.first() < record.time_s.last();
     if !advances && record.len() > 1 {
-        return Err(rows[rows.len() - 1]
+        return Err(lines
+            .at(last_line)
             .error(
                 1,
                 format!(

@@ -1,11 +1,15 @@
 //! Measured records: thermal records and captures (`docs/manual.md`).
 //!
 //! [`thermal`] reads a thermal record; `cells` cuts its lines and reads its numbers, [`columns`]
-//! says which column plays which part, `clock` puts the rows in time, `plausibility` and `frozen`
-//! look for what is readable but unlikely; [`stats`] holds the few robust statistics that all of
-//! them share. [`capture`] streams captured ADC codes from CSV or NPY; [`capture_meta`] is what a
-//! capture says of itself; [`rows`] writes one row a decimated sample.
+//! says which column plays which part, `clock` puts the rows in time, `plausibility` (with `scale`
+//! and `timing`) and `frozen` look for what is readable but unlikely; `ulog` and `dataflash` read
+//! autopilots' logs, which `averager` makes rows of; [`read_any`] takes whatever a file is; [`stats`]
+//! holds the few robust statistics that all of them share. [`capture`] streams captured ADC codes
+//! from CSV or NPY; [`capture_meta`] is what a capture says of itself; [`rows`] writes one row a
+//! decimated sample.
 
+mod any;
+mod averager;
 pub mod capture;
 mod capture_csv;
 mod capture_lines;
@@ -14,12 +18,20 @@ mod capture_npy;
 mod cells;
 mod clock;
 pub mod columns;
+mod dataflash;
 mod frozen;
+mod lines;
+mod log_bytes;
 mod npy_header;
 mod plausibility;
 pub mod rows;
+mod scale;
+mod shorten;
 pub mod stats;
 pub mod thermal;
+mod timing;
+mod ulog;
+mod ulog_layout;
 mod warning;
 
 #[cfg(test)]
@@ -29,9 +41,14 @@ mod capture_random_tests;
 #[cfg(test)]
 mod capture_tests;
 #[cfg(test)]
+mod dataflash_tests;
+#[cfg(test)]
 mod reading_tests;
 #[cfg(test)]
 mod rows_tests;
+#[cfg(test)]
+mod ulog_tests;
 
+pub use any::read_any;
 pub use thermal::{ThermalRecord, read};
 pub use warning::Warning;

@@ -2,8 +2,9 @@
 
 use super::cells::{self, BadNumber};
 use super::columns::{self, Line, Roles};
+use super::lines::Lines;
 use super::warning::Warning;
-use super::{clock, frozen, plausibility};
+use super::{clock, frozen, plausibility, shorten};
 use crate::design::RecordMapping;
 use crate::error::{InputError, Result, io_error};
 use std::collections::BTreeMap;
@@ -99,16 +100,8 @@ pub fn parse(
         );
     }
     let text = decode(bytes, path)?;
-    let ending = if text.contains('\n') { '\n' } else { '\r' };
-    let mut lines = text
-        .split(ending)
-        .enumerate()
-        .map(|(i, line)| Line {
-            path,
-            number: i + 1,
-            text: line.trim_end_matches('\r'),
-        })
-        .filter(|line| !line.text.trim().is_empty());
+    let source = Lines::new(text, path);
+    let mut lines = source.iter();
     let header = lines
         .find(|line| !line.text.trim_start().starts_with('#'))
         .ok_or_else(|| {
@@ -118,7 +111,7 @@ pub fn parse(
                 .help("a record is a header row, such as time_s,rate_out_dps,die_degc, and rows")
         })?;
     let roles = columns::resolve(header, mapping)?;
-    let rows: Vec<Line<'_>> = lines.collect();
+    let (values, rows) = cells(lines, &roles, source.count())?;
     if rows.is_empty() {
         return Err(header
             .error(
@@ -128,27 +121,35 @@ pub fn parse(
             )
             .into());
     }
-    let (values, mut warnings) = numbers(&rows, &roles)?;
+    let first = rows.first().map_or(header, |n| source.at(*n));
+    let (values, mut warnings) = usable(values, first, &roles)?;
     warnings.splice(0..0, roles.warnings.iter().cloned());
     let mut record = ThermalRecord {
         source: path.to_path_buf(),
         time_s: Vec::new(),
         columns: BTreeMap::new(),
-        lines: rows.iter().map(|r| r.number).collect(),
+        lines: rows,
         renamed: BTreeMap::new(),
     };
-    for ((file_name, names), column) in roles.columns.iter().zip(&values) {
+    for ((file_name, names), column) in roles.columns.iter().zip(values) {
         let Some(column) = column else { continue };
         for name in names {
             if name != file_name {
                 record.renamed.insert(name.clone(), file_name.clone());
             }
-            record.columns.insert(name.clone(), column.clone());
+        }
+        if let Some((last, others)) = names.split_last() {
+            for name in others {
+                record.columns.insert(name.clone(), column.clone());
+            }
+            record.columns.insert(last.clone(), column);
         }
     }
-    clock::take(&mut record, &rows, &roles, mapping, &mut warnings)?;
+    let last = record.lines.last().map_or(header, |n| source.at(*n));
+    clock::take(&mut record, &source, &roles, mapping, &mut warnings)?;
     clock::merge_repeated(&mut record, &mut warnings);
-    enough(&record, &rows, &mut warnings)?;
+    shorten::rows(&mut record, mapping.average_s, &mut warnings);
+    enough(&record, last, &mut warnings)?;
     plausibility::check(&record, &mut warnings);
     frozen::check(&record, &mut warnings);
     Ok((record, warnings))
@@ -176,63 +177,117 @@ fn decode<'a>(bytes: &'a [u8], path: &Path) -> Result<&'a str> {
     })
 }
 
+/// Reads all cells: the numbers by column of the file, with what is wrong with the first bad one;
+/// and the number of each row's line.
+fn cells<'a>(
+    lines: impl Iterator<Item = Line<'a>>,
+    roles: &Roles,
+    expected: usize,
+) -> Result<(Vec<ReadColumn>, Vec<usize>)> {
+    let mut columns: Vec<ReadColumn> = (0..roles.columns.len())
+        .map(|_| ReadColumn {
+            values: Vec::with_capacity(expected),
+            bad: None,
+        })
+        .collect();
+    let mut rows = Vec::with_capacity(expected);
+    for line in lines {
+        if !plain_numbers(line.text, &mut columns, rows.len()) {
+            any_cells(line, roles, &mut columns)?;
+        }
+        rows.push(line.number);
+    }
+    Ok((columns, rows))
+}
+
+/// A column as it is read.
+struct ReadColumn {
+    values: Vec<f64>,
+    /// The first cell that holds no number.
+    bad: Option<InputError>,
+}
+
+/// Reads a row that holds numbers and nothing else, which nearly all rows do; false, and the
+/// columns as they were (`rows` long), if there is anything to look at more closely.
+fn plain_numbers(text: &str, columns: &mut [ReadColumn], rows: usize) -> bool {
+    let mut cells = text.split(',');
+    let whole = columns.iter_mut().all(|column| {
+        let Some(cell) = cells.next() else {
+            return false;
+        };
+        let cell = cell.trim();
+        let value = match cell.is_empty() {
+            true => f64::NAN,
+            false => cell.parse().unwrap_or(f64::INFINITY),
+        };
+        column.values.push(value);
+        !value.is_infinite()
+    });
+    let whole = whole && cells.next().is_none();
+    if !whole {
+        for column in columns {
+            column.values.truncate(rows);
+        }
+    }
+    whole
+}
+
+/// Reads any row, and refuses it with the place of what is wrong.
+fn any_cells(line: Line<'_>, roles: &Roles, columns: &mut [ReadColumn]) -> Result<()> {
+    if line.text.trim_start().starts_with('#') {
+        return Err(line
+            .error(
+                1,
+                "a comment among the rows".to_owned(),
+                "comments stand before the header; move or remove it".to_owned(),
+            )
+            .into());
+    }
+    let cells = match cells::split(line.text) {
+        Ok(cells) => cells,
+        Err(column) => return Err(columns::open_quote(line, column).into()),
+    };
+    if cells.len() != roles.columns.len() {
+        return Err(wrong_width(&line, &cells, roles).into());
+    }
+    for ((cell, column), (name, names)) in cells.iter().zip(columns).zip(&roles.columns) {
+        let value = cells::number(&cell.text).unwrap_or_else(|why| {
+            if column.bad.is_none() {
+                let what = if why == BadNumber::Infinite {
+                    "is not finite"
+                } else {
+                    "is no number"
+                };
+                let shown: String = cell.text.chars().take(40).collect();
+                column.bad = Some(line.error(
+                    cell.column,
+                    format!("\"{shown}\" in column {name} {what}"),
+                    why.help().to_owned(),
+                ));
+            }
+            f64::NAN
+        });
+        column.values.push(value);
+        if names.iter().any(|n| columns::is_known(n))
+            && let Some(e) = column.bad.take()
+        {
+            return Err(e.into());
+        }
+    }
+    Ok(())
+}
+
 /// The numbers, by column of the file; `None` for a column that is left out.
 type Values = Vec<Option<Vec<f64>>>;
 
-/// Reads all cells.
-fn numbers(rows: &[Line<'_>], roles: &Roles) -> Result<(Values, Vec<Warning>)> {
-    let width = roles.columns.len();
-    let mut values = vec![Vec::with_capacity(rows.len()); width];
-    let mut first_bad: Vec<Option<InputError>> = vec![None; width];
-    for line in rows {
-        if line.text.trim_start().starts_with('#') {
-            return Err(line
-                .error(
-                    1,
-                    "a comment among the rows".to_owned(),
-                    "comments stand before the header; move or remove it".to_owned(),
-                )
-                .into());
-        }
-        let cells = match cells::split(line.text) {
-            Ok(cells) => cells,
-            Err(column) => return Err(columns::open_quote(*line, column).into()),
-        };
-        if cells.len() != width {
-            return Err(wrong_width(line, &cells, roles).into());
-        }
-        for (i, cell) in cells.iter().enumerate() {
-            let (name, names) = &roles.columns[i];
-            let value = cells::number(&cell.text).unwrap_or_else(|why| {
-                if first_bad[i].is_none() {
-                    let what = if why == BadNumber::Infinite {
-                        "is not finite"
-                    } else {
-                        "is no number"
-                    };
-                    let shown: String = cell.text.chars().take(40).collect();
-                    first_bad[i] = Some(line.error(
-                        cell.column,
-                        format!("\"{shown}\" in column {name} {what}"),
-                        why.help().to_owned(),
-                    ));
-                }
-                f64::NAN
-            });
-            values[i].push(value);
-            if names.iter().any(|n| columns::is_known(n))
-                && let Some(e) = first_bad[i].take()
-            {
-                return Err(e.into());
-            }
-        }
-    }
+/// Leaves out what holds no numbers. `first` is the first row.
+fn usable(read: Vec<ReadColumn>, first: Line<'_>, roles: &Roles) -> Result<(Values, Vec<Warning>)> {
     let mut warnings = Vec::new();
-    let mut kept = Vec::with_capacity(width);
-    for ((column, (name, names)), bad) in values.into_iter().zip(&roles.columns).zip(first_bad) {
-        let any = column.iter().any(|v| !v.is_nan());
+    let mut kept = Vec::with_capacity(read.len());
+    for (ReadColumn { values, bad }, (name, names)) in read.into_iter().zip(&roles.columns) {
+        let any = values.iter().any(|v| !v.is_nan());
         if name.is_empty() && (any || bad.is_some()) {
-            return Err(rows[0]
+            return Err(first
                 .error(
                     1,
                     "a column with values has no name in the header".to_owned(),
@@ -258,7 +313,7 @@ fn numbers(rows: &[Line<'_>], roles: &Roles) -> Result<(Values, Vec<Warning>)> {
             }
             None => {}
         }
-        kept.push((any && !names.is_empty()).then_some(column));
+        kept.push((any && !names.is_empty()).then_some(values));
     }
     Ok((kept, warnings))
 }
@@ -288,10 +343,10 @@ fn wrong_width(line: &Line<'_>, cells: &[cells::Cell<'_>], roles: &Roles) -> Inp
 }
 
 /// Enough rows with a rate, and a word on those without.
-fn enough(record: &ThermalRecord, rows: &[Line<'_>], warnings: &mut Vec<Warning>) -> Result<()> {
+fn enough(record: &ThermalRecord, last: Line<'_>, warnings: &mut Vec<Warning>) -> Result<()> {
     let measured = record.measured("rate_out_dps");
     if measured < LEAST_ROWS {
-        return Err(rows[rows.len() - 1]
+        return Err(last
             .error(
                 1,
                 format!("only {measured} rows have a time and a rate_out_dps"),

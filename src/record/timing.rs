@@ -1,0 +1,178 @@
+//! Is the clock of a record in seconds since its start?
+
+use super::stats;
+use super::thermal::ThermalRecord;
+use super::warning::Warning;
+
+/// No die moves faster over 10 K, K/s: a chamber's ramp makes 0.2, power-on and hot air 0.5. Ramps
+/// of 1.5 K/min and more are told from it when their minutes pass for seconds.
+const FASTEST_K_PER_S: f64 = 1.5;
+
+/// Movement that counts as such, K.
+const LEAST_MOVE_K: f64 = 10.0;
+
+/// A warning for a clock in another unit, or of calendar time.
+pub(super) fn check(record: &ThermalRecord) -> Option<Warning> {
+    let (first, last) = (*record.time_s.first()?, *record.time_s.last()?);
+    if first > 1e8 {
+        return Some(Warning::on(
+            "time_is_calendar_time",
+            "time_s",
+            format!(
+                "time_s starts at {first:.0} s: calendar time? It is to count from the record's \
+                 start (warm-up effects need that)"
+            ),
+        ));
+    }
+    clocks(record)
+        .or_else(|| too_long(record, last - first))
+        .or_else(|| too_short(record))
+}
+
+/// Milliseconds for seconds.
+fn too_long(record: &ThermalRecord, lasts_s: f64) -> Option<Warning> {
+    let steps: Vec<f64> = record.time_s.windows(2).map(|w| w[1] - w[0]).collect();
+    let step = stats::median(&steps);
+    let days = lasts_s / 86_400.0;
+    (step > 3600.0 || days > 5.0).then(|| {
+        Warning::on(
+            "time_step_implausible",
+            "time_s",
+            format!(
+                "the record lasts {days:.1} days with {step} s between rows: milliseconds for \
+                 seconds? Divide by 1000 if so"
+            ),
+        )
+    })
+}
+
+/// The two clocks of a record run alike, except where one restarts.
+fn clocks(record: &ThermalRecord) -> Option<Warning> {
+    let power_on = record.column("time_since_power_on_s")?;
+    let steps = |v: &[f64]| -> Vec<f64> { v.windows(2).map(|w| w[1] - w[0]).collect() };
+    let ratios: Vec<f64> = steps(power_on)
+        .iter()
+        .zip(steps(&record.time_s))
+        .filter(|(p, t)| **p > 0.0 && *t > 0.0)
+        .map(|(p, t)| p / t)
+        .collect();
+    let ratio = stats::median(&ratios);
+    (ratios.len() >= 10 && !(0.9..=1.1).contains(&ratio)).then(|| {
+        Warning::on(
+            "clocks_disagree",
+            "time_since_power_on_s",
+            format!(
+                "time_since_power_on_s advances by {ratio:.6} s for each s of time_s: one of them \
+                 is in another unit (minutes, ms)"
+            ),
+        )
+    })
+}
+
+/// Minutes for seconds: the die moves faster than one can. Once and in no time: two records.
+fn too_short(record: &ThermalRecord) -> Option<Warning> {
+    let die = record.column("die_degc")?;
+    // Medians of five rows, so that a glitch is no movement.
+    let points: Vec<(f64, f64)> = die
+        .chunks(5)
+        .zip(record.time_s.chunks(5))
+        .map(|(d, t)| (stats::median(t), stats::median(d)))
+        .filter(|(_, d)| !d.is_nan())
+        .collect();
+    let (mut fastest, mut jump) = (0.0f64, None);
+    let mut lag = 2;
+    while lag < points.len() {
+        let middles = points.iter().skip(lag / 2);
+        for ((a, m), b) in points.iter().zip(middles).zip(points.iter().skip(lag)) {
+            let (time, moved) = (b.0 - a.0, b.1 - a.1);
+            if moved.abs() < LEAST_MOVE_K || moved.abs() <= FASTEST_K_PER_S * time {
+                continue;
+            }
+            // A ramp is half way in the middle, a jump is over or yet to come.
+            if (0.2..=0.8).contains(&((m.1 - a.1) / moved)) {
+                fastest = fastest.max(moved.abs() / time.max(f64::MIN_POSITIVE));
+            } else if lag == 2 {
+                jump = jump.or(Some((a, b)));
+            }
+        }
+        lag *= 2;
+    }
+    if let (Some((a, b)), 0.0) = (jump, fastest) {
+        return Some(Warning::on(
+            "record_spliced",
+            "die_degc",
+            format!(
+                "die_degc jumps from {:.1} to {:.1} degC at {:.1} s, faster than a die can: were \
+                 two sessions joined? Give time_s the pause between them, or close them one by one",
+                a.1, b.1, b.0
+            ),
+        ));
+    }
+    (fastest > FASTEST_K_PER_S).then(|| {
+        Warning::on(
+            "time_step_implausible",
+            "time_s",
+            format!(
+                "die_degc moves by {LEAST_MOVE_K} K and more at {fastest:.2} K/s: minutes for \
+                 seconds? Multiply by 60 if so"
+            ),
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::thermal::parse;
+    use crate::design::RecordMapping;
+    use std::path::Path;
+
+    fn codes(header: &str, row: impl Fn(f64) -> String) -> Vec<&'static str> {
+        let rows: String = (0..400).map(|k| row(f64::from(k)) + "\n").collect();
+        let text = format!("{header}\n{rows}");
+        let mapping = RecordMapping::default();
+        let (_, warnings) = parse(text.as_bytes(), Path::new("r.csv"), &mapping).unwrap();
+        warnings.iter().map(|w| w.code).collect()
+    }
+
+    #[test]
+    fn minutes_are_told_from_seconds_by_the_die() {
+        let header = "time_s,rate_out_dps,die_degc";
+        // 2 K/min up and down over 70 K, a row every 10 s; one glitch of the thermometer.
+        let die = |k: f64| {
+            let glitch = if k == 50.0 { 80.0 } else { 0.0 };
+            70.0 - (70.0 - k / 3.0).abs() + glitch
+        };
+        let row = |unit: f64| move |k: f64| format!("{},{},{}", unit * k, (k * 1.7).sin(), die(k));
+        assert!(codes(header, row(10.0)).is_empty());
+        assert_eq!(codes(header, row(10.0 / 60.0)), ["time_step_implausible"]);
+        assert_eq!(codes(header, row(10_000.0)), ["time_step_implausible"]);
+    }
+
+    #[test]
+    fn two_sessions_without_their_pause_are_no_ramp() {
+        let header = "time_s,rate_out_dps,die_degc";
+        for at in 200..206 {
+            let die = |k: f64| if k < f64::from(at) { 13.0 } else { 47.0 };
+            let row = |pause: f64| {
+                move |k: f64| {
+                    let time = if k < f64::from(at) { k } else { k + pause };
+                    format!("{time},{},{}", (k * 1.7).sin(), die(k) + 0.01 * (k % 7.0))
+                }
+            };
+            assert_eq!(codes(header, row(0.0)), ["record_spliced"], "{at}");
+            assert!(codes(header, row(600.0)).is_empty(), "{at}");
+        }
+    }
+
+    #[test]
+    fn two_clocks_run_alike() {
+        let header = "time_s,time_since_power_on_s,rate_out_dps";
+        let row = |unit: f64| {
+            move |k: f64| format!("{k},{},{}", unit * (k % 150.0 + 3.0), (k * 1.7).sin())
+        };
+        assert!(codes(header, row(1.0)).is_empty());
+        for unit in [1e3, 1.0 / 60.0] {
+            assert_eq!(codes(header, row(unit)), ["clocks_disagree"]);
+        }
+    }
+}
