@@ -41,7 +41,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if std::io::stderr().is_terminal() {
         eprintln!("reading {} ...", path.display());
     }
-    let (record, warnings) = crate::record::read(path, &design.record)?;
+    let (record, warnings) = crate::record::read_any(path, &design.record)?;
     let closed = close::close(&record, warnings, &design, &command, Effort::default())?;
     let json = super::json(&closed.closure);
     super::make_folder(&arguments.out)?;
