@@ -21,7 +21,7 @@ struct Covariate {
 const COVARIATE: Sheet = Sheet {
     id: "covariate",
     physics: "something that this column measures moves the bias, by a smooth function",
-    equation: "f(c), a natural cubic spline of one to four degrees of freedom; at once or after a \
+    equation: "f(c), a natural cubic spline of one to seven degrees of freedom; at once or after a \
                first-order delay",
     parameters: &[],
     compensable: true,
@@ -31,7 +31,7 @@ const COVARIATE: Sheet = Sheet {
 };
 
 /// Forms: degrees of freedom of the curve.
-const DEGREES: [usize; 3] = [1, 2, 4];
+const DEGREES: [usize; 4] = [1, 2, 4, 7];
 
 /// Delays that are tried, in rows.
 const DELAYS_ROWS: [f64; 4] = [1.5, 3.0, 6.0, 12.0];

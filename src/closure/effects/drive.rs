@@ -4,6 +4,7 @@ use super::{
     Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, gain, map, moving,
 };
 use crate::closure::channels::Channels;
+use crate::closure::likelihood::linear::Basis;
 
 /// All of this file.
 pub fn all() -> Vec<Box<dyn Candidate>> {
@@ -126,28 +127,28 @@ impl Candidate for Coupling {
     }
 
     fn points(&self, _c: &Channels) -> Vec<Point> {
-        vec![Point::form(0), Point::form(1), Point::form(2)]
+        (0..5).map(Point::form).collect()
     }
 
     fn columns(&self, c: &Channels, bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
         let Some(g) = c.column("agc") else {
             return Vec::new();
         };
-        // Forms: the gain's first and second power, and the first power with the curve's own
-        // second-order answer, for large pulls.
-        let pull = map(g, |g| {
-            if point.form == 1 {
-                g * g - 1.0
-            } else {
-                g - 1.0
-            }
-        });
+        // Forms: the gain's first and second power; the first power with the curve's own second-order
+        // answer, for large pulls; the powers of the amplitude, which is the gain without Q's course in
+        // temperature.
+        let amplitude = match point.form {
+            3 | 4 => without_temperature(g, &c.u),
+            _ => g.to_vec(),
+        };
+        let square = matches!(point.form, 1 | 4);
+        let pull = map(&amplitude, |g| if square { g * g - 1.0 } else { g - 1.0 });
         let slope: Vec<f64> =
             c.u.iter()
                 .zip(&pull)
                 .map(|(u, d)| bias.slope(*u) * d)
                 .collect();
-        if point.form < 2 {
+        if point.form != 2 {
             return vec![slope];
         }
         let bent = bias.coefficients_dps.get(2).copied().unwrap_or(0.0);
@@ -161,4 +162,16 @@ impl Candidate for Coupling {
     fn report(&self, c: &Channels, e: &Estimate) -> Reported {
         [gain("pull_rad", e, 0, -c.half)].into_iter().collect()
     }
+}
+
+/// A gain over its own quadratic in temperature.
+fn without_temperature(g: &[f64], u: &[f64]) -> Vec<f64> {
+    let powers: Vec<Vec<f64>> = (0..3).map(|k| map(u, |u| u.powi(k))).collect();
+    let basis = Basis::new(&powers);
+    let mut rest = g.to_vec();
+    basis.project_off(&mut rest);
+    let pairs = g.iter().zip(&rest);
+    pairs
+        .map(|(g, r)| if g == r { 1.0 } else { g / (g - r) })
+        .collect()
 }

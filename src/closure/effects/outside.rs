@@ -6,6 +6,7 @@
 use super::covariate::spline;
 use super::{Bias, Candidate, Estimate, Missing, Point, Reported, Sheet, map, product};
 use crate::closure::channels::{Channels, lag};
+use crate::closure::likelihood::linear::Basis;
 use crate::record::columns::is_known;
 
 /// What the shape is of.
@@ -170,7 +171,8 @@ impl Candidate for Outside {
                 vec![product(&v, c.column("rate_dps").unwrap_or(&r)), v]
             }
             Kind::Late(name) => {
-                let v = of(name);
+                // What follows the temperature is a thermometer, and its past a thermal lag.
+                let v = without_heat(c, &of(name));
                 let late = lag(&c.time_s, &v, point.theta[0].exp());
                 vec![late.iter().zip(&v).map(|(l, v)| l - v).collect(), v]
             }
@@ -189,6 +191,14 @@ impl Candidate for Outside {
     fn report(&self, _c: &Channels, _estimate: &Estimate) -> Reported {
         Reported::new()
     }
+}
+
+/// A column less its cubic in the temperature.
+fn without_heat(c: &Channels, column: &[f64]) -> Vec<f64> {
+    let powers: Vec<Vec<f64>> = (0..4).map(|k| map(&c.u, |u| u.powi(k))).collect();
+    let mut rest = column.to_vec();
+    Basis::new(&powers).project_off(&mut rest);
+    rest
 }
 
 /// Play (backlash) operator with half width `r`: the output moves only when the input pushes it.

@@ -87,12 +87,7 @@ impl Search<'_> {
                     .collect(),
             })
             .collect();
-        let options = score::Options {
-            draws: 0,
-            surrogates,
-            seed: 1,
-        };
-        let scores = score::score(fit, &groups, &options);
+        let scores = scored(fit, &groups, surrogates);
         let tone = tones::strongest(c, fit, &Grid::new(fit));
         if let Some(tone) = tone {
             let pickup: Arc<dyn Candidate> = Arc::new(Pickup {
@@ -165,6 +160,32 @@ impl Search<'_> {
             )
             .collect()
     }
+}
+
+/// Surrogates of a first look, and probabilities at which it decides: far from the level, more
+/// surrogates change nothing.
+const FIRST_LOOK: usize = 30;
+const CLEAR: (f64, f64) = (1e-4, 0.12);
+
+/// Scores with as many surrogates as it takes, `surrogates` at most.
+fn scored(fit: &Fit, groups: &[Group], surrogates: usize) -> Scores {
+    let with = |surrogates: usize| {
+        let options = score::Options {
+            draws: 0,
+            surrogates,
+            seed: 1,
+        };
+        score::score(fit, groups, &options)
+    };
+    if surrogates <= FIRST_LOOK {
+        return with(surrogates);
+    }
+    let first = with(FIRST_LOOK);
+    let p = first.leader().and_then(|g| first.groups[g].p_bootstrap);
+    if p.is_none_or(|p| p < CLEAR.0 || p > CLEAR.1) {
+        return first;
+    }
+    with(surrogates)
 }
 
 /// Columns of a shape in the rows of the fit's problem.

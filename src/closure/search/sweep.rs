@@ -102,17 +102,25 @@ impl Search<'_> {
         let term = &model.terms[k];
         let candidate = term.candidate.as_ref();
         let gain = |p: &Point| refine::gain(&bench, candidate, c, &model.bias, p);
+        let fine: Vec<(Point, f64)> = candidate
+            .fine(c, &term.point)
+            .into_iter()
+            .map(|p| {
+                let there = gain(&p);
+                (p, there)
+            })
+            .collect();
         let mut start = term.point.clone();
         let mut best = gain(&start);
-        for point in candidate.fine(c, &term.point) {
+        for (point, there) in &fine {
             // A form with a parameter more has to be worth it.
             let more = point.theta.len() as f64 - term.point.theta.len() as f64;
-            let there = gain(&point) - PRICE * more;
-            if there > best {
-                (start, best) = (point, there);
+            if there - PRICE * more > best {
+                (start, best) = (point.clone(), there - PRICE * more);
             }
         }
-        refine::refined(&bench, candidate, c, &model.bias, &start, 0.5)
+        let top = refine::refined(&bench, candidate, c, &model.bias, &start, 0.5);
+        middle(&top, &fine, gain)
     }
 
     /// Every term against all other candidates, the other terms being in: it is replaced by a better
@@ -290,5 +298,29 @@ impl Search<'_> {
             .columns(self.channels, &model.bias, &term.point);
         let count = |c: &Vec<f64>| c.windows(2).filter(|w| w[0] != w[1]).count();
         columns.iter().map(count).max().unwrap_or(0)
+    }
+}
+
+/// The middle of the plateau around a top: a threshold between two readings may lie anywhere between
+/// them, and the middle errs least on rows that were not fitted.
+fn middle(top: &Point, fine: &[(Point, f64)], gain: impl Fn(&Point) -> f64) -> Point {
+    const FLAT: f64 = 0.2;
+    let reached = gain(top);
+    let level: Vec<&Point> = fine
+        .iter()
+        .filter(|(p, there)| p.form == top.form && *there > reached - FLAT)
+        .map(|(p, _)| p)
+        .collect();
+    if level.is_empty() {
+        return top.clone();
+    }
+    let mut out = top.clone();
+    for (k, theta) in out.theta.iter_mut().enumerate() {
+        *theta = level.iter().map(|p| p.theta[k]).sum::<f64>() / level.len() as f64;
+    }
+    if gain(&out) > reached - FLAT {
+        out
+    } else {
+        top.clone()
     }
 }

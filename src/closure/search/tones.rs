@@ -25,6 +25,21 @@ const LEAST_PERIODS: f64 = 3.0;
 /// Frequencies per independent one.
 const OVERSAMPLING: f64 = 2.0;
 
+/// A noise of less posterior weight is not looked at.
+const LIGHT: f64 = 0.1;
+
+/// Turns (sine, cosine) pairs by the angles of others.
+fn turn(pair: &mut [Vec<f64>], step: &[Vec<f64>]) {
+    let [sines, cosines] = pair else { return };
+    let [step_sines, step_cosines] = step else {
+        return;
+    };
+    let steps = step_sines.iter().zip(step_cosines);
+    for ((s, c), (ds, dc)) in sines.iter_mut().zip(cosines).zip(steps) {
+        (*s, *c) = (*s * dc + *c * ds, *c * dc - *s * ds);
+    }
+}
+
 /// Scans frequencies from three periods over the record to the rows' Nyquist frequency, under the
 /// likeliest noises of the grid.
 pub fn strongest(c: &Channels, fit: &Fit, grid: &Grid) -> Option<Tone> {
@@ -40,7 +55,7 @@ pub fn strongest(c: &Channels, fit: &Fit, grid: &Grid) -> Option<Tone> {
     let mut p_value = 0.0;
     let mut best: Option<(f64, f64)> = None;
     for (shape, weight) in grid.shapes.iter().zip(&grid.weights).take(4) {
-        if *weight <= 0.0 {
+        if *weight < LIGHT {
             continue;
         }
         let whitener = Whitener::new(&fit.problem.line, *shape);
@@ -49,13 +64,20 @@ pub fn strongest(c: &Channels, fit: &Fit, grid: &Grid) -> Option<Tone> {
         let contrasts = whitener.used.saturating_sub(declared.rank());
         let rss = dot(&y, &y).max(f64::MIN_POSITIVE);
         let mut greatest = 0.0f64;
-        for k in 0..count {
-            let w = TAU * frequency(k);
-            let pair: Vec<Vec<f64>> = [
+        // Each frequency is the one before, turned by a constant step.
+        let angles = |w: f64| -> Vec<Vec<f64>> {
+            [
                 times.iter().map(|t| (w * t).sin()).collect(),
                 times.iter().map(|t| (w * t).cos()).collect(),
             ]
-            .into();
+            .into()
+        };
+        let mut pair = angles(TAU * frequency(0));
+        let step = angles(TAU / (OVERSAMPLING * span));
+        for k in 0..count {
+            if k > 0 {
+                turn(&mut pair, &step);
+            }
             let mut own = Basis::default();
             for mut column in whitener.apply_all(&pair) {
                 declared.project_off(&mut column);
@@ -77,7 +99,7 @@ pub fn strongest(c: &Channels, fit: &Fit, grid: &Grid) -> Option<Tone> {
         let any = 1.0 - (independent * (-one).ln_1p()).exp();
         p_value += weight * any.max(independent * one * 0.5);
     }
-    let weights: f64 = grid.weights.iter().take(4).sum();
+    let weights: f64 = grid.weights.iter().take(4).filter(|w| **w >= LIGHT).sum();
     best.map(|(frequency_hz, _)| Tone {
         frequency_hz,
         p_value: (p_value / weights.max(f64::MIN_POSITIVE)).min(1.0),
