@@ -115,7 +115,12 @@ impl Step {
                 .inputs
                 .iter()
                 .zip(&formats.inputs)
-                .map(|(i, f)| format!("x = ({} - ({:?})) / ({:?}), {f}", i.column, i.offset, i.scale))
+                .map(|(i, f)| {
+                    format!(
+                        "x = ({} - ({:?})) / ({:?}), {f}",
+                        i.column, i.offset, i.scale
+                    )
+                })
                 .collect(),
             formats: formats.clone(),
         };
@@ -303,7 +308,11 @@ fn lagging<A: Arithmetic>(
     let bits = approach.fraction_bits;
     let to_input = ar.mul(ar.constant(approach.a, bits), ar.sub(before, y));
     let with_input = ar.mul(ar.constant(approach.b, bits), ar.sub(x, before));
-    let moved = ar.cast(ar.add(to_input, with_input), update, &[to_input, with_input]);
+    let moved = ar.cast(
+        ar.add(to_input, with_input),
+        update,
+        &[to_input, with_input],
+    );
     // The state is a mean of inputs; the limit only holds what rounding adds at the ends.
     let y = ar.limit(ar.add(y, moved), limits.0, limits.1, approach.state_bits);
     *lag = [y, x];
@@ -354,7 +363,9 @@ impl<A: Arithmetic, const I: usize> Block<A, I, 1> for Step {
 
     fn inputs(&self) -> [Port; I] {
         std::array::from_fn(|k| {
-            let of_input = k.checked_sub(1).and_then(|k| self.meanings.get(k).zip(INPUTS.get(k)));
+            let of_input = k
+                .checked_sub(1)
+                .and_then(|k| self.meanings.get(k).zip(INPUTS.get(k)));
             match of_input {
                 Some((meaning, name)) => Port::new(name, meaning.clone()),
                 None if k == 0 => Port::new("restart", "1 = first reading after power-on, else 0"),
@@ -389,17 +400,20 @@ impl<A: Arithmetic, const I: usize> Block<A, I, 1> for Step {
                     }
                 }
                 OnBias::Slope { slot, ring, .. } => {
-                    if let (Some(name), Some(past)) = (PASTS.get(*slot), state.pasts.get_mut(*slot)) {
+                    if let (Some(name), Some(past)) = (PASTS.get(*slot), state.pasts.get_mut(*slot))
+                    {
                         visitor.residues(name, past, ring);
                     }
                 }
                 OnBias::Decay { slot, approach, .. } => {
-                    if let (Some(name), Some(d)) = (DECAYS.get(*slot), state.decays.get_mut(*slot)) {
+                    if let (Some(name), Some(d)) = (DECAYS.get(*slot), state.decays.get_mut(*slot))
+                    {
                         visitor.word(name, d, 0, 1 << approach.state_bits);
                     }
                 }
                 OnBias::Step { slot, .. } => {
-                    if let (Some(name), Some(on)) = (RELAYS.get(*slot), state.relays.get_mut(*slot)) {
+                    if let (Some(name), Some(on)) = (RELAYS.get(*slot), state.relays.get_mut(*slot))
+                    {
                         visitor.word(name, on, 0, 1);
                     }
                 }

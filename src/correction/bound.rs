@@ -99,17 +99,15 @@ fn on_bias(plan: &Plan, formats: &Formats, term: &Term) -> f64 {
             ..
         } => {
             let size = values.iter().fold(0.0f64, |m, v| m.max(v.abs()));
-            let from = (formats.sum_fraction_bits + 2 - bits_for(gain_dps.abs()))
-                .clamp(16, PRODUCT_BITS);
+            let from =
+                (formats.sum_fraction_bits + 2 - bits_for(gain_dps.abs())).clamp(16, PRODUCT_BITS);
             // Knot and blend, on x and on y.
             let curve = gain_dps.abs() * 2.0 * pow2(-from);
             let own = state(*gain_dps, *tau_s, size, from);
             2.0 * size * gain_half + inputs + curve + own + half
         }
         Term::Slope { .. } => 2.0 * gain_half + inputs + half,
-        Term::Decay { gain_dps, tau_s } => {
-            gain_half + state(*gain_dps, *tau_s, 1.0, 0) + half
-        }
+        Term::Decay { gain_dps, tau_s } => gain_half + state(*gain_dps, *tau_s, 1.0, 0) + half,
         Term::Curve { values_dps, input } => steepest(values_dps) * d(*input) + 2.0 * half,
         Term::Step { .. } => half,
         Term::ScaleBy { .. } | Term::Cubic { .. } | Term::Even { .. } => 0.0,

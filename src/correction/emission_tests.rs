@@ -41,56 +41,74 @@ fn a_bundle_verifies_from_its_files_and_damage_to_a_constant_shows() {
         files::write(&emitted, folder.path()).unwrap();
         let good = verify(folder.path(), "test").unwrap();
         assert!(good.holds && good.selftest == Some(true), "{good:?}");
-        assert!(good.functions.iter().any(|f| f.name == "correct" && f.inputs == 3072));
+        assert!(
+            good.functions
+                .iter()
+                .any(|f| f.name == "correct" && f.inputs == 3072)
+        );
 
-        // Each constant of the step that is not a limit, one more.
-        let (source, open) = match language {
-            Language::C => ("tested.c", "_C("),
-            Language::Rust => ("src/lib.rs", "."),
+        // Each multiplier of the step: one in 256 more shows in all of them, one LSB in nearly all (a
+        // constant may be finer than any output).
+        let source = match language {
+            Language::C => "tested.c",
+            Language::Rust => "src/lib.rs",
         };
         let file = emitted.iter().find(|f| f.path == source).unwrap();
-        let damaged = damages(&file.text, language);
-        assert!(damaged.len() >= 5, "{open}: {}", damaged.len());
-        for (what, text) in damaged {
-            std::fs::write(folder.path().join(source), text).unwrap();
+        let mut unseen = Vec::new();
+        let count = multipliers(&file.text, language).len();
+        for (k, share) in (0..count).flat_map(|k| [(k, 256), (k, i64::MAX)]) {
+            let (what, damaged) = damage(&file.text, language, k, share);
+            std::fs::write(folder.path().join(source), damaged).unwrap();
             let bad = verify(folder.path(), "test").unwrap();
-            assert!(bad.vectors.mismatches > 0, "{language:?}: {what}");
+            if bad.vectors.mismatches == 0 {
+                unseen.push((what, share));
+            }
         }
+        assert!(
+            count >= 10 && unseen.len() <= count / 10,
+            "{count}: {unseen:#?}"
+        );
+        assert!(
+            unseen.iter().all(|(_, share)| *share == i64::MAX),
+            "{unseen:#?}"
+        );
     }
 }
 
-/// The source with one multiplier one more, for each multiplier with a constant in it.
-fn damages(text: &str, language: Language) -> Vec<(String, String)> {
-    let mut all = Vec::new();
-    for (start, line) in text
-        .lines()
-        .scan(0, |at, line| {
-            let start = *at;
-            *at += line.len() + 1;
-            Some((start, line))
-        })
-        .filter(|(_, line)| match language {
-            Language::C => line.contains(" * ") && line.contains("const int") && line.contains("_C("),
-            Language::Rust => line.contains(".wrapping_mul(") && line.contains("let t"),
-        })
-    {
-        let place = match language {
-            Language::C => line.find("_C(").map(|k| k + 3),
-            Language::Rust => line.find("= ").map(|k| k + 2),
-        };
-        let Some(place) = place else { continue };
-        let digits: String = line[place..]
-            .trim_start_matches(['(', '-'])
-            .chars()
-            .take_while(char::is_ascii_digit)
-            .collect();
-        let Ok(value) = digits.parse::<i64>() else {
-            continue;
-        };
-        let at = start + place + line[place..].find(&digits).unwrap_or(0);
-        let mut damaged = text.to_owned();
-        damaged.replace_range(at..at + digits.len(), &(value + 1).to_string());
-        all.push((line.trim().to_owned(), damaged));
+/// Place and value of each constant that something is multiplied by.
+fn multipliers(text: &str, language: Language) -> Vec<(std::ops::Range<usize>, i64)> {
+    let after = match language {
+        Language::C => ") * ",
+        Language::Rust => ".wrapping_mul(",
+    };
+    let mut found = Vec::new();
+    let mut start = 0;
+    for line in text.split_inclusive('\n') {
+        if let Some(end) = line.find(after).filter(|_| line.contains(" t")) {
+            let head = line[..end].trim_end_matches(')');
+            let head = head.trim_end_matches("_i64").trim_end_matches("_i32");
+            let digits = head.trim_end_matches(|c: char| c.is_ascii_digit()).len();
+            let sign = line[..digits].trim_end_matches(['-', '(']);
+            let is_first = match language {
+                Language::C => line[..digits].ends_with("_C("),
+                Language::Rust => sign.ends_with("= "),
+            };
+            if let Ok(value) = head[digits..].parse::<i64>()
+                && is_first
+            {
+                found.push((start + digits..start + head.len(), value));
+            }
+        }
+        start += line.len();
     }
-    all
+    found
+}
+
+/// The source with the k-th multiplier more by its share, at least by one; and its line.
+fn damage(text: &str, language: Language, k: usize, share: i64) -> (String, String) {
+    let (range, value) = multipliers(text, language)[k].clone();
+    let line = text[range.start..].lines().next().unwrap_or("");
+    let mut damaged = text.to_owned();
+    damaged.replace_range(range, &(value + value / share + 1).to_string());
+    (line.to_owned(), damaged)
 }

@@ -36,7 +36,11 @@ pub struct Firmware {
 ///
 /// # Errors
 /// A template that cannot be printed (a fault of the tool).
-pub fn emit(correction: &Correction, origin: &Origin, language: Language) -> Result<Vec<EmittedFile>> {
+pub fn emit(
+    correction: &Correction,
+    origin: &Origin,
+    language: Language,
+) -> Result<Vec<EmittedFile>> {
     let what = Stepped {
         prefix: origin.prefix,
         program: &correction.trace(),
@@ -76,7 +80,8 @@ pub fn facts(correction: &Correction) -> Vec<String> {
         let text = format!("{t:?}");
         // A curve's knots are in its table.
         let cut = text.find("values").filter(|_| text.len() > 160);
-        cut.and_then(|end| text.get(..end).map(|t| format!("{t}.. }}"))).unwrap_or(text)
+        cut.and_then(|end| text.get(..end).map(|t| format!("{t}.. }}")))
+            .unwrap_or(text)
     }));
     facts.push(format!(
         "at most {:.2e} deg/s from these terms in real numbers (analysis), where no word saturates and no relay switches at another reading",
@@ -91,7 +96,9 @@ impl Firmware {
     /// # Errors
     /// No compiler; sources that do not compile.
     pub fn make(correction: &Correction, origin: &Origin) -> Result<Self> {
-        let one = |language| Built::of_files(emit(correction, origin, language)?, language, origin.prefix);
+        let one = |language| {
+            Built::of_files(emit(correction, origin, language)?, language, origin.prefix)
+        };
         let (c, rust) = both(|| one(Language::C), || one(Language::Rust));
         Ok(Firmware {
             bundle: stepped::bundle(origin.prefix, &correction.trace()),

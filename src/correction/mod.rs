@@ -13,6 +13,7 @@ mod plan;
 mod rate_terms;
 mod run;
 mod terms;
+mod text;
 
 pub use firmware::Firmware;
 pub use formats::{Formats, NOISE_PER_FULL_SCALE};
@@ -21,6 +22,7 @@ pub use plan::{
     MOST_SLOPE_ROWS, Plan, SHORTEST_TAU_PERIODS, Term,
 };
 pub use run::{Correction, MOST_STEPS, Reading, Steps, readings, schedule};
+pub use text::Planned;
 
 #[cfg(test)]
 mod emission_tests;

@@ -83,11 +83,7 @@ impl OnRate {
             } => Law::Linear(
                 *input,
                 (s1 * pow2(bits)).round() as i128,
-                exact(
-                    "correction.scale",
-                    bits + formats.input_bits(*input),
-                    bits,
-                ),
+                exact("correction.scale", bits + formats.input_bits(*input), bits),
             ),
             Term::Even { absolute: true, .. } => Law::Absolute,
             Term::Even { .. } => Law::Even(exact("correction.even", bits + u, bits)),

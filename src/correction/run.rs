@@ -37,9 +37,11 @@ pub struct Reading {
 pub fn readings(plan: &Plan, record: &ThermalRecord) -> Result<Vec<Reading>> {
     let column = |name: &str| {
         record.column(name).ok_or_else(|| {
-            InputError::new(format!("the record has no column `{name}`, which the correction reads"))
-                .in_file(&record.source)
-                .help("name the column in `[record.columns]`, or give a record that has it")
+            InputError::new(format!(
+                "the record has no column `{name}`, which the correction reads"
+            ))
+            .in_file(&record.source)
+            .help("name the column in `[record.columns]`, or give a record that has it")
         })
     };
     let inputs: std::result::Result<Vec<&[f64]>, _> =
@@ -186,9 +188,7 @@ impl Correction {
         let ar = Fixed::<i128, i128>::new();
         let mut state: State<Fixed<i128, i128>> = self.step.state();
         let one = |words: &Vec<i128>| match words.as_slice() {
-            [restart, inputs @ .., rate] => {
-                self.step.run(&ar, &mut state, *restart, inputs, *rate)
-            }
+            [restart, inputs @ .., rate] => self.step.run(&ar, &mut state, *restart, inputs, *rate),
             _ => 0,
         };
         calls.iter().map(one).collect()

@@ -207,7 +207,14 @@ pub fn evaluate(plan: &Plan, readings: &[Reading]) -> Vec<f64> {
                     ppm,
                     rate_max_dps,
                     absolute,
-                } => ppm * 1e-6 * if *absolute { r.abs() } else { r * r / rate_max_dps },
+                } => {
+                    ppm * 1e-6
+                        * if *absolute {
+                            r.abs()
+                        } else {
+                            r * r / rate_max_dps
+                        }
+                }
                 _ => 0.0,
             };
         }

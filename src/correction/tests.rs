@@ -138,8 +138,8 @@ fn a_relay_remembers_and_a_latch_outlives_a_restart() {
     readings.append(&mut again);
     for (gap, once, first_on, first_off, at_last) in [
         (0.0, false, 50, Some(151), -1.0),
-        (0.4, false, 70, Some(171), -1.0),
-        (0.4, true, 70, None, -1.0),
+        (0.5, false, 75, Some(176), -1.0),
+        (0.5, true, 75, None, -1.0),
         (2.0, false, usize::MAX, None, -1.0),
         (2.0, true, usize::MAX, None, 0.0),
     ] {
@@ -174,8 +174,14 @@ fn fixed_and_float_stay_within_the_bound_of_the_plan() {
         {
             let distance = (fixed - due).abs();
             worst = worst.max(distance / bound);
-            assert!(distance <= bound, "plan {seed}, reading {n}: {distance} > {bound}");
-            assert!((float - due).abs() <= bound, "plan {seed}, reading {n}: float");
+            assert!(
+                distance <= bound,
+                "plan {seed}, reading {n}: {distance} > {bound}"
+            );
+            assert!(
+                (float - due).abs() <= bound,
+                "plan {seed}, reading {n}: float"
+            );
         }
         // Far below the noise that the words were chosen for (1e-3 deg/s): 1.005 of its rms at most.
         let errors = correction.run(&readings);
@@ -273,7 +279,15 @@ fn steps_follow_the_clock() {
     // Power-on, even, gap, late; a repeated time is a step that the next one saves.
     assert_eq!(
         counts(&[0.0, 10.0, 40.0, 51.0, 51.0, 71.0, 80.0]),
-        [(true, 1), (false, 1), (false, 3), (false, 1), (false, 1), (false, 1), (false, 1)]
+        [
+            (true, 1),
+            (false, 1),
+            (false, 3),
+            (false, 1),
+            (false, 1),
+            (false, 1),
+            (false, 1)
+        ]
     );
     // Twelve per cent late each time: after 25 readings, three more steps than readings.
     let late: Vec<f64> = (0..26).map(|n| 11.2 * f64::from(n)).collect();
@@ -282,7 +296,13 @@ fn steps_follow_the_clock() {
     // The first reading 30 s after power-on; a restart; a gap beyond the most.
     assert_eq!(
         counts(&[30.0, 40.0, 5.0, 15.0, 1e9]),
-        [(true, 4), (false, 1), (true, 2), (false, 1), (false, MOST_STEPS)]
+        [
+            (true, 4),
+            (false, 1),
+            (true, 2),
+            (false, 1),
+            (false, MOST_STEPS)
+        ]
     );
 }
 
@@ -341,4 +361,58 @@ fn plans_that_cannot_become_firmware_are_refused_with_the_rule() {
     assert!(Correction::auto(&plan).is_ok());
     let e = Formats::choose(&plan, 1e-9).unwrap_err().to_string();
     assert!(e.contains("32 bits"), "{e}");
+}
+
+#[test]
+fn a_plan_reads_back_from_a_design_file_and_mistakes_are_shown_in_their_place() {
+    use crate::design::reader::parse;
+    for seed in 0..12 {
+        let planned = Planned {
+            plan: plan(300 + seed, seed as usize % 9, true),
+            noise_dps: 2e-3,
+        };
+        let design = parse(&planned.to_toml(), None).unwrap();
+        assert_eq!(design.correction, Some(planned));
+    }
+    assert_eq!(parse("", None).unwrap().correction, None);
+
+    let text = |terms: &str| {
+        format!(
+            "[correction]\nperiod_s = 1.0\nfull_scale_dps = 500.0\n\
+             inputs = [{{ column = \"agc\", offset = 1, scale = 0.1 }}]\nterms = [\n{terms}\n]\n"
+        )
+    };
+    let good =
+        text("{ kind = \"step\", gain_dps = 1, input = 0, centre = 0, gap = 0, once = \"no\" }");
+    let design = parse(&good, None).unwrap();
+    assert_eq!(design.correction.map(|c| c.noise_dps), Some(1e-3));
+    for (terms, line, rule) in [
+        ("{ kind = \"lags\" }", 6, "did you mean `lag`"),
+        (
+            "{ kind = \"decay\", gain_dps = 1 }",
+            6,
+            "lacks the required key `tau_s`",
+        ),
+        (
+            "{ kind = \"decay\", gain = 1, tau_s = 9 }",
+            6,
+            "did you mean `gain_dps`",
+        ),
+        (
+            "{ kind = \"product\", gain_dps = 1, factors = [[0]] }",
+            6,
+            "no pair",
+        ),
+        (
+            "{ kind = \"lag\", gain_dps = 1, input = 1, tau_s = 9 }",
+            1,
+            "input 1 of 1",
+        ),
+    ] {
+        let e = parse(&text(terms), None).unwrap_err().to_string();
+        assert!(
+            e.contains(rule) && e.starts_with(&format!("{line}:")),
+            "{e}"
+        );
+    }
 }

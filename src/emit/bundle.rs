@@ -17,6 +17,8 @@ pub enum Part {
     Compensation,
     /// The constant tables.
     Tables,
+    /// The correction of averaged readings.
+    Correction,
     /// The whole chain; the compensation alone where its thermometer is not the chain's phase.
     Chain,
 }

@@ -148,7 +148,12 @@ fn vectors<'a>(
         let span = range.high - range.low;
         // 2, 3, 4, ... times up and down.
         let place = n as i128 * 2 * span * (k as i128 + 2) / CALLS as i128 % (2 * span).max(1);
-        range.low + if place > span { 2 * span - place } else { place }
+        range.low
+            + if place > span {
+                2 * span - place
+            } else {
+                place
+            }
     };
     let mut calls = Vec::with_capacity(3 * CALLS);
     for n in 0..CALLS {

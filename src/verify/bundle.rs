@@ -96,7 +96,9 @@ pub fn verify(folder: &Path, command: &str) -> Result<Verification> {
             let rows = read_words(&path, stream.inputs + stream.outputs + 1)?;
             let (inputs, outputs) = split(rows, stream.inputs);
             let name = &stream.name;
-            functions.push(compare::stream(language, &harness, name, &inputs, &outputs)?);
+            functions.push(compare::stream(
+                language, &harness, name, &inputs, &outputs,
+            )?);
         }
         if let Some(chain) = &manifest.chain {
             let codes = read_words(&folder.join("vectors/chain_input.csv"), 2)?;
