@@ -6,7 +6,8 @@
 use super::formats::Formats;
 use super::plan::{MOST_INPUTS, MOST_OF_A_KIND, Plan};
 use super::rate_terms::OnRate;
-use super::terms::{Followed, OnBias, Slots, exact};
+use super::states::Followed;
+use super::terms::{OnBias, Slots, exact};
 use crate::error::Result;
 use crate::numeric::arithmetic::{Arithmetic, Block, Port, StateVisitor};
 use crate::numeric::cast::{Cast, Label};
@@ -162,10 +163,10 @@ impl Step {
         };
         for term in &self.on_bias {
             match term {
-                OnBias::Lag { .. } => state.lags.push([A::Word::default(); 2]),
+                OnBias::Lag(_) => state.lags.push([A::Word::default(); 2]),
                 OnBias::Slope { rows, .. } => state.pasts.push(vec![A::Residue::default(); *rows]),
-                OnBias::Decay { .. } => state.decays.push(A::Word::default()),
-                OnBias::Step { .. } => state.relays.push(A::Word::default()),
+                OnBias::Decay(_) => state.decays.push(A::Word::default()),
+                OnBias::Step(_) => state.relays.push(A::Word::default()),
                 OnBias::Constant(_) | OnBias::Product { .. } | OnBias::Curve(_) => {}
             }
         }
@@ -223,13 +224,13 @@ impl Step {
                 }
                 gain.times(ar, t)
             }
-            OnBias::Lag { slot, of, .. } => {
-                let x = match of {
+            OnBias::Lag(lag) => {
+                let x = match &lag.of {
                     Followed::Input(k) => input(*k),
                     Followed::Curve(curve) => curve.value(ar, input(curve.input())),
                 };
-                match state.lags.get_mut(*slot) {
-                    Some(lag) => lagging(ar, lag, term, fresh, x),
+                match state.lags.get_mut(lag.slot) {
+                    Some(state) => lag.behind(ar, state, fresh, x),
                     None => zero,
                 }
             }
@@ -250,110 +251,20 @@ impl Step {
                 }
                 gain.times(ar, ar.sub(x, oldest))
             }
-            OnBias::Decay {
-                slot,
-                approach,
-                update,
-                reading,
-                gain,
-            } => {
-                let bits = approach.state_bits;
-                let Some(state) = state.decays.get_mut(*slot) else {
-                    return zero;
-                };
-                let rate = ar.constant(approach.a, approach.fraction_bits);
-                let loss = ar.cast(ar.mul(rate, *state), update, &[*state]);
-                let decayed = ar.sub(*state, loss);
-                let next = ar.select(fresh, ar.constant(1 << bits, bits), decayed);
-                // Never above 1 nor below 0: what intervals lose.
-                *state = ar.within(next, 0, 1 << bits);
-                gain.times(ar, ar.cast(*state, reading, &[*state]))
-            }
+            OnBias::Decay(decay) => match state.decays.get_mut(decay.slot) {
+                Some(d) => decay.step(ar, d, fresh),
+                None => zero,
+            },
             OnBias::Curve(curve) => curve.value(ar, input(curve.input())),
-            OnBias::Step { slot, gain, .. } => match state.relays.get_mut(*slot) {
-                Some(relay) => {
-                    relayed(ar, relay, term, fresh, inputs);
-                    ar.mul(*relay, ar.constant(*gain, sum))
+            OnBias::Step(relay) => match state.relays.get_mut(relay.slot) {
+                Some(on) => {
+                    *on = relay.moved(ar, *on, fresh, input(relay.input));
+                    ar.mul(*on, ar.constant(relay.gain, sum))
                 }
                 None => zero,
             },
         }
     }
-}
-
-/// gain (x - y) of a [`OnBias::Lag`].
-#[inline(always)]
-fn lagging<A: Arithmetic>(
-    ar: &A,
-    lag: &mut [A::Word; 2],
-    term: &OnBias,
-    fresh: A::Truth,
-    x: A::Word,
-) -> A::Word {
-    let OnBias::Lag {
-        align,
-        approach,
-        update,
-        difference,
-        limits,
-        gain,
-        ..
-    } = term
-    else {
-        return x;
-    };
-    let x = ar.cast(x, align, &[x]);
-    let before = ar.select(fresh, x, lag[1]);
-    let y = ar.select(fresh, x, lag[0]);
-    let bits = approach.fraction_bits;
-    let to_input = ar.mul(ar.constant(approach.a, bits), ar.sub(before, y));
-    let with_input = ar.mul(ar.constant(approach.b, bits), ar.sub(x, before));
-    let moved = ar.cast(
-        ar.add(to_input, with_input),
-        update,
-        &[to_input, with_input],
-    );
-    // The state is a mean of inputs; the limit only holds what rounding adds at the ends.
-    let y = ar.limit(ar.add(y, moved), limits.0, limits.1, approach.state_bits);
-    *lag = [y, x];
-    let rest = ar.sub(x, y);
-    gain.times(ar, ar.cast(rest, difference, &[rest]))
-}
-
-/// Moves the relay of a [`OnBias::Step`].
-#[inline(always)]
-fn relayed<A: Arithmetic>(
-    ar: &A,
-    relay: &mut A::Word,
-    term: &OnBias,
-    fresh: A::Truth,
-    inputs: &[A::Word],
-) {
-    let OnBias::Step {
-        input,
-        input_bits,
-        on,
-        off,
-        centre,
-        once,
-        ..
-    } = term
-    else {
-        return;
-    };
-    let Some(x) = inputs.get(*input).copied() else {
-        return;
-    };
-    let (zero, one) = (ar.constant(0, 0), ar.constant(1, 0));
-    let below = |level: i128| ar.is_negative(ar.sub(x, ar.constant(level, *input_bits)));
-    *relay = if *once {
-        ar.select(below(*on), *relay, one)
-    } else {
-        let at_start = ar.select(below(*centre), zero, one);
-        let before = ar.select(fresh, at_start, *relay);
-        let held = ar.select(below(*on), before, one);
-        ar.select(below(*off), zero, held)
-    };
 }
 
 impl<A: Arithmetic, const I: usize> Block<A, I, 1> for Step {
@@ -392,11 +303,14 @@ impl<A: Arithmetic, const I: usize> Block<A, I, 1> for Step {
         visitor.word("started", &mut state.started, 0, 1);
         for term in &self.on_bias {
             match term {
-                OnBias::Lag { slot, limits, .. } => {
-                    let names = LAGS.get(*slot).zip(LAG_INPUTS.get(*slot));
-                    if let (Some((y, x)), Some(lag)) = (names, state.lags.get_mut(*slot)) {
-                        visitor.word(y, &mut lag[0], limits.0, limits.1);
-                        visitor.word(x, &mut lag[1], limits.0, limits.1);
+                OnBias::Lag(lag) => {
+                    let names = LAGS.get(lag.slot).zip(LAG_INPUTS.get(lag.slot));
+                    let words = state.lags.get_mut(lag.slot);
+                    if let (Some((y, before)), Some(words)) = (names, words) {
+                        let (low, high) = lag.limits;
+                        for (name, word) in [y, before].into_iter().zip(words) {
+                            visitor.word(name, word, low, high);
+                        }
                     }
                 }
                 OnBias::Slope { slot, ring, .. } => {
@@ -405,15 +319,15 @@ impl<A: Arithmetic, const I: usize> Block<A, I, 1> for Step {
                         visitor.residues(name, past, ring);
                     }
                 }
-                OnBias::Decay { slot, approach, .. } => {
-                    if let (Some(name), Some(d)) = (DECAYS.get(*slot), state.decays.get_mut(*slot))
-                    {
-                        visitor.word(name, d, 0, 1 << approach.state_bits);
+                OnBias::Decay(decay) => {
+                    let word = state.decays.get_mut(decay.slot);
+                    if let Some((name, d)) = DECAYS.get(decay.slot).zip(word) {
+                        visitor.word(name, d, 0, decay.one());
                     }
                 }
-                OnBias::Step { slot, .. } => {
-                    if let (Some(name), Some(on)) = (RELAYS.get(*slot), state.relays.get_mut(*slot))
-                    {
+                OnBias::Step(relay) => {
+                    let word = state.relays.get_mut(relay.slot);
+                    if let Some((name, on)) = RELAYS.get(relay.slot).zip(word) {
                         visitor.word(name, on, 0, 1);
                     }
                 }

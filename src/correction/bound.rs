@@ -14,10 +14,11 @@
 //! | decay | g + abs(gain) (s / a + q / a + 2^-31) + h |
 //! | on the rate, error k r | R (error of k) + h, R the largest rate; errors before it grow by 1 + 3 K, K the largest k |
 
-use super::formats::{Formats, PRODUCT_BITS, bits_for, slope_dps, slope_gain_dps, steepest};
+use super::formats::{Formats, PRODUCT_BITS, slope_dps, slope_gain_dps, steepest};
 use super::plan::{Plan, Term};
 use super::rate_terms::{constant, share_bits};
-use super::terms::{Approach, GAIN_BITS};
+use super::states::{Approach, lagged_curve_bits};
+use super::terms::GAIN_BITS;
 use crate::numeric::format::pow2;
 
 /// Covers products of errors.
@@ -99,8 +100,7 @@ fn on_bias(plan: &Plan, formats: &Formats, term: &Term) -> f64 {
             ..
         } => {
             let size = values.iter().fold(0.0f64, |m, v| m.max(v.abs()));
-            let from =
-                (formats.sum_fraction_bits + 2 - bits_for(gain_dps.abs())).clamp(16, PRODUCT_BITS);
+            let from = lagged_curve_bits(formats, *gain_dps);
             // Knot and blend, on x and on y.
             let curve = gain_dps.abs() * 2.0 * pow2(-from);
             let own = state(*gain_dps, *tau_s, size, from);

@@ -40,7 +40,7 @@ enum Law {
     /// Constant * u.
     Even(Cast),
     /// Constant * u^2: rounding of u^2, then of k.
-    Cubic(Cast, Cast),
+    Cubic(Box<[Cast; 2]>),
 }
 
 /// Fraction bits of k.
@@ -87,10 +87,10 @@ impl OnRate {
             ),
             Term::Even { absolute: true, .. } => Law::Absolute,
             Term::Even { .. } => Law::Even(exact("correction.even", bits + u, bits)),
-            Term::Cubic { .. } => Law::Cubic(
+            Term::Cubic { .. } => Law::Cubic(Box::new([
                 exact("correction.square", 2 * u, square),
                 exact("correction.cubic", bits + square, bits),
-            ),
+            ])),
             _ => Law::Constant,
         };
         Some(OnRate {
@@ -106,7 +106,7 @@ impl OnRate {
         let mut casts = match &mut self.law {
             Law::Constant | Law::Absolute => Vec::new(),
             Law::Linear(_, _, cast) | Law::Even(cast) => vec![cast],
-            Law::Cubic(square, cast) => vec![square, cast],
+            Law::Cubic(casts) => casts.iter_mut().collect(),
         };
         casts.push(&mut self.last);
         casts
@@ -136,7 +136,8 @@ impl OnRate {
                 let product = ar.mul(constant, u);
                 ar.cast(product, cast, &[u])
             }
-            Law::Cubic(square, cast) => {
+            Law::Cubic(casts) => {
+                let [square, cast] = casts.as_ref();
                 let u2 = ar.cast(ar.mul(u, u), square, &[u]);
                 ar.cast(ar.mul(constant, u2), cast, &[u2])
             }

@@ -35,17 +35,16 @@ pub struct Reading {
 /// # Errors
 /// An input that the record lacks.
 pub fn readings(plan: &Plan, record: &ThermalRecord) -> Result<Vec<Reading>> {
-    let column = |name: &str| {
-        record.column(name).ok_or_else(|| {
-            InputError::new(format!(
-                "the record has no column `{name}`, which the correction reads"
-            ))
-            .in_file(&record.source)
-            .help("name the column in `[record.columns]`, or give a record that has it")
-        })
+    let column = |name: &str| -> Result<&[f64]> {
+        let missing = || {
+            let what = format!("the record has no column `{name}`, which the correction reads");
+            InputError::new(what)
+                .in_file(&record.source)
+                .help("name the column in `[record.columns]`, or give a record that has it")
+        };
+        Ok(record.column(name).ok_or_else(missing)?)
     };
-    let inputs: std::result::Result<Vec<&[f64]>, _> =
-        plan.inputs.iter().map(|i| column(&i.column)).collect();
+    let inputs: Result<Vec<&[f64]>> = plan.inputs.iter().map(|i| column(&i.column)).collect();
     let (inputs, rate) = (inputs?, column("rate_out_dps")?);
     let since = record.column("time_since_power_on_s");
     let at = |column: &[f64], row: usize| column.get(row).copied().unwrap_or(f64::NAN);
