@@ -56,7 +56,10 @@ fn a_bundle_verifies_from_its_files_and_damage_to_a_constant_shows() {
         let file = emitted.iter().find(|f| f.path == source).unwrap();
         let mut unseen = Vec::new();
         let count = multipliers(&file.text, language).len();
-        for (k, share) in (0..count).flat_map(|k| [(k, 256), (k, i64::MAX)]) {
+        // Both languages print the same program; compiling Rust takes longer.
+        let every = if language == Language::C { 1 } else { 6 };
+        let ks = (0..count).step_by(every);
+        for (k, share) in ks.flat_map(|k| [(k, 256), (k, i64::MAX)]) {
             let (what, damaged) = damage(&file.text, language, k, share);
             std::fs::write(folder.path().join(source), damaged).unwrap();
             let bad = verify(folder.path(), "test").unwrap();
