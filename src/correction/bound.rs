@@ -14,7 +14,7 @@
 //! | decay | g + abs(gain) (s / a + q / a + 2^-31) + h |
 //! | on the rate, error k r | R (error of k) + h, R the largest rate; errors before it grow by 1 + 3 K, K the largest k |
 
-use super::formats::{Formats, PRODUCT_BITS, slope_dps, slope_gain_dps, steepest};
+use super::formats::{Formats, PRODUCT_BITS, largest_bias_dps, slope_dps, steepest};
 use super::plan::{Plan, Term};
 use super::rate_terms::{constant, share_bits};
 use super::states::{Approach, lagged_curve_bits};
@@ -31,31 +31,12 @@ pub(super) fn bound_dps(plan: &Plan, formats: &Formats) -> f64 {
     for term in &plan.terms {
         bound += on_bias(plan, formats, term);
     }
-    let largest = pow2(formats.rate_exponent()) + bias(plan);
+    let largest = pow2(formats.rate_exponent()) + largest_bias_dps(plan);
     for term in plan.terms.iter().filter(|t| t.is_on_rate()) {
         let (share, error) = on_rate(formats, term, largest);
         bound = bound * (1.0 + 3.0 * share) + largest * error + formats.sum_lsb_dps() / 2.0;
     }
     (bound + rate_lsb / 2.0) * SECOND_ORDER
-}
-
-/// The largest sum of the terms on the bias, deg/s.
-fn bias(plan: &Plan) -> f64 {
-    let most = |values: &[f64]| values.iter().fold(0.0f64, |m, v| m.max(v.abs()));
-    let of = |term: &Term| match term {
-        Term::Product { gain_dps, .. } | Term::Decay { gain_dps, .. } => gain_dps.abs(),
-        Term::Step { gain_dps, .. } => gain_dps.abs(),
-        Term::Lag { gain_dps, .. } => 2.0 * gain_dps.abs(),
-        Term::LagOfCurve {
-            gain_dps, values, ..
-        } => 2.0 * gain_dps.abs() * most(values),
-        Term::Slope {
-            gain_dps_s, rows, ..
-        } => 2.0 * slope_gain_dps(plan, *gain_dps_s, *rows).abs(),
-        Term::Curve { values_dps, .. } => most(values_dps),
-        Term::ScaleBy { .. } | Term::Cubic { .. } | Term::Even { .. } => 0.0,
-    };
-    plan.terms.iter().map(of).sum()
 }
 
 fn on_bias(plan: &Plan, formats: &Formats, term: &Term) -> f64 {

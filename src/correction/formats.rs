@@ -22,9 +22,6 @@ const INPUT_BITS: (i32, i32) = (15, 23);
 const SUM_BITS: (i32, i32) = (8, 30);
 /// Most fraction bits of a product of inputs.
 pub(super) const PRODUCT_BITS: i32 = 30;
-/// The full scale of the rate word is at least this times that of the plan.
-const HEADROOM: f64 = 1.1;
-
 /// The words of a correction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Formats {
@@ -45,7 +42,9 @@ impl Formats {
     /// A noise that is not positive, or so small beside the full scale that the rate needs more than
     /// 32 bits.
     pub fn choose(plan: &Plan, noise_dps: f64) -> Result<Self> {
-        let exponent = (plan.full_scale_dps * HEADROOM).log2().ceil() as i32;
+        // What comes in has the bias on it.
+        let largest = plan.full_scale_dps + largest_bias_dps(plan);
+        let exponent = largest.log2().ceil() as i32;
         let fraction_bits = bits_for(noise_dps * RATE_SHARE).max(0);
         let width = exponent + 1 + fraction_bits;
         if !(noise_dps > 0.0 && noise_dps.is_finite()) || width > 32 {
@@ -142,4 +141,23 @@ pub(super) fn steepest(values: &[f64]) -> f64 {
         _ => 0.0,
     });
     rises.fold(0.0, f64::max) * intervals / 2.0
+}
+
+/// The largest sum of the terms on the bias, deg/s.
+pub(super) fn largest_bias_dps(plan: &Plan) -> f64 {
+    let most = |values: &[f64]| values.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+    let of = |term: &Term| match term {
+        Term::Product { gain_dps, .. } | Term::Decay { gain_dps, .. } => gain_dps.abs(),
+        Term::Step { gain_dps, .. } => gain_dps.abs(),
+        Term::Lag { gain_dps, .. } => 2.0 * gain_dps.abs(),
+        Term::LagOfCurve {
+            gain_dps, values, ..
+        } => 2.0 * gain_dps.abs() * most(values),
+        Term::Slope {
+            gain_dps_s, rows, ..
+        } => 2.0 * slope_gain_dps(plan, *gain_dps_s, *rows).abs(),
+        Term::Curve { values_dps, .. } => most(values_dps),
+        Term::ScaleBy { .. } | Term::Cubic { .. } | Term::Even { .. } => 0.0,
+    };
+    plan.terms.iter().map(of).sum()
 }
