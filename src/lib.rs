@@ -9,6 +9,7 @@ pub mod approx;
 pub mod circuit;
 pub mod cli;
 pub mod closure;
+pub mod correction;
 pub mod cosim;
 pub mod design;
 pub mod emit;

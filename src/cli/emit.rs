@@ -1,9 +1,11 @@
 //! `gyrogen emit`: a firmware bundle in one language.
 
+use crate::correction::firmware::{self, Origin};
+use crate::design::Design;
 use crate::emit::bundle::Part;
-use crate::emit::files;
+use crate::emit::files::{self, EmittedFile};
 use crate::emit::views::Language;
-use crate::error::Result;
+use crate::error::{InputError, Result};
 use std::path::PathBuf;
 
 /// Write firmware sources with their self-test, vectors and manifest.
@@ -37,7 +39,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         format!("{:?}", arguments.lang).to_lowercase(),
         format!("{:?}", arguments.part).to_lowercase()
     );
-    let bundle = files::emit(&design, arguments.part, arguments.lang, &command)?;
+    let bundle = match arguments.part {
+        Part::Correction => correction(&design, arguments.lang, &command)?,
+        part => files::emit(&design, part, arguments.lang, &command)?,
+    };
     files::write(&bundle, &arguments.out)?;
     eprintln!(
         "wrote {} files to {}",
@@ -45,4 +50,18 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         arguments.out.display()
     );
     Ok(())
+}
+
+/// The bundle of the design's `[correction]`.
+fn correction(design: &Design, language: Language, command: &str) -> Result<Vec<EmittedFile>> {
+    let planned = design.correction.as_ref().ok_or_else(|| {
+        InputError::new("the design has no [correction] to emit")
+            .help("add a [correction] table to the design")
+    })?;
+    let origin = Origin {
+        prefix: &design.name,
+        sha256: &design.source.sha256,
+        command,
+    };
+    firmware::emit(&planned.compile()?, &origin, language)
 }

@@ -11,6 +11,7 @@ pub(super) const KEYS: &[(&str, &[(&str, &str)])] = &[
             ("name", "\"gyro\""),
             ("circuit", "["),
             ("compensation", "["),
+            ("correction", "["),
             ("gyro", "["),
             ("thermal_run", "["),
             ("record", "["),
@@ -121,6 +122,22 @@ pub(super) const KEYS: &[(&str, &[(&str, &str)])] = &[
             ("coefficients_dps", "[109.60, 763.31, 1350.36]"),
             ("std_max_dps", "0.01"),
             ("heldout_rms_dps", "0.02"),
+        ],
+    ),
+    (
+        "correction",
+        &[
+            ("period_s", "10.0"),
+            ("full_scale_dps", "500.0"),
+            ("noise_dps", "1e-3"),
+            (
+                "inputs",
+                "[{ column = \"phase_rad\", offset = -1.8, scale = 0.4 }]",
+            ),
+            (
+                "terms",
+                "[{ kind = \"lag\", gain_dps = 0.5, input = 0, tau_s = 600.0 }]",
+            ),
         ],
     ),
     (

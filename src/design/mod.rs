@@ -6,6 +6,7 @@
 //! gyro, by name; [`limits`] refuses formats whose exact intermediates the engine cannot hold; [`template`] holds the embedded default and what `gyrogen init` writes.
 
 mod circuit_tables;
+mod correction_table;
 mod device_tables;
 mod effect_catalogue;
 pub mod effects;

@@ -1,7 +1,7 @@
 //! From a design file to a checked [`Design`], with the place of every mistake.
 
 use super::table::{Doc, Table};
-use super::{circuit_tables, device_tables, limits, template};
+use super::{circuit_tables, correction_table, device_tables, limits, template};
 use crate::design::schema::*;
 use crate::error::{Error, InputError, Result, io_error};
 use sha2::{Digest, Sha256};
@@ -69,10 +69,16 @@ fn build(text: &str, file: Option<&Path>, base: Option<&Design>) -> Result<Desig
         base.and_then(|b| b.compensation.clone())
     };
     let section = |key| root.section(key);
+    let planned = section("correction")?;
+    let correction = planned
+        .is_given()
+        .then(|| correction_table::correction(&planned))
+        .transpose()?;
     let design = Design {
         name,
         circuit,
         compensation,
+        correction,
         // The embedded default's formats are nobody's choice.
         compensation_is_own: own.is_given() && base.is_some(),
         gyro: device_tables::gyro(&section("gyro")?, base.map(|b| &b.gyro))?,

@@ -2,6 +2,7 @@
 //! `docs/manual.md`; their meaning is stated there and only summarised here.
 
 use super::effects::Effects;
+use crate::correction::Planned;
 use crate::numeric::format::{Format, Overflow, Quantizer, Rounding, pow2};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -15,6 +16,8 @@ pub struct Design {
     pub circuit: Circuit,
     /// The bias compensation; absent = no `rate` column.
     pub compensation: Option<Compensation>,
+    /// A correction of averaged readings beside it; from `gyrogen close`.
+    pub correction: Option<Planned>,
     /// True if the file gave its own `[compensation]` (and so chose the formats itself).
     pub compensation_is_own: bool,
     /// The gyro: the declared model and the plant's parameters.

@@ -18,6 +18,8 @@ pub enum Part {
     Compensation,
     /// The constant tables.
     Tables,
+    /// The correction of averaged readings.
+    Correction,
     /// The whole chain; the compensation alone where its thermometer is not the chain's phase.
     Chain,
 }
@@ -164,7 +166,7 @@ pub fn trace_compensation(design: &Design) -> Program {
     trace.finish()
 }
 
-fn states(program: &Program) -> Vec<StateType> {
+pub(super) fn states(program: &Program) -> Vec<StateType> {
     let mut states: Vec<StateType> = Vec::new();
     for function in &program.functions {
         if function.state.is_empty() {

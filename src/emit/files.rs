@@ -3,6 +3,7 @@
 use super::bundle::{Bundle, Part};
 use super::machine::{Type, Width};
 use super::manifest::{self, Header, Manifest};
+use super::stepped::StreamView;
 use super::views::{self, FunctionView, Language, StateView, StructView, TableView, mix};
 use super::{c, calibrated, rust};
 use crate::approx::bias::certainty;
@@ -71,7 +72,8 @@ pub struct View {
     initial: Vec<String>,
     sample_faults: bool,
     period_faults: bool,
-    stimulated: bool,
+    pub(super) stimulated: bool,
+    pub(super) stream: Option<StreamView>,
     seed: u64,
     chain_count: usize,
     code_low: String,
@@ -230,6 +232,7 @@ impl View {
             sample_faults: faults("sample"),
             period_faults: faults("period"),
             stimulated: bundle.has_chain || functions.iter().any(|f| f.tested),
+            stream: None,
             seed: SEED,
             chain_count: PERIODS * bundle.ratio as usize,
             code_low: String::new(),

@@ -24,7 +24,7 @@ pub struct Manifest {
     pub command: String,
     /// `c` or `rust`.
     pub language: String,
-    /// `compensation`, `tables` or `chain`.
+    /// `compensation`, `tables`, `chain`, `function` or `correction`.
     pub part: String,
     /// Prefix (C) or crate (Rust).
     pub prefix: String,
@@ -34,6 +34,9 @@ pub struct Manifest {
     pub functions: Vec<FunctionEntry>,
     /// The whole chain has vectors.
     pub chain: Option<ChainEntry>,
+    /// The function with a state that is called once a reading, where there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stream: Option<FunctionEntry>,
     /// Casts whose overflow is an error, by fault number.
     pub faults: Vec<FaultEntry>,
     /// The compensation's calibrated range, where one is known.
@@ -282,6 +285,7 @@ impl Manifest {
                 ratio: bundle.ratio,
                 columns: header.columns.iter().map(|&c| c.to_owned()).collect(),
             }),
+            stream: None,
             faults: casts
                 .filter(|(_, cast)| cast.overflow == Some(Overflow::Error))
                 .filter(|(k, _)| !bundle.program.is_proved_in_range(*k))

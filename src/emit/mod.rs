@@ -12,4 +12,5 @@ mod lower_cast;
 pub mod machine;
 pub mod manifest;
 pub mod rust;
+pub mod stepped;
 pub mod views;

@@ -102,6 +102,14 @@ impl Firmware {
 }
 
 impl Built {
+    /// Builds the driver of a bundle.
+    ///
+    /// # Errors
+    /// No compiler; sources that do not compile.
+    pub fn of_files(files: Vec<EmittedFile>, language: Language, prefix: &str) -> Result<Self> {
+        built(files, language, prefix)
+    }
+
     /// Outputs of a function for each input, the fault left out; `outputs` words each.
     ///
     /// # Errors
@@ -147,13 +155,17 @@ impl Built {
 
 fn build(design: &Design, part: Part, language: Language, command: &str) -> Result<Built> {
     let files = files::emit(design, part, language, command)?;
+    Built::of_files(files, language, &design.name)
+}
+
+fn built(files: Vec<EmittedFile>, language: Language, prefix: &str) -> Result<Built> {
     let folder = tempfile::Builder::new()
         .prefix("gyrogen-firmware-")
         .tempdir()
         .map_err(|e| io_error(std::env::temp_dir(), "make a folder for the firmware", &e))?;
     files::write(&files, folder.path())?;
     let sources: Vec<String> = files.iter().map(|f| f.path.clone()).collect();
-    let harness = toolchain::build(language, &design.name, folder.path(), &sources)?;
+    let harness = toolchain::build(language, prefix, folder.path(), &sources)?;
     Ok(Built {
         language,
         files,
@@ -163,7 +175,7 @@ fn build(design: &Design, part: Part, language: Language, command: &str) -> Resu
 }
 
 /// Two jobs side by side; what they give does not depend on which ends first.
-fn both<T: Send>(a: impl FnOnce() -> T + Send, b: impl FnOnce() -> T + Send) -> (T, T) {
+pub(crate) fn both<T: Send>(a: impl FnOnce() -> T + Send, b: impl FnOnce() -> T + Send) -> (T, T) {
     std::thread::scope(|scope| {
         let second = scope.spawn(b);
         let first = a();

@@ -87,13 +87,7 @@ pub fn verify(folder: &Path, target: Target, command: &str) -> Result<Verificati
         for function in &manifest.functions {
             let path = folder.join(format!("vectors/{}.csv", function.name));
             let rows = read_words(&path, function.inputs + function.outputs + 1)?;
-            let split: (Vec<_>, Vec<_>) = rows
-                .into_iter()
-                .map(|mut row| {
-                    let outputs = row.split_off(function.inputs);
-                    (row, outputs)
-                })
-                .unzip();
+            let split = split(rows, function.inputs);
             functions.push(compare::calls(
                 language,
                 &harness,
@@ -108,6 +102,15 @@ pub fn verify(folder: &Path, target: Target, command: &str) -> Result<Verificati
                     compare::every_input(language, &harness, &function.name, words, &blocks)?;
                 functions.push(every);
             }
+        }
+        if let Some(stream) = &manifest.stream {
+            let path = folder.join(format!("vectors/{}.csv", stream.name));
+            let rows = read_words(&path, stream.inputs + stream.outputs + 1)?;
+            let (inputs, outputs) = split(rows, stream.inputs);
+            let name = &stream.name;
+            functions.push(compare::stream(
+                language, &harness, name, &inputs, &outputs,
+            )?);
         }
         if let Some(chain) = &manifest.chain {
             let codes = read_words(&folder.join("vectors/chain_input.csv"), 2)?;
@@ -200,6 +203,15 @@ fn read_words(path: &Path, columns: usize) -> Result<Vec<Vec<i128>>> {
         }
     }
     Ok(rows)
+}
+
+/// Rows as inputs and outputs.
+fn split(rows: Vec<Vec<i128>>, inputs: usize) -> (Vec<Vec<i128>>, Vec<Vec<i128>>) {
+    let parts = rows.into_iter().map(|mut row| {
+        let outputs = row.split_off(inputs);
+        (row, outputs)
+    });
+    parts.unzip()
 }
 
 fn read_tables(folder: &Path) -> Result<BTreeMap<String, Vec<i128>>> {

@@ -197,13 +197,39 @@ pub fn calls(
     inputs: &[Vec<i128>],
     expected: &[Vec<i128>],
 ) -> Result<Compared> {
+    records(language, harness, "call", name, inputs, expected)
+}
+
+/// Compares a function with a state, called once a reading, on given inputs from its state at zeros; the
+/// last expected word is the fault.
+///
+/// # Errors
+/// A test driver that cannot be run.
+pub fn stream(
+    language: Language,
+    harness: &Harness,
+    name: &str,
+    inputs: &[Vec<i128>],
+    expected: &[Vec<i128>],
+) -> Result<Compared> {
+    records(language, harness, "stream", name, inputs, expected)
+}
+
+fn records(
+    language: Language,
+    harness: &Harness,
+    mode: &str,
+    name: &str,
+    inputs: &[Vec<i128>],
+    expected: &[Vec<i128>],
+) -> Result<Compared> {
     let words = inputs.iter().flatten().map(|w| *w as i64);
     let bytes: Vec<u8> = words.flat_map(i64::to_ne_bytes).collect();
     let record = expected.first().map_or(1, Vec::len);
     let mut tally = Tally::new(language, name);
     let mut k = 0;
     harness.run(
-        &["call".to_owned(), name.to_owned()],
+        &[mode.to_owned(), name.to_owned()],
         bytes,
         record,
         &mut |words| {

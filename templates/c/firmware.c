@@ -21,4 +21,9 @@ bool {{ v.p }}_push({{ v.p }}_t *g, int32_t drive, int32_t sense, {{ v.p }}_peri
     *row = {{ v.p }}_period(&g->chain{% if v.period_faults %}, &g->fault{% endif %});
     return true;
 }
+{% endif %}{% if let Some(t) = v.stream %}void {{ v.p }}_init({{ v.p }}_{{ t.state }}_t *s)
+{
+    static const {{ v.p }}_{{ t.state }}_t zero = {0};
+    *s = zero;
+}
 {% endif %}

@@ -2,7 +2,7 @@
  *
  * Host-side driver, not firmware. `selftest` runs the start-up check; `table NAME` writes a table;
  * `call NAME` reads int64 inputs and writes the outputs; `range NAME LOW COUNT` counts one input
- * up; `chain` reads int32 pairs (drive, sense) and writes rows. Words are native int64; every record
+ * up; `stream` calls a function with a state for int64 inputs from the state at zeros; `chain` reads int32 pairs (drive, sense) and writes rows. Words are native int64; every record
  * ends with the number of the fault, 0 = none.
  */
 #include <inttypes.h>
@@ -89,7 +89,22 @@ static int table(const char *name)
     return 2;
 }
 
-{% if v.chain %}static int chain(void)
+{% if let Some(t) = v.stream %}static int stream(void)
+{
+    static {{ v.p }}_{{ t.state }}_t s;
+    int64_t in[16];
+    {{ v.p }}_init(&s);
+    while (get(in, {{ t.function.inputs.len() }}U * sizeof(int64_t)) == 1U) {
+        const {{ t.function.result }} r = {{ v.p }}_{{ t.function.name }}(&s, {{ t.function.harness_arguments }});
+        uint64_t out[{{ t.function.outputs.len() + 1 }}U];
+{% for o in t.function.outputs %}        out[{{ loop.index0 }}] = {{ o }};
+{% endfor %}        out[{{ t.function.outputs.len() }}] = UINT64_C(0);
+        put(out, {{ t.function.outputs.len() + 1 }}U);
+    }
+    return 0;
+}
+
+{% endif %}{% if v.chain %}static int chain(void)
 {
     static {{ v.p }}_t g;
     {{ v.p }}_period_out_t row;
@@ -126,7 +141,10 @@ static int table(const char *name)
     if ((strcmp(mode, "table") == 0) && (argc > 2)) {
         return table(argv[2]);
     }
-{% if v.chain %}    if (strcmp(mode, "chain") == 0) {
+{% if v.stream.is_some() %}    if (strcmp(mode, "stream") == 0) {
+        return stream();
+    }
+{% endif %}{% if v.chain %}    if (strcmp(mode, "chain") == 0) {
         return chain();
     }
 {% endif %}    (void)fprintf(stderr, "unknown mode or function\n");

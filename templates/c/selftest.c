@@ -62,5 +62,20 @@ static uint64_t {{ v.p }}_mix(uint64_t h, uint64_t word)
     if (h != UINT64_C({{ v.chain_checksum }})) {
         return UINT32_C({{ v.chain_number }}); /* chain */
     }
+{% endif %}{% if let Some(t) = v.stream %}
+    {
+        {{ v.p }}_{{ t.state }}_t s;
+        uint64_t x = UINT64_C({{ v.seed }});
+        {{ v.p }}_init(&s);
+        for (uint32_t k = UINT32_C(0); k < UINT32_C({{ t.count }}); ++k) {
+            const {{ t.function.inputs[0].ty }} a0 = ((k % UINT32_C({{ t.restart }})) == UINT32_C(0)) ? 1 : 0;
+{% for i in t.function.inputs %}{% if !loop.first %}            const {{ i.ty }} a{{ loop.index0 }} = ({{ i.ty }}){{ v.p }}_stimulus(&x, {{ i.low }}, {{ i.span }});
+{% endif %}{% endfor %}            const {{ t.function.result }} r = {{ v.p }}_{{ t.function.name }}(&s, {{ t.function.arguments }});
+{% for o in t.function.outputs %}            h = {{ v.p }}_mix(h, {{ o }});
+{% endfor %}        }
+    }
+    if (h != UINT64_C({{ t.checksum }})) {
+        return UINT32_C({{ t.number }}); /* {{ t.function.name }} */
+    }
 {% endif %}    return UINT32_C(0);
 }

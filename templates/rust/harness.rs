@@ -37,7 +37,21 @@ fn table(name: &str) -> Option<Vec<u64>> {
     }
 }
 
-{% if v.chain %}fn chain(input: &mut impl Read, output: &mut impl Write) {
+{% if let Some(t) = v.stream %}fn stream(input: &mut impl Read, output: &mut impl Write) {
+    let mut s = {{ v.p }}::{{ t.camel }}::default();
+    loop {
+        let a: Vec<i64> = (0..{{ t.function.inputs.len() }})
+            .map_while(|_| get::<8>(input).map(i64::from_ne_bytes))
+            .collect();
+        if a.len() < {{ t.function.inputs.len() }} {
+            break;
+        }
+        let r = {{ v.p }}::{{ t.function.name }}(&mut s, {{ t.function.harness_arguments }});
+        put(output, &[{% for o in t.function.outputs %}{{ o }}, {% endfor %}0]);
+    }
+}
+
+{% endif %}{% if v.chain %}fn chain(input: &mut impl Read, output: &mut impl Write) {
     let mut g = {{ v.p }}::Detector::new();
     while let Some(bytes) = get::<8>(input) {
         let [a, b, c, d, e, f, h, i] = bytes;
@@ -91,7 +105,8 @@ fn table(name: &str) -> Option<Vec<u64>> {
                 put(&mut output, &out);
             }
         }
-{% if v.chain %}        ("chain", _) => chain(&mut input, &mut output),
+{% if v.stream.is_some() %}        ("stream", _) => stream(&mut input, &mut output),
+{% endif %}{% if v.chain %}        ("chain", _) => chain(&mut input, &mut output),
 {% endif %}        _ => {
             eprintln!("unknown mode or function");
             std::process::exit(2);

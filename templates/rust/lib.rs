@@ -125,5 +125,19 @@ pub fn selftest() -> u32 {
             return {{ v.chain_number }}; // chain
         }
     }
+{% endif %}{% if let Some(t) = v.stream %}    {
+        let mut h = BASIS;
+        let mut x = {{ v.seed }}_u64;
+        let mut s = {{ t.camel }}::default();
+        for k in 0..{{ t.count }}_u32 {
+            let a0 = {{ t.function.inputs[0].ty }}::from(k % {{ t.restart }} == 0);
+{% for i in t.function.inputs %}{% if !loop.first %}            let a{{ loop.index0 }} = stimulus(&mut x, {{ i.low }}, {{ i.span }}) as {{ i.ty }};
+{% endif %}{% endfor %}            let r = {{ t.function.name }}(&mut s, {{ t.function.arguments }});
+{% for o in t.function.outputs %}            h = mix(h, {{ o }});
+{% endfor %}        }
+        if h != {{ t.checksum }} {
+            return {{ t.number }}; // {{ t.function.name }}
+        }
+    }
 {% endif %}    0
 }

@@ -1,0 +1,121 @@
+//! How far a fixed-point reading can be from the plan in real numbers.
+//!
+//! Term by term, every rounding at its worst, to first order in the errors (a factor below covers their
+//! products). Notation: h = half an LSB of the sum; g = half an LSB of a gain; d = one LSB of an input
+//! (its rounding, or 1 held at the largest word).
+//!
+//! | term | at most |
+//! |---|---|
+//! | constant, step | h |
+//! | product of m factors | g + abs(gain) (m d + (m - 1) 2^-31) + h |
+//! | lag of c, size S | 2 S g + abs(gain) (2 e + s / a + 2 S (q + q) / a + 2^-31) + h; e: error of c; s: half an LSB of the state, which decays by a a step and so sums up to s / a; q: half an LSB of a and b |
+//! | curve | slope d + h (knots) + h (between them) |
+//! | slope | 2 g + 2 abs(gain) d + h |
+//! | decay | g + abs(gain) (s / a + q / a + 2^-31) + h |
+//! | on the rate, error k r | R (error of k) + h, R the largest rate; errors before it grow by 1 + 3 K, K the largest k |
+
+use super::formats::{Formats, PRODUCT_BITS, largest_bias_dps, slope_dps, steepest};
+use super::plan::{Plan, Term};
+use super::rate_terms::{constant, share_bits};
+use super::states::{Approach, lagged_curve_bits};
+use super::terms::GAIN_BITS;
+use crate::numeric::format::pow2;
+
+/// Covers products of errors.
+const SECOND_ORDER: f64 = 1.01;
+
+/// The bound for readings within the words, deg/s.
+pub(super) fn bound_dps(plan: &Plan, formats: &Formats) -> f64 {
+    let rate_lsb = formats.rate.lsb();
+    let mut bound = rate_lsb / 2.0;
+    for term in &plan.terms {
+        bound += on_bias(plan, formats, term);
+    }
+    let largest = pow2(formats.rate_exponent()) + largest_bias_dps(plan);
+    for term in plan.terms.iter().filter(|t| t.is_on_rate()) {
+        let (share, error) = on_rate(formats, term, largest);
+        bound = bound * (1.0 + 3.0 * share) + largest * error + formats.sum_lsb_dps() / 2.0;
+    }
+    (bound + rate_lsb / 2.0) * SECOND_ORDER
+}
+
+fn on_bias(plan: &Plan, formats: &Formats, term: &Term) -> f64 {
+    let half = formats.sum_lsb_dps() / 2.0;
+    let gain_half = half * pow2(-GAIN_BITS);
+    let product_half = pow2(-PRODUCT_BITS - 1);
+    let d = |input: usize| pow2(-formats.input_bits(input));
+    let inputs: f64 = {
+        let one = Plan {
+            terms: vec![term.clone()],
+            ..plan.clone()
+        };
+        let all = 0..plan.inputs.len();
+        all.map(|k| slope_dps(&one, k) * d(k)).sum()
+    };
+    // What a state and its rates add: s / a, and what q does, for a range of 2 `size`.
+    let state = |gain: f64, tau_s: f64, size: f64, from: i32| {
+        let approach = Approach::new(plan, formats, tau_s, gain * size.max(1.0));
+        let a = approach.a as f64 * pow2(-approach.fraction_bits);
+        let s = pow2(-approach.state_bits.max(from) - 1);
+        let q = pow2(-approach.fraction_bits - 1);
+        gain.abs() * (s / a + 4.0 * size * q / a + product_half)
+    };
+    match term {
+        Term::Product { factors, gain_dps } => {
+            let count: u32 = factors.iter().map(|(_, p)| *p).sum();
+            let rounded = gain_dps.abs() * f64::from(count.saturating_sub(1)) * product_half;
+            gain_half + inputs + rounded + half
+        }
+        Term::Lag {
+            gain_dps,
+            input,
+            tau_s,
+        } => {
+            let from = formats.input_bits(*input);
+            2.0 * gain_half + inputs + state(*gain_dps, *tau_s, 1.0, from) + half
+        }
+        Term::LagOfCurve {
+            gain_dps,
+            values,
+            tau_s,
+            ..
+        } => {
+            let size = values.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+            let from = lagged_curve_bits(formats, *gain_dps);
+            // Knot and blend, on x and on y.
+            let curve = gain_dps.abs() * 2.0 * pow2(-from);
+            let own = state(*gain_dps, *tau_s, size, from);
+            2.0 * size * gain_half + inputs + curve + own + half
+        }
+        Term::Slope { .. } => 2.0 * gain_half + inputs + half,
+        Term::Decay { gain_dps, tau_s } => gain_half + state(*gain_dps, *tau_s, 1.0, 0) + half,
+        Term::Curve { values_dps, input } => steepest(values_dps) * d(*input) + 2.0 * half,
+        Term::Step { .. } => half,
+        Term::ScaleBy { .. } | Term::Cubic { .. } | Term::Even { .. } => 0.0,
+    }
+}
+
+/// The largest k of a term on the rate, and its error.
+fn on_rate(formats: &Formats, term: &Term, largest: f64) -> (f64, f64) {
+    let c = constant(formats, term).unwrap_or(0.0).abs();
+    let half = pow2(-share_bits(formats) - 1);
+    let u = largest * pow2(-formats.rate_exponent());
+    match term {
+        Term::ScaleBy {
+            input: Some(input),
+            s1,
+            ..
+        } => {
+            let x = s1.abs() * pow2(-formats.input_bits(*input));
+            (c + s1.abs(), 3.0 * half + x)
+        }
+        Term::Even {
+            absolute: false, ..
+        } => (c * u, half * (1.0 + u)),
+        Term::Cubic { .. } => {
+            let square = pow2(-PRODUCT_BITS - 1);
+            (c * u * u, half * (1.0 + u * u) + c * square)
+        }
+        _ => (c, half),
+    }
+}

@@ -1,0 +1,117 @@
+//! Emitted C and Rust against the model, and damage to them.
+
+use super::firmware::{Origin, emit};
+use super::sample::{plan, record};
+use super::*;
+use crate::emit::files;
+use crate::emit::views::Language;
+use crate::verify::bundle::verify;
+
+const ORIGIN: Origin = Origin {
+    prefix: "tested",
+    sha256: "0",
+    command: "test",
+};
+
+#[test]
+fn emitted_c_and_rust_are_the_model_bit_for_bit_on_random_plans() {
+    for seed in 0..10u64 {
+        // No input, one and so on up to eight, and relays.
+        let plan = plan(1000 + seed, seed as usize % 9, true);
+        let correction = Correction::auto(&plan).unwrap();
+        let firmware = Firmware::make(&correction, &ORIGIN).unwrap();
+        let readings = record(&plan, 3000, seed);
+        let compared = firmware.compare(&correction, &readings).unwrap();
+        assert!(compared.len() >= 2);
+        for c in compared {
+            assert_eq!(c.mismatches, 0, "plan {seed}: {} {:?}", c.name, c.first);
+            assert!(c.name != "correct" || c.inputs >= 3000);
+        }
+    }
+}
+
+#[test]
+fn a_bundle_verifies_from_its_files_and_damage_to_a_constant_shows() {
+    let plan = plan(2004, 3, true);
+    let correction = Correction::auto(&plan).unwrap();
+    for language in [Language::C, Language::Rust] {
+        let emitted = emit(&correction, &ORIGIN, language).unwrap();
+        assert_eq!(emitted, emit(&correction, &ORIGIN, language).unwrap());
+        let folder = tempfile::tempdir().unwrap();
+        files::write(&emitted, folder.path()).unwrap();
+        let good = verify(folder.path(), "test").unwrap();
+        assert!(good.holds && good.selftest == Some(true), "{good:?}");
+        assert!(
+            good.functions
+                .iter()
+                .any(|f| f.name == "correct" && f.inputs == 3072)
+        );
+
+        // Each multiplier of the step: one in 256 more shows in all of them, one LSB in nearly all (a
+        // constant may be finer than any output).
+        let source = match language {
+            Language::C => "tested.c",
+            Language::Rust => "src/lib.rs",
+        };
+        let file = emitted.iter().find(|f| f.path == source).unwrap();
+        let mut unseen = Vec::new();
+        let count = multipliers(&file.text, language).len();
+        // Both languages print the same program; compiling Rust takes longer.
+        let every = if language == Language::C { 1 } else { 6 };
+        let ks = (0..count).step_by(every);
+        for (k, share) in ks.flat_map(|k| [(k, 256), (k, i64::MAX)]) {
+            let (what, damaged) = damage(&file.text, language, k, share);
+            std::fs::write(folder.path().join(source), damaged).unwrap();
+            let bad = verify(folder.path(), "test").unwrap();
+            if bad.vectors.mismatches == 0 {
+                unseen.push((what, share));
+            }
+        }
+        assert!(
+            count >= 10 && unseen.len() <= count / 10,
+            "{count}: {unseen:#?}"
+        );
+        assert!(
+            unseen.iter().all(|(_, share)| *share == i64::MAX),
+            "{unseen:#?}"
+        );
+    }
+}
+
+/// Place and value of each constant that something is multiplied by.
+fn multipliers(text: &str, language: Language) -> Vec<(std::ops::Range<usize>, i64)> {
+    let after = match language {
+        Language::C => ") * ",
+        Language::Rust => ".wrapping_mul(",
+    };
+    let mut found = Vec::new();
+    let mut start = 0;
+    for line in text.split_inclusive('\n') {
+        if let Some(end) = line.find(after).filter(|_| line.contains(" t")) {
+            let head = line[..end].trim_end_matches(')');
+            let head = head.trim_end_matches("_i64").trim_end_matches("_i32");
+            let digits = head.trim_end_matches(|c: char| c.is_ascii_digit()).len();
+            let sign = line[..digits].trim_end_matches(['-', '(']);
+            let is_first = match language {
+                Language::C => line[..digits].ends_with("_C("),
+                Language::Rust => sign.ends_with("= "),
+            };
+            if let Ok(value) = head[digits..].parse::<i64>()
+                && is_first
+            {
+                found.push((start + digits..start + head.len(), value));
+            }
+        }
+        start += line.len();
+    }
+    found
+}
+
+/// The source with the k-th multiplier more by its share, at least by one; and its line.
+fn damage(text: &str, language: Language, k: usize, share: i64) -> (String, String) {
+    let (range, value) = multipliers(text, language)[k].clone();
+    let line = text[range.start..].lines().next().unwrap_or("");
+    let mut damaged = text.to_owned();
+    damaged.replace_range(range, &(value + value / share + 1).to_string());
+    (line.to_owned(), damaged)
+}

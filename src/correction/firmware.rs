@@ -1,0 +1,144 @@
+//! The correction as C and Rust: emitted, built, compared with the model on a record's readings.
+
+use super::run::{Correction, Reading};
+use crate::emit::bundle::Bundle;
+use crate::emit::files::{self, EmittedFile};
+use crate::emit::stepped::{self, Stepped};
+use crate::emit::views::{self, Language};
+use crate::error::Result;
+use crate::job::firmware::{Built, both};
+use crate::verify::compare::{self, Compared};
+use std::path::Path;
+
+/// Where an emitted correction comes from.
+#[derive(Debug, Clone, Copy)]
+pub struct Origin<'a> {
+    /// Prefix of every name in C, the crate in Rust: a C identifier.
+    pub prefix: &'a str,
+    /// SHA-256 of the design (or of the request that stands in its place).
+    pub sha256: &'a str,
+    /// The command that makes it again.
+    pub command: &'a str,
+}
+
+/// Both languages' bundles, with their built test drivers.
+#[derive(Debug)]
+pub struct Firmware {
+    /// What was traced.
+    pub bundle: Bundle,
+    /// C: files and driver.
+    pub c: Built,
+    /// Rust: files and driver.
+    pub rust: Built,
+}
+
+/// Emits a correction in one language, as files in memory: sources, self-test, driver, vectors, manifest.
+///
+/// # Errors
+/// A template that cannot be printed (a fault of the tool).
+pub fn emit(
+    correction: &Correction,
+    origin: &Origin,
+    language: Language,
+) -> Result<Vec<EmittedFile>> {
+    let what = Stepped {
+        prefix: origin.prefix,
+        program: &correction.trace(),
+        model: &|calls| correction.run_words(calls),
+        part: "correction",
+        facts: facts(correction),
+        request_sha256: origin.sha256,
+        command: origin.command,
+    };
+    stepped::emit(&what, language)
+}
+
+/// The plan and its words in sentences, for the head of the sources.
+pub fn facts(correction: &Correction) -> Vec<String> {
+    let (plan, formats) = (&correction.plan, &correction.formats);
+    let mut facts = vec![
+        format!(
+            "correction of averaged readings, one call each nominal {:?} s; after a gap of k periods, k calls with the new words",
+            plan.period_s
+        ),
+        format!(
+            "rate {} deg/s in and out, sum on 2^-{} deg/s, for a noise of {:e} deg/s",
+            formats.rate, formats.sum_fraction_bits, formats.noise_dps
+        ),
+    ];
+    for (k, (input, format)) in plan.inputs.iter().zip(&formats.inputs).enumerate() {
+        facts.push(format!(
+            "input {} (input_{}): ({} - ({:?})) / ({:?}), {format}, rounded and held within it",
+            k,
+            k + 1,
+            input.column,
+            input.offset,
+            input.scale
+        ));
+    }
+    facts.extend(plan.terms.iter().map(|t| {
+        let text = format!("{t:?}");
+        // A curve's knots are in its table.
+        let cut = text.find("values").filter(|_| text.len() > 160);
+        cut.and_then(|end| text.get(..end).map(|t| format!("{t}.. }}")))
+            .unwrap_or(text)
+    }));
+    facts.push(format!(
+        "at most {:.2e} deg/s from these terms in real numbers (analysis), where no word saturates and no relay switches at another reading",
+        correction.bound_dps()
+    ));
+    facts
+}
+
+impl Firmware {
+    /// Emits and builds both.
+    ///
+    /// # Errors
+    /// No compiler; sources that do not compile.
+    pub fn make(correction: &Correction, origin: &Origin) -> Result<Self> {
+        let one = |language| {
+            Built::of_files(emit(correction, origin, language)?, language, origin.prefix)
+        };
+        let (c, rust) = both(|| one(Language::C), || one(Language::Rust));
+        Ok(Firmware {
+            bundle: stepped::bundle(origin.prefix, &correction.trace()),
+            c: c?,
+            rust: rust?,
+        })
+    }
+
+    /// Compares both with the model on these readings, call by call and bit for bit, and their tables: C
+    /// first.
+    ///
+    /// # Errors
+    /// A driver that cannot be run.
+    pub fn compare(&self, correction: &Correction, readings: &[Reading]) -> Result<Vec<Compared>> {
+        let (calls, _) = correction.calls(readings);
+        let words = correction.run_words(&calls);
+        let expected: Vec<Vec<i128>> = words.into_iter().map(|word| vec![word, 0]).collect();
+        let one = |built: &Built| -> Result<Vec<Compared>> {
+            let (language, harness) = (built.language, &built.harness);
+            let mut all = Vec::new();
+            for table in views::tables(&self.bundle, language) {
+                let entries: Vec<i128> = table.entries.iter().map(|v| i128::from(*v)).collect();
+                all.push(compare::table(language, harness, &table.name, &entries)?);
+            }
+            let name = super::block::STEP;
+            all.push(compare::stream(language, harness, name, &calls, &expected)?);
+            Ok(all)
+        };
+        let (c, rust) = both(|| one(&self.c), || one(&self.rust));
+        let mut all = c?;
+        all.extend(rust?);
+        Ok(all)
+    }
+
+    /// Writes `firmware/c` and `firmware/rust` under `folder`.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
+    pub fn write(&self, folder: &Path) -> Result<()> {
+        files::write(&self.c.files, &folder.join("firmware/c"))?;
+        files::write(&self.rust.files, &folder.join("firmware/rust"))
+    }
+}

@@ -1,0 +1,33 @@
+//! The correction of averaged readings: causes that a record called for, carried into firmware.
+//!
+//! [`Plan`] says in real numbers what is subtracted (declared bias, lags, slopes, decays, curves, steps, laws of
+//! the rate); [`Formats`] chooses the words; [`Correction`] runs the one step that both make, [`block::Step`],
+//! bit-accurately and without quantisation; [`firmware`] emits it as C and Rust and compares.
+
+pub mod block;
+mod bound;
+mod curve;
+pub mod firmware;
+mod formats;
+mod plan;
+mod rate_terms;
+mod run;
+mod states;
+mod terms;
+mod text;
+
+pub use firmware::Firmware;
+pub use formats::{Formats, NOISE_PER_FULL_SCALE};
+pub use plan::{
+    HIGHEST_POWER, Input, LONGEST_TAU_PERIODS, MOST_INPUTS, MOST_KNOTS, MOST_OF_A_KIND,
+    MOST_SLOPE_ROWS, Plan, SHORTEST_TAU_PERIODS, Term,
+};
+pub use run::{Correction, MOST_STEPS, Reading, Steps, readings, schedule};
+pub use text::Planned;
+
+#[cfg(test)]
+mod emission_tests;
+#[cfg(test)]
+mod sample;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,331 @@
+//! The plan of a correction: what is subtracted from a reading, in real numbers.
+
+use crate::error::{InputError, Result};
+
+/// Most inputs of a plan.
+pub const MOST_INPUTS: usize = 8;
+/// Most terms of a kind that has a state or a table.
+pub const MOST_OF_A_KIND: usize = 8;
+/// Most knots of a curve.
+pub const MOST_KNOTS: usize = 1025;
+/// Most readings that a slope reaches back.
+pub const MOST_SLOPE_ROWS: u32 = 64;
+/// The longest time constant, in nominal periods: beyond it a state word would need more than 64 bits
+/// in a product.
+pub const LONGEST_TAU_PERIODS: f64 = 1e6;
+/// The shortest: below it a lag is its input.
+pub const SHORTEST_TAU_PERIODS: f64 = 0.01;
+/// The highest power of an input in a product.
+pub const HIGHEST_POWER: u32 = 9;
+
+/// A correction of averaged readings, in real numbers.
+///
+/// With the scaled inputs x (each held within -1 ..= 1) and the reading r, deg/s, first
+/// r1 = r - (sum of the terms on the bias), then the terms on the rate ([`Term::ScaleBy`],
+/// [`Term::Cubic`], [`Term::Even`]) one after the other in the plan's order, each on what the one
+/// before it left. Wherever they stand in [`Plan::terms`], terms on the rate come after those on the bias.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// Nominal time between readings, s.
+    pub period_s: f64,
+    /// What firmware reads beside the rate.
+    pub inputs: Vec<Input>,
+    /// Full scale of the output rate, deg/s.
+    pub full_scale_dps: f64,
+    /// What is corrected.
+    pub terms: Vec<Term>,
+}
+
+/// An input: x = (value - offset) / scale, held within -1 ..= 1.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Input {
+    /// Contract name of the record's column (never `rate_out_dps`), or an auxiliary one.
+    pub column: String,
+    /// In the column's unit.
+    pub offset: f64,
+    /// In the column's unit; not 0.
+    pub scale: f64,
+}
+
+/// One term. Inputs are named by their position in [`Plan::inputs`].
+#[derive(Debug, Clone, PartialEq)]
+pub enum Term {
+    /// gain * product of x^power; without factors a constant.
+    Product {
+        /// deg/s.
+        gain_dps: f64,
+        /// (input, power); powers 1 ..= 9.
+        factors: Vec<(usize, u32)>,
+    },
+    /// gain * (x - y), tau dy/dt = x - y, exact for an input that is linear between readings; y = x at
+    /// the first reading after power-on.
+    Lag {
+        /// deg/s.
+        gain_dps: f64,
+        /// x.
+        input: usize,
+        /// tau, s.
+        tau_s: f64,
+    },
+    /// The same of c(x), the curve through equidistant knots over -1 ..= 1, linear between them.
+    LagOfCurve {
+        /// deg/s.
+        gain_dps: f64,
+        /// x.
+        input: usize,
+        /// c at the knots, 1.
+        values: Vec<f64>,
+        /// tau, s.
+        tau_s: f64,
+    },
+    /// gain * (x now - x `rows` readings ago) / (rows * period); 0 at the first reading.
+    Slope {
+        /// deg/s per 1/s.
+        gain_dps_s: f64,
+        /// x.
+        input: usize,
+        /// Readings.
+        rows: u32,
+    },
+    /// gain * exp(-t / tau), t since power-on in nominal periods.
+    Decay {
+        /// deg/s.
+        gain_dps: f64,
+        /// tau, s.
+        tau_s: f64,
+    },
+    /// c(x) as in [`Term::LagOfCurve`], in deg/s.
+    Curve {
+        /// x.
+        input: usize,
+        /// c at the knots, deg/s.
+        values_dps: Vec<f64>,
+    },
+    /// gain while the relay is on: on from x >= centre + gap/2, off from x < centre - gap/2, else as
+    /// before; at power-on, on where x >= centre.
+    Step {
+        /// deg/s.
+        gain_dps: f64,
+        /// x.
+        input: usize,
+        /// In x.
+        centre: f64,
+        /// In x; not negative.
+        gap: f64,
+        /// Never off again, not even by a restart, once it was on; off before the first time.
+        once: bool,
+    },
+    /// r -> r - r (s0 + s1 x).
+    ScaleBy {
+        /// x; `None`: s1 is not used.
+        input: Option<usize>,
+        /// 1.
+        s0: f64,
+        /// 1 per unit of x.
+        s1: f64,
+    },
+    /// r -> r - ppm 1e-6 r (r / rate_max)^2.
+    Cubic {
+        /// Parts per million of the rate at `rate_max_dps`.
+        ppm: f64,
+        /// deg/s.
+        rate_max_dps: f64,
+    },
+    /// r -> r - ppm 1e-6 r^2 / rate_max, or with `absolute` r - ppm 1e-6 abs(r).
+    Even {
+        /// Parts per million of the rate at `rate_max_dps`.
+        ppm: f64,
+        /// deg/s.
+        rate_max_dps: f64,
+        /// abs(r) in place of r^2 / rate_max.
+        absolute: bool,
+    },
+}
+
+impl Term {
+    /// The name in a design file.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Term::Product { .. } => "product",
+            Term::Lag { .. } => "lag",
+            Term::LagOfCurve { .. } => "lag_of_curve",
+            Term::Slope { .. } => "slope",
+            Term::Decay { .. } => "decay",
+            Term::Curve { .. } => "curve",
+            Term::Step { .. } => "step",
+            Term::ScaleBy { .. } => "scale_by",
+            Term::Cubic { .. } => "cubic",
+            Term::Even { .. } => "even",
+        }
+    }
+
+    /// True for a term on the rate, which comes after those on the bias.
+    pub fn is_on_rate(&self) -> bool {
+        matches!(
+            self,
+            Term::ScaleBy { .. } | Term::Cubic { .. } | Term::Even { .. }
+        )
+    }
+
+    /// The inputs that it reads.
+    pub fn inputs(&self) -> Vec<usize> {
+        match self {
+            Term::Product { factors, .. } => factors.iter().map(|(input, _)| *input).collect(),
+            Term::Lag { input, .. }
+            | Term::LagOfCurve { input, .. }
+            | Term::Slope { input, .. }
+            | Term::Curve { input, .. }
+            | Term::Step { input, .. } => vec![*input],
+            Term::ScaleBy { input, .. } => input.iter().copied().collect(),
+            Term::Decay { .. } | Term::Cubic { .. } | Term::Even { .. } => Vec::new(),
+        }
+    }
+}
+
+impl Plan {
+    /// Checks every number.
+    ///
+    /// # Errors
+    /// The first thing that cannot become firmware, with the rule.
+    pub fn check(&self) -> Result<()> {
+        positive("period_s", self.period_s)?;
+        within("full_scale_dps", self.full_scale_dps, 1e-3, 1e6)?;
+        if self.inputs.len() > MOST_INPUTS {
+            let given = self.inputs.len();
+            return refuse(format!("{given} inputs; a correction takes {MOST_INPUTS}"));
+        }
+        for input in &self.inputs {
+            finite(&format!("offset of {}", input.column), input.offset)?;
+            finite(&format!("scale of {}", input.column), 1.0 / input.scale)?;
+            finite(&format!("scale of {}", input.column), input.scale)?;
+            if input.column == "rate_out_dps" {
+                return refuse("`rate_out_dps` is what is corrected and no input".into());
+            }
+        }
+        let kinds: [&[&str]; 5] = [
+            &["lag", "lag_of_curve"],
+            &["lag_of_curve", "curve"],
+            &["slope"],
+            &["decay"],
+            &["step"],
+        ];
+        for kind in kinds {
+            let count = self.terms.iter().filter(|t| kind.contains(&t.kind()));
+            if count.count() > MOST_OF_A_KIND {
+                let what = kind.join(" and ");
+                return refuse(format!("more than {MOST_OF_A_KIND} terms `{what}`"));
+            }
+        }
+        self.terms.iter().enumerate().try_for_each(|(k, term)| {
+            let place = format!("term {} ({})", k + 1, term.kind());
+            self.check_term(&place, term)
+        })
+    }
+
+    fn check_term(&self, place: &str, term: &Term) -> Result<()> {
+        let named = |key: &str| format!("{place}: {key}");
+        if let Some(unknown) = term.inputs().iter().find(|k| **k >= self.inputs.len()) {
+            let count = self.inputs.len();
+            return refuse(named(&format!("input {unknown} of {count} inputs")));
+        }
+        let gain = |key: &str, value: f64| within(&named(key), value, -1e6, 1e6);
+        let knots = |values: &[f64]| {
+            if !(2..=MOST_KNOTS).contains(&values.len()) {
+                let count = values.len();
+                return refuse(named(&format!(
+                    "{count} knots; a curve has 2 to {MOST_KNOTS}"
+                )));
+            }
+            values.iter().try_for_each(|v| gain("knot", *v))
+        };
+        let tau = |tau_s: f64| {
+            let (low, high) = (SHORTEST_TAU_PERIODS, LONGEST_TAU_PERIODS);
+            within(&named("tau_s in periods"), tau_s / self.period_s, low, high)
+        };
+        match term {
+            Term::Product { gain_dps, factors } => {
+                if factors
+                    .iter()
+                    .any(|(_, p)| !(1..=HIGHEST_POWER).contains(p))
+                {
+                    return refuse(named(&format!("a power is 1 to {HIGHEST_POWER}")));
+                }
+                gain("gain_dps", *gain_dps)
+            }
+            Term::Lag {
+                gain_dps, tau_s, ..
+            }
+            | Term::Decay { gain_dps, tau_s } => {
+                gain("gain_dps", *gain_dps).and_then(|()| tau(*tau_s))
+            }
+            Term::LagOfCurve {
+                gain_dps,
+                values,
+                tau_s,
+                ..
+            } => {
+                gain("gain_dps", *gain_dps)?;
+                knots(values)?;
+                tau(*tau_s)
+            }
+            Term::Slope {
+                gain_dps_s, rows, ..
+            } => {
+                if !(1..=MOST_SLOPE_ROWS).contains(rows) {
+                    return refuse(named(&format!("rows is 1 to {MOST_SLOPE_ROWS}")));
+                }
+                gain("gain per period", gain_dps_s / self.period_s)
+            }
+            Term::Curve { values_dps, .. } => knots(values_dps),
+            Term::Step {
+                gain_dps,
+                centre,
+                gap,
+                ..
+            } => {
+                within(&named("centre"), *centre, -1e3, 1e3)?;
+                within(&named("gap"), *gap, 0.0, 1e3)?;
+                gain("gain_dps", *gain_dps)
+            }
+            Term::ScaleBy { s0, s1, .. } => {
+                within(&named("s0"), *s0, -0.5, 0.5)?;
+                within(&named("s1"), *s1, -0.5, 0.5)
+            }
+            Term::Cubic { ppm, rate_max_dps }
+            | Term::Even {
+                ppm, rate_max_dps, ..
+            } => {
+                within(&named("ppm"), *ppm, -1e5, 1e5)?;
+                let share = rate_max_dps / self.full_scale_dps;
+                within(&named("rate_max_dps over full scale"), share, 0.1, 100.0)
+            }
+        }
+    }
+}
+
+fn refuse(what: String) -> Result<()> {
+    Err(InputError::new(format!("correction: {what}"))
+        .help("change the plan of the correction")
+        .into())
+}
+
+fn finite(what: &str, value: f64) -> Result<()> {
+    match value.is_finite() {
+        true => Ok(()),
+        false => refuse(format!("{what} makes {value}, which is not finite")),
+    }
+}
+
+fn positive(what: &str, value: f64) -> Result<()> {
+    within(what, value, f64::MIN_POSITIVE, f64::MAX)
+}
+
+fn within(what: &str, value: f64, low: f64, high: f64) -> Result<()> {
+    // False for a NaN too.
+    match value >= low && value <= high {
+        true => Ok(()),
+        false => refuse(format!(
+            "{what} is {value}; it has to be from {low} to {high}"
+        )),
+    }
+}

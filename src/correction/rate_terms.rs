@@ -1,0 +1,148 @@
+//! The terms on the rate itself: r -> r - cast(r k), k the relative error.
+//!
+//! | term | k |
+//! |---|---|
+//! | `ScaleBy` | s0 + cast(s1 x) |
+//! | `Even`, absolute | ppm 1e-6, on abs(r) |
+//! | `Even` | cast(c u), c = ppm 1e-6 2^e / rate_max |
+//! | `Cubic` | cast(c cast(u u)), c = ppm 1e-6 (2^e / rate_max)^2 |
+//!
+//! with u = r / 2^e, the rate read in the full scale of its word.
+
+use super::formats::{Formats, PRODUCT_BITS};
+use super::plan::Term;
+use super::terms::exact;
+use crate::numeric::arithmetic::Arithmetic;
+use crate::numeric::cast::Cast;
+use crate::numeric::format::pow2;
+
+/// A term on the rate, compiled.
+#[derive(Debug, Clone)]
+pub struct OnRate {
+    law: Law,
+    /// Fraction bits of k.
+    bits: i32,
+    /// The constant in k, raw.
+    constant: i128,
+    exponent: i32,
+    /// r k to the sum's fraction bits.
+    last: Cast,
+}
+
+#[derive(Debug, Clone)]
+enum Law {
+    /// The constant alone.
+    Constant,
+    /// The constant and slope * x: input, slope, rounding.
+    Linear(usize, i128, Cast),
+    /// The constant, on abs(r).
+    Absolute,
+    /// Constant * u.
+    Even(Cast),
+    /// Constant * u^2: rounding of u^2, then of k.
+    Cubic(Box<[Cast; 2]>),
+}
+
+/// Fraction bits of k.
+pub(super) fn share_bits(formats: &Formats) -> i32 {
+    (formats.sum_fraction_bits + formats.rate_exponent() + 1).clamp(16, PRODUCT_BITS)
+}
+
+/// The constant of a term on the rate in k, 1; `None` for a term on the bias.
+pub(super) fn constant(formats: &Formats, term: &Term) -> Option<f64> {
+    let scale = pow2(formats.rate_exponent());
+    Some(match term {
+        Term::ScaleBy { s0, .. } => *s0,
+        Term::Even {
+            ppm,
+            absolute: true,
+            ..
+        } => ppm * 1e-6,
+        Term::Even {
+            ppm, rate_max_dps, ..
+        } => ppm * 1e-6 * (scale / rate_max_dps),
+        Term::Cubic { ppm, rate_max_dps } => ppm * 1e-6 * (scale / rate_max_dps).powi(2),
+        _ => return None,
+    })
+}
+
+impl OnRate {
+    /// Compiles a term; `None` for one on the bias.
+    pub fn new(formats: &Formats, term: &Term) -> Option<Self> {
+        let constant = constant(formats, term)?;
+        let bits = share_bits(formats);
+        let (sum, exponent) = (formats.sum_fraction_bits, formats.rate_exponent());
+        // u has so many fraction bits.
+        let u = sum + exponent;
+        let square = (2 * u).min(PRODUCT_BITS);
+        let law = match term {
+            Term::ScaleBy {
+                input: Some(input),
+                s1,
+                ..
+            } => Law::Linear(
+                *input,
+                (s1 * pow2(bits)).round() as i128,
+                exact("correction.scale", bits + formats.input_bits(*input), bits),
+            ),
+            Term::Even { absolute: true, .. } => Law::Absolute,
+            Term::Even { .. } => Law::Even(exact("correction.even", bits + u, bits)),
+            Term::Cubic { .. } => Law::Cubic(Box::new([
+                exact("correction.square", 2 * u, square),
+                exact("correction.cubic", bits + square, bits),
+            ])),
+            _ => Law::Constant,
+        };
+        Some(OnRate {
+            law,
+            bits,
+            constant: (constant * pow2(bits)).round() as i128,
+            exponent,
+            last: exact("correction.rate_term", sum + bits, sum),
+        })
+    }
+
+    pub(super) fn casts_mut(&mut self) -> Vec<&mut Cast> {
+        let mut casts = match &mut self.law {
+            Law::Constant | Law::Absolute => Vec::new(),
+            Law::Linear(_, _, cast) | Law::Even(cast) => vec![cast],
+            Law::Cubic(casts) => casts.iter_mut().collect(),
+        };
+        casts.push(&mut self.last);
+        casts
+    }
+
+    /// r less its error.
+    #[inline(always)]
+    pub fn corrected<A: Arithmetic>(&self, ar: &A, r: A::Word, inputs: &[A::Word]) -> A::Word {
+        let constant = ar.constant(self.constant, self.bits);
+        let u = ar.read_as(r, -self.exponent);
+        let mut on = r;
+        let k = match &self.law {
+            Law::Constant => constant,
+            Law::Linear(input, slope, cast) => match inputs.get(*input) {
+                Some(x) => {
+                    let product = ar.mul(ar.constant(*slope, self.bits), *x);
+                    ar.add(constant, ar.cast(product, cast, &[*x]))
+                }
+                // The plan was checked: every input exists.
+                None => constant,
+            },
+            Law::Absolute => {
+                on = ar.select(ar.is_negative(r), ar.neg(r), r);
+                constant
+            }
+            Law::Even(cast) => {
+                let product = ar.mul(constant, u);
+                ar.cast(product, cast, &[u])
+            }
+            Law::Cubic(casts) => {
+                let [square, cast] = casts.as_ref();
+                let u2 = ar.cast(ar.mul(u, u), square, &[u]);
+                ar.cast(ar.mul(constant, u2), cast, &[u2])
+            }
+        };
+        let product = ar.mul(on, k);
+        ar.sub(r, ar.cast(product, &self.last, &[on, k]))
+    }
+}

@@ -1,0 +1,229 @@
+//! The terms of a correction, compiled: constants, casts and where their state lies.
+
+use super::curve::Curve;
+use super::formats::{Formats, PRODUCT_BITS, slope_gain_dps};
+use super::plan::{Plan, Term};
+use super::states::{Decay, Followed, Following, Lag, Relay, lagged_curve_bits};
+use crate::numeric::arithmetic::{Arithmetic, Ring};
+use crate::numeric::cast::{Cast, Label, Target};
+use crate::numeric::format::{Rounding, pow2};
+
+/// Fraction bits that a gain has beyond those of the sum.
+pub(super) const GAIN_BITS: i32 = 2;
+
+/// A cast to so many fraction bits, to nearest, that never limits: proved ranges give the width.
+pub(super) fn exact(label: &'static str, from: i32, to: i32) -> Cast {
+    let target = Target::signed(127, to);
+    Cast::new(Label::of(label), from, 0, target, Rounding::HalfUp, None)
+}
+
+/// The integer nearest to `value` in LSBs of 2^-`fraction_bits`.
+pub(super) fn raw(value: f64, fraction_bits: i32) -> i128 {
+    (value * pow2(fraction_bits)).round() as i128
+}
+
+/// A constant times a word, in the sum's unit.
+#[derive(Debug, Clone)]
+pub struct Gain {
+    raw: i128,
+    fraction_bits: i32,
+    pub(super) out: Cast,
+}
+
+impl Gain {
+    /// `value` times a word with `word_bits` fraction bits.
+    pub(super) fn new(value: f64, word_bits: i32, formats: &Formats) -> Self {
+        let sum = formats.sum_fraction_bits;
+        let fraction_bits = sum + GAIN_BITS;
+        Gain {
+            raw: raw(value, fraction_bits),
+            fraction_bits,
+            out: exact("correction.gain", fraction_bits + word_bits, sum),
+        }
+    }
+
+    /// The product, rounded once.
+    #[inline(always)]
+    pub fn times<A: Arithmetic>(&self, ar: &A, word: A::Word) -> A::Word {
+        let product = ar.mul(ar.constant(self.raw, self.fraction_bits), word);
+        ar.cast(product, &self.out, &[word])
+    }
+}
+
+/// A term on the bias.
+#[derive(Debug, Clone)]
+pub enum OnBias {
+    /// A constant.
+    Constant(i128),
+    /// Inputs, multiplied one after the other, and the gain.
+    Product {
+        /// One entry for each factor, powers as repetitions.
+        inputs: Vec<usize>,
+        /// After each product but the gain's.
+        products: Vec<Cast>,
+        /// Of the last.
+        gain: Gain,
+    },
+    /// A first-order lag.
+    Lag(Box<Lag>),
+    /// gain (x - x `rows` ago).
+    Slope {
+        /// Position in the state.
+        slot: usize,
+        /// x.
+        input: usize,
+        /// Readings.
+        rows: usize,
+        /// In which the past is kept.
+        ring: Ring,
+        /// On the difference.
+        gain: Gain,
+    },
+    /// A decay since power-on.
+    Decay(Box<Decay>),
+    /// A curve in the sum's unit.
+    Curve(Box<Curve>),
+    /// A relay.
+    Step(Relay),
+}
+
+/// Positions in the state that are given away.
+#[derive(Debug, Default)]
+pub struct Slots {
+    lags: usize,
+    slopes: usize,
+    decays: usize,
+    steps: usize,
+    curves: usize,
+}
+
+fn next(counter: &mut usize) -> usize {
+    *counter += 1;
+    *counter - 1
+}
+
+impl OnBias {
+    /// Compiles a term; `None` for one on the rate.
+    pub fn new(plan: &Plan, formats: &Formats, term: &Term, slots: &mut Slots) -> Option<Self> {
+        let sum = formats.sum_fraction_bits;
+        Some(match term {
+            Term::Product { gain_dps, factors } => product(formats, *gain_dps, factors),
+            Term::Lag {
+                gain_dps,
+                input,
+                tau_s,
+            } => {
+                let from = formats.input_bits(*input);
+                let followed = Following {
+                    limits: (-(1i128 << from), (1i128 << from) - 1),
+                    of: Followed::Input(*input),
+                    from,
+                    size: 1.0,
+                };
+                let slot = next(&mut slots.lags);
+                let lag = Lag::new(plan, formats, followed, *gain_dps, *tau_s, slot);
+                OnBias::Lag(Box::new(lag))
+            }
+            Term::LagOfCurve {
+                gain_dps,
+                input,
+                values,
+                tau_s,
+            } => {
+                let size = values.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+                let from = lagged_curve_bits(formats, *gain_dps);
+                let number = next(&mut slots.curves);
+                let input_bits = formats.input_bits(*input);
+                let curve = Curve::new(number, *input, input_bits, values, from);
+                let followed = Following {
+                    limits: curve.range(),
+                    of: Followed::Curve(Box::new(curve)),
+                    from,
+                    size,
+                };
+                let slot = next(&mut slots.lags);
+                let lag = Lag::new(plan, formats, followed, *gain_dps, *tau_s, slot);
+                OnBias::Lag(Box::new(lag))
+            }
+            Term::Slope {
+                gain_dps_s,
+                input,
+                rows,
+            } => {
+                let bits = formats.input_bits(*input);
+                let gain = slope_gain_dps(plan, *gain_dps_s, *rows);
+                OnBias::Slope {
+                    slot: next(&mut slots.slopes),
+                    input: *input,
+                    rows: *rows as usize,
+                    ring: Ring::cyclic(bits as u32 + 1, bits),
+                    gain: Gain::new(gain, bits, formats),
+                }
+            }
+            Term::Decay { gain_dps, tau_s } => {
+                let slot = next(&mut slots.decays);
+                OnBias::Decay(Box::new(Decay::new(plan, formats, *gain_dps, *tau_s, slot)))
+            }
+            Term::Curve { input, values_dps } => {
+                let number = next(&mut slots.curves);
+                let bits = formats.input_bits(*input);
+                OnBias::Curve(Box::new(Curve::new(number, *input, bits, values_dps, sum)))
+            }
+            Term::Step {
+                gain_dps,
+                input,
+                centre,
+                gap,
+                once,
+            } => {
+                let input_bits = formats.input_bits(*input);
+                OnBias::Step(Relay {
+                    slot: next(&mut slots.steps),
+                    input: *input,
+                    input_bits,
+                    on: raw(centre + gap / 2.0, input_bits),
+                    off: raw(centre - gap / 2.0, input_bits),
+                    centre: raw(*centre, input_bits),
+                    once: *once,
+                    gain: raw(*gain_dps, sum),
+                })
+            }
+            Term::ScaleBy { .. } | Term::Cubic { .. } | Term::Even { .. } => return None,
+        })
+    }
+
+    pub(super) fn casts_mut(&mut self) -> Vec<&mut Cast> {
+        match self {
+            OnBias::Constant(_) | OnBias::Step(_) => Vec::new(),
+            OnBias::Product { products, gain, .. } => {
+                products.iter_mut().chain([&mut gain.out]).collect()
+            }
+            OnBias::Lag(lag) => lag.casts_mut(),
+            OnBias::Slope { gain, .. } => vec![&mut gain.out],
+            OnBias::Decay(decay) => decay.casts_mut(),
+            OnBias::Curve(curve) => curve.casts_mut(),
+        }
+    }
+}
+
+fn product(formats: &Formats, gain_dps: f64, factors: &[(usize, u32)]) -> OnBias {
+    let repeated = factors
+        .iter()
+        .flat_map(|(input, power)| (0..*power).map(|_| *input));
+    let inputs: Vec<usize> = repeated.collect();
+    let Some(first) = inputs.first() else {
+        return OnBias::Constant(raw(gain_dps, formats.sum_fraction_bits));
+    };
+    let mut bits = formats.input_bits(*first);
+    let mut products = Vec::new();
+    for input in inputs.iter().skip(1) {
+        let from = bits + formats.input_bits(*input);
+        bits = from.min(PRODUCT_BITS);
+        products.push(exact("correction.product", from, bits));
+    }
+    OnBias::Product {
+        inputs,
+        products,
+        gain: Gain::new(gain_dps, bits, formats),
+    }
+}

@@ -1,0 +1,112 @@
+//! A plan as the table `[correction]` of a design file, so that a corrected gyro is a design.
+
+use super::formats::Formats;
+use super::plan::{Plan, Term};
+use super::run::Correction;
+use crate::error::Result;
+use std::fmt::Write as _;
+
+/// A plan and the noise that its words are chosen for: the table `[correction]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Planned {
+    /// The plan.
+    pub plan: Plan,
+    /// Noise of a reading, deg/s rms.
+    pub noise_dps: f64,
+}
+
+impl Planned {
+    /// Compiles it.
+    ///
+    /// # Errors
+    /// As [`Correction::new`] and [`Formats::choose`].
+    pub fn compile(&self) -> Result<Correction> {
+        self.plan.check()?;
+        Correction::new(&self.plan, &Formats::choose(&self.plan, self.noise_dps)?)
+    }
+
+    /// The table as text, read back as itself.
+    pub fn to_toml(&self) -> String {
+        let plan = &self.plan;
+        let mut text = String::from("[correction]\n");
+        _ = writeln!(text, "period_s = {:?}", plan.period_s);
+        _ = writeln!(text, "full_scale_dps = {:?}", plan.full_scale_dps);
+        _ = writeln!(text, "noise_dps = {:?}", self.noise_dps);
+        text += "inputs = [\n";
+        for input in &plan.inputs {
+            let column = toml::Value::from(input.column.as_str());
+            let (offset, scale) = (input.offset, input.scale);
+            _ = writeln!(
+                text,
+                "    {{ column = {column}, offset = {offset:?}, scale = {scale:?} }},"
+            );
+        }
+        text += "]\nterms = [\n";
+        for term in &plan.terms {
+            let keys = keys(term);
+            _ = writeln!(text, "    {{ kind = \"{}\", {keys} }},", term.kind());
+        }
+        text + "]\n"
+    }
+}
+
+fn yes(flag: bool) -> &'static str {
+    if flag { "\"yes\"" } else { "\"no\"" }
+}
+
+/// The keys of a term but its kind.
+fn keys(term: &Term) -> String {
+    match term {
+        Term::Product { gain_dps, factors } => {
+            let pairs: Vec<[usize; 2]> = factors.iter().map(|(k, p)| [*k, *p as usize]).collect();
+            format!("gain_dps = {gain_dps:?}, factors = {pairs:?}")
+        }
+        Term::Lag {
+            gain_dps,
+            input,
+            tau_s,
+        } => format!("gain_dps = {gain_dps:?}, input = {input}, tau_s = {tau_s:?}"),
+        Term::LagOfCurve {
+            gain_dps,
+            input,
+            values,
+            tau_s,
+        } => format!(
+            "gain_dps = {gain_dps:?}, input = {input}, tau_s = {tau_s:?}, values = {values:?}"
+        ),
+        Term::Slope {
+            gain_dps_s,
+            input,
+            rows,
+        } => format!("gain_dps_s = {gain_dps_s:?}, input = {input}, rows = {rows}"),
+        Term::Decay { gain_dps, tau_s } => format!("gain_dps = {gain_dps:?}, tau_s = {tau_s:?}"),
+        Term::Curve { input, values_dps } => {
+            format!("input = {input}, values_dps = {values_dps:?}")
+        }
+        Term::Step {
+            gain_dps,
+            input,
+            centre,
+            gap,
+            once,
+        } => format!(
+            "gain_dps = {gain_dps:?}, input = {input}, centre = {centre:?}, gap = {gap:?}, once = {}",
+            yes(*once)
+        ),
+        Term::ScaleBy { input, s0, s1 } => {
+            let input = input.map_or(String::new(), |k| format!("input = {k}, "));
+            format!("{input}s0 = {s0:?}, s1 = {s1:?}")
+        }
+        Term::Cubic { ppm, rate_max_dps } => {
+            format!("ppm = {ppm:?}, rate_max_dps = {rate_max_dps:?}")
+        }
+        Term::Even {
+            ppm,
+            rate_max_dps,
+            absolute,
+        } => format!(
+            "ppm = {ppm:?}, rate_max_dps = {rate_max_dps:?}, absolute = {}",
+            yes(*absolute)
+        ),
+    }
+}

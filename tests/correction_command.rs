@@ -1,0 +1,78 @@
+//! `gyrogen emit --part correction` and `gyrogen verify` from a design file.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+const DESIGN: &str = r#"
+name = "corrected"
+
+[correction]
+period_s = 10.0
+full_scale_dps = 500.0
+noise_dps = 2e-3
+inputs = [
+    { column = "phase_rad", offset = -1.8, scale = 0.4 },
+    { column = "supply_v", offset = 3.3, scale = 0.2 },
+]
+terms = [
+    { kind = "product", gain_dps = 109.6, factors = [] },
+    { kind = "product", gain_dps = 97.2, factors = [[0, 1]] },
+    { kind = "product", gain_dps = 21.9, factors = [[0, 2]] },
+    { kind = "lag", gain_dps = 4.0, input = 0, tau_s = 600.0 },
+    { kind = "decay", gain_dps = 0.5, tau_s = 900.0 },
+    { kind = "step", gain_dps = 0.3, input = 0, centre = 0.2, gap = 0.1, once = "no" },
+    { kind = "product", gain_dps = 0.1, factors = [[1, 1]] },
+    { kind = "cubic", ppm = 80.0, rate_max_dps = 500.0 },
+]
+"#;
+
+fn gyrogen(arguments: &[&str], folder: &Path) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_gyrogen"));
+    let output = command.args(arguments).current_dir(folder).output();
+    output.expect("the program runs")
+}
+
+#[test]
+fn a_design_with_a_correction_becomes_firmware_that_verifies() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("design.toml"), DESIGN).expect("written");
+    for language in ["c", "rust"] {
+        let part = [
+            "--part",
+            "correction",
+            "--lang",
+            language,
+            "--out",
+            language,
+        ];
+        let emitted = gyrogen(
+            &[&["emit", "design.toml"], &part[..]].concat(),
+            folder.path(),
+        );
+        let said = String::from_utf8_lossy(&emitted.stderr).into_owned();
+        assert!(emitted.status.success(), "{said}");
+        let verified = gyrogen(&["verify", language], folder.path());
+        let said = String::from_utf8_lossy(&verified.stderr).into_owned();
+        assert!(verified.status.success(), "{said}");
+    }
+    let manifest = std::fs::read_to_string(folder.path().join("c/manifest.json"));
+    let manifest = manifest.expect("a manifest");
+    assert!(manifest.contains("\"part\": \"correction\""), "{manifest}");
+
+    // A changed vector shows.
+    let vectors = folder.path().join("c/vectors/correct.csv");
+    let text = std::fs::read_to_string(&vectors).expect("vectors");
+    let damaged = text.replacen(",0\n", ",1\n", 1);
+    std::fs::write(&vectors, damaged).expect("written");
+    let verified = gyrogen(&["verify", "c"], folder.path());
+    assert_eq!(verified.status.code(), Some(1));
+}
+
+#[test]
+fn without_a_correction_there_is_nothing_to_emit() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let part = ["emit", "--part", "correction", "--lang", "c", "--out", "c"];
+    let emitted = gyrogen(&part, folder.path());
+    assert_eq!(emitted.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&emitted.stderr).contains("[correction]"));
+}
