@@ -169,3 +169,26 @@ impl Axis {
         (36.0 + CHARACTER * longest as f64).max(74.0)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn labels(low: f64, high: f64) -> Vec<String> {
+        decades(Interval { low, high }).labels
+    }
+
+    #[test]
+    fn logarithmic_ticks_are_powers_of_ten_or_what_lies_between_them() {
+        assert_eq!(labels(-1.0, 1.3), ["0.1", "1", "10"]);
+        assert_eq!(labels(-2.1, -1.5), ["0.01", "0.02"]);
+        assert_eq!(labels(0.2, 0.8), ["2", "5"]);
+        assert_eq!(labels(-5.1, -4.9), ["10⁻⁵"]);
+        let ticks = decades(Interval {
+            low: -7.0,
+            high: -4.0,
+        });
+        assert_eq!(ticks.values, [-7.0, -6.0, -5.0, -4.0]);
+        assert_eq!(ticks.exponent, 0);
+    }
+}

@@ -15,50 +15,52 @@ pub struct Abscissa {
     pub values: Vec<f64>,
     /// Rows in ascending order of the values.
     pub order: Vec<usize>,
-    /// Whether the contribution is one curve over it.
-    pub is_curve: bool,
+    /// Whether the contribution's deviation is one curve over it.
+    pub is_band: bool,
     /// What a reader has to know of it; starts with a space, or empty.
     pub remark: String,
 }
 
-/// The first channel over which the contribution is one curve; where none is, the first.
-pub fn abscissa(view: &View, step: &Step, contribution: &Contribution) -> Option<Abscissa> {
-    let mut passed = Vec::new();
-    let mut first = None;
-    for candidate in candidates(view, step) {
-        let order = ascending(&candidate.values);
-        let is_curve = is_curve(&contribution.value_dps, &order);
-        let mut candidate = Abscissa {
-            order,
-            is_curve,
-            ..candidate
-        };
-        if is_curve {
-            if !passed.is_empty() {
-                candidate.remark += &format!(" Over {} it is not one curve.", passed.join(" or "));
-            }
-            return Some(candidate);
+/// The first channel over which the contribution is one curve; where none is, the contribution itself.
+pub fn abscissa(view: &View, step: &Step, contribution: &Contribution) -> Abscissa {
+    let value = &contribution.value_dps;
+    let mut passed: Vec<String> = Vec::new();
+    let not = |passed: &[String]| match passed {
+        [] => String::new(),
+        names => format!(" Over {} it is not one curve.", names.join(" or ")),
+    };
+    for (name, axis, values) in candidates(view, step) {
+        let order = ascending(&values);
+        if is_curve(value, &order) {
+            return Abscissa {
+                is_band: is_curve(&contribution.std_dps, &order),
+                remark: not(&passed),
+                name,
+                axis,
+                values,
+                order,
+            };
         }
-        passed.push(candidate.name.clone());
-        first = first.or(Some(candidate));
+        passed.push(name);
     }
-    first.map(|mut f| {
-        f.remark += " It is not one curve over any channel: one mark and bar a reading.";
-        f
-    })
+    let order = ascending(value);
+    Abscissa {
+        name: "itself".to_owned(),
+        axis: Axis {
+            interval: Interval::of(value.iter().copied()).padded(0.04),
+            quantity: "fitted contribution".to_owned(),
+            unit: view.closed.closure.unit.to_owned(),
+        },
+        values: value.clone(),
+        is_band: is_curve(&contribution.std_dps, &order),
+        order,
+        remark: not(&passed) + " So the abscissa is the contribution itself.",
+    }
 }
 
 /// A tone's phase, then the step's channels in their order.
-fn candidates(view: &View, step: &Step) -> Vec<Abscissa> {
+fn candidates(view: &View, step: &Step) -> Vec<(String, Axis, Vec<f64>)> {
     let mut out = Vec::new();
-    let plain = |name: &str, axis: Axis, values: Vec<f64>| Abscissa {
-        name: name.to_owned(),
-        axis,
-        values,
-        order: Vec::new(),
-        is_curve: false,
-        remark: String::new(),
-    };
     if let Some(hz) = step.parameters.get("frequency_hz") {
         let cycle = |t: &f64| (hz * t).rem_euclid(1.0);
         let values = view.closed.channels.time_s.iter().map(cycle).collect();
@@ -70,7 +72,7 @@ fn candidates(view: &View, step: &Step) -> Vec<Abscissa> {
             quantity: "phase of the tone".to_owned(),
             unit: "cycles".to_owned(),
         };
-        out.push(plain("its phase", axis, values));
+        out.push(("its phase".to_owned(), axis, values));
     }
     for name in &step.channels {
         if name == "time_s" {
@@ -80,9 +82,9 @@ fn candidates(view: &View, step: &Step) -> Vec<Abscissa> {
                 quantity: "time".to_owned(),
                 unit: unit.to_owned(),
             };
-            out.push(plain("time", axis, values));
+            out.push(("time".to_owned(), axis, values));
         } else if let Some(values) = view.channel(name) {
-            out.push(plain(name, view.channel_axis(name, &values), values));
+            out.push((name.clone(), view.channel_axis(name, &values), values));
         }
     }
     out

@@ -4,6 +4,7 @@
 use super::contribution::Contribution;
 use super::view::{DRAWN, View, scatter, thin};
 use super::{allan, curve};
+use crate::closure::channels::range;
 use crate::report::axis::{Axis, Interval};
 use crate::report::figures::Figure;
 use crate::report::svg::{Frame, Shape, Svg, Swatch};
@@ -91,7 +92,7 @@ fn over_time(view: &View) -> Figure {
     svg.legend(&entries);
     let last = shown.len().saturating_sub(1);
     for (k, ((_, class, values), y)) in shown.iter().zip(axes).enumerate() {
-        let range = y.interval;
+        let height = y.interval;
         let x = if k == last { x.clone() } else { unlabelled(&x) };
         let mut frame = svg.frame(210.0, left, x, y);
         for (from, to) in view.blocks() {
@@ -103,7 +104,7 @@ fn over_time(view: &View) -> Figure {
             .iter()
             .map(|i| (time[*i], values[*i]))
             .collect();
-        scatter(&mut frame, class, range, &points);
+        scatter(&mut frame, class, height, &points);
         svg.add(&frame);
     }
     let title = if view.has_steps() {
@@ -176,11 +177,12 @@ fn over_channels(view: &View) -> Option<Figure> {
 fn step(view: &View, k: usize, contribution: &Contribution) -> Option<Figure> {
     let step = view.closed.closure.steps.get(k)?;
     let term = view.closed.after.terms.get(k)?;
-    let abscissa = curve::abscissa(view, step, contribution)?;
+    let abscissa = curve::abscissa(view, step, contribution);
     let value = &contribution.value_dps;
     let partial: Vec<f64> = view.after.iter().zip(value).map(|(r, v)| r + v).collect();
-    let y = view.residual_axis("partial residual", &[&partial, value]);
-    let range = y.interval;
+    let (low, high) = band_within(&partial, contribution);
+    let y = view.residual_axis("partial residual", &[&partial, value, &low, &high]);
+    let shown = y.interval;
     let left = y.room();
     let mut svg = Svg::new(WIDTH);
     svg.legend(&[
@@ -202,8 +204,8 @@ fn step(view: &View, k: usize, contribution: &Contribution) -> Option<Figure> {
         .iter()
         .map(|i| (abscissa.values[*i], partial[*i]))
         .collect();
-    scatter(&mut frame, "before", range, &points);
-    draw_contribution(&mut frame, &abscissa, contribution, range);
+    scatter(&mut frame, "before", shown, &points);
+    draw_contribution(&mut frame, &abscissa, contribution, shown);
     svg.add(&frame);
     let title = format!("Step {}: {} against {}", k + 1, step.effect, abscissa.name);
     let sheet = term.candidate.sheet();
@@ -212,14 +214,13 @@ fn step(view: &View, k: usize, contribution: &Contribution) -> Option<Figure> {
         title,
         caption: format!(
             "{}: {}. The deviation counts coefficients and shape, estimated together with the declared model and all other \
-             steps.{}",
+             steps: it is wide where those could take its place.{}",
             step.effect, sheet.equation, abscissa.remark
         ),
     })
 }
 
-/// A line with its band where the contribution is a curve over the abscissa, else a mark and a bar
-/// for each reading that is drawn.
+/// The contribution as a line with its band; a bar for each row where the deviation is no curve.
 fn draw_contribution(
     frame: &mut Frame,
     x: &curve::Abscissa,
@@ -227,29 +228,36 @@ fn draw_contribution(
     y: Interval,
 ) {
     let (value, std) = (&contribution.value_dps, &contribution.std_dps);
-    let place = |i: usize| {
-        let clip = |v: f64| v.clamp(y.low, y.high);
-        let wide = 2.0 * std.get(i).copied().unwrap_or(0.0);
-        (
-            x.values[i],
-            value[i],
-            clip(value[i] - wide),
-            clip(value[i] + wide),
-        )
-    };
-    let rows: Vec<_> = sparse(&x.order).into_iter().map(place).collect();
-    if x.is_curve {
-        let band: Vec<(f64, f64, f64)> = rows.iter().map(|p| (p.0, p.2, p.3)).collect();
+    let clip = |v: f64| v.clamp(y.low, y.high);
+    let rows = sparse(&x.order);
+    let band: Vec<(f64, f64, f64)> = rows
+        .iter()
+        .map(|i| {
+            let wide = 2.0 * std.get(*i).copied().unwrap_or(0.0);
+            (x.values[*i], clip(value[*i] - wide), clip(value[*i] + wide))
+        })
+        .collect();
+    if x.is_band {
         frame.band("sigma", &band);
-        let line: Vec<(f64, f64)> = rows.iter().map(|p| (p.0, p.1)).collect();
-        frame.line("after", &line);
-        return;
+    } else {
+        for (x, low, high) in &band {
+            frame.line("bar", &[(*x, *low), (*x, *high)]);
+        }
     }
-    for p in &rows {
-        frame.line("bar", &[(p.0, p.2), (p.0, p.3)]);
-    }
-    let points: Vec<(f64, f64)> = rows.iter().map(|p| (p.0, p.1)).collect();
-    scatter(frame, "after", y, &points);
+    let line: Vec<(f64, f64)> = rows.iter().map(|i| (x.values[*i], value[*i])).collect();
+    frame.line("after", &line);
+}
+
+/// Both edges of the band, no farther off than the residual is wide: what the axis has to show.
+fn band_within(partial: &[f64], contribution: &Contribution) -> (Vec<f64>, Vec<f64>) {
+    let (least, greatest) = range(partial);
+    let edge = |sign: f64| {
+        let pairs = contribution.value_dps.iter().zip(&contribution.std_dps);
+        pairs
+            .map(|(v, s)| v + sign * (2.0 * s).min(0.5 * (greatest - least)))
+            .collect()
+    };
+    (edge(-1.0), edge(1.0))
 }
 
 /// Every so many, with the last.

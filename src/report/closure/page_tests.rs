@@ -16,7 +16,9 @@ const EFFORT: Effort = Effort {
 fn closed(gain_dps_per_v: f64, rows: usize) -> Closed {
     let mut random = Random::new(5);
     let degc: Vec<f64> = [triangle(rows / 2), triangle(rows - rows / 2)].concat();
-    let supply: Vec<f64> = (0..rows).map(|i| 5.0 + f64::from(u8::from(i / 17 % 3 == 1))).collect();
+    let supply: Vec<f64> = (0..rows)
+        .map(|i| 5.0 + f64::from(u8::from(i / 17 % 3 == 1)))
+        .collect();
     let output: Vec<f64> = degc
         .iter()
         .zip(&supply)
@@ -37,9 +39,15 @@ fn the_page_shows_the_step_and_needs_nothing_else() {
     let closed = closed(0.4, 300);
     let page = html(&closed, "made<up>.csv").unwrap();
     assert_eq!(closed.closure.steps[0].effect, "supply_sensitivity");
-    assert!(page.contains("Explained by supply_sensitivity"), "{}", page.len());
+    assert!(
+        page.contains("Explained by supply_sensitivity"),
+        "{}",
+        page.len()
+    );
     assert!(page.contains("made&#60;up&#62;.csv") || page.contains("made&lt;up&gt;.csv"));
-    for absent in ["<script", "http://", "https://", "<up>", "<x>", "NaN", "inf "] {
+    for absent in [
+        "<script", "http://", "https://", "<up>", "<x>", "NaN", "inf ",
+    ] {
         let bare = page.replace("http://www.w3.org/2000/svg", "");
         assert!(!bare.contains(absent), "{absent}");
     }
@@ -56,7 +64,10 @@ fn the_page_shows_the_step_and_needs_nothing_else() {
         "id=\"warnings\"",
     ]
     .iter()
-    .map(|what| page.find(what).unwrap_or_else(|| panic!("{what} is missing")))
+    .map(|what| {
+        page.find(what)
+            .unwrap_or_else(|| panic!("{what} is missing"))
+    })
     .collect();
     assert!(places.is_sorted(), "{places:?}");
     assert!(page.contains("Constant in this record: still_v"));

@@ -3,7 +3,7 @@
 use crate::closure::close::Closed;
 use crate::closure::effects::Sheet;
 use crate::closure::verdict::{Closure, Errors, Fate, Step, Verdict};
-use crate::report::text::{fixed, grouped, minus, significant};
+use crate::report::text::{fixed, grouped, minus, significant, trimmed};
 
 /// A step as the page shows it.
 #[derive(Debug, Clone, PartialEq)]
@@ -201,7 +201,7 @@ fn unit(name: &str) -> &'static str {
 /// A value with as many decimals as its deviation has in two digits.
 fn with_deviation(value: f64, std: f64) -> String {
     if std.is_nan() || std <= 0.0 || !value.is_finite() {
-        return significant(value, 4);
+        return trimmed(&significant(value, 4));
     }
     let decimals = 1 - std.log10().floor() as i32;
     if (0..=7).contains(&decimals) && value.abs() < 1e6 {
