@@ -46,6 +46,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let json = super::json(&closed.closure);
     super::make_folder(&arguments.out)?;
     crate::output::write_whole(&arguments.out.join("closure.json"), json.as_bytes())?;
+    let name = path.file_name().unwrap_or(path.as_os_str());
+    let page = crate::report::closure::html(&closed, &name.to_string_lossy())?;
+    crate::output::write_whole(&arguments.out.join("report.html"), page.as_bytes())?;
     match arguments.format {
         OutputFormat::Json => say!("{}", json.trim_end()),
         OutputFormat::Text => print(&closed, &arguments.out),

@@ -29,6 +29,6 @@ mod check_tests;
 #[cfg(test)]
 mod lego_tests;
 #[cfg(test)]
-mod synthetic;
+pub(crate) mod synthetic;
 
 pub use baseline::{BaselineFit, fit};

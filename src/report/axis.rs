@@ -101,6 +101,46 @@ pub fn ticks(interval: Interval, most: usize) -> Ticks {
     }
 }
 
+/// Ticks of a logarithmic axis whose interval is in powers of ten: whole powers, with twice and five times
+/// of each where there are fewer than three of them.
+pub fn decades(interval: Interval) -> Ticks {
+    let (low, high) = (interval.low.ceil() as i32, interval.high.floor() as i32);
+    let mantissas: &[f64] = if high - low >= 2 {
+        &[1.0]
+    } else {
+        &[1.0, 2.0, 5.0]
+    };
+    let mut out = Ticks {
+        values: Vec::new(),
+        labels: Vec::new(),
+        exponent: 0,
+    };
+    for power in low.saturating_sub(1)..=high {
+        for mantissa in mantissas {
+            let at = f64::from(power) + mantissa.log10();
+            if at >= interval.low && at <= interval.high {
+                out.values.push(at);
+                out.labels.push(decade(*mantissa, power));
+            }
+        }
+    }
+    out
+}
+
+/// `mantissa` 10^`power`: with plain digits from a thousandth to ten thousand.
+fn decade(mantissa: f64, power: i32) -> String {
+    if (-3..=4).contains(&power) {
+        let decimals = (-power).max(0) as usize;
+        return format!("{:.decimals$}", mantissa * 10f64.powi(power));
+    }
+    let ten = format!("10{}", superscript(power));
+    if mantissa == 1.0 {
+        ten
+    } else {
+        format!("{mantissa:.0}\u{202f}×\u{202f}{ten}")
+    }
+}
+
 /// An axis before it has ticks.
 #[derive(Debug, Clone)]
 pub struct Axis {
@@ -127,5 +167,28 @@ impl Axis {
         let labels = ticks(self.interval, 8).labels;
         let longest = labels.iter().map(|l| l.chars().count()).max().unwrap_or(1);
         (36.0 + CHARACTER * longest as f64).max(74.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn labels(low: f64, high: f64) -> Vec<String> {
+        decades(Interval { low, high }).labels
+    }
+
+    #[test]
+    fn logarithmic_ticks_are_powers_of_ten_or_what_lies_between_them() {
+        assert_eq!(labels(-1.0, 1.3), ["0.1", "1", "10"]);
+        assert_eq!(labels(-2.1, -1.5), ["0.01", "0.02"]);
+        assert_eq!(labels(0.2, 0.8), ["2", "5"]);
+        assert_eq!(labels(-5.1, -4.9), ["10⁻⁵"]);
+        let ticks = decades(Interval {
+            low: -7.0,
+            high: -4.0,
+        });
+        assert_eq!(ticks.values, [-7.0, -6.0, -5.0, -4.0]);
+        assert_eq!(ticks.exponent, 0);
     }
 }

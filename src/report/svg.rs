@@ -4,7 +4,7 @@
 //! decimals, so the same plot gives the same bytes. Values that are no number are left out: a line
 //! breaks there, a marker is missing.
 
-use super::axis::{Axis, CHARACTER, Interval, Ticks, ticks};
+use super::axis::{Axis, CHARACTER, Interval, Ticks, decades, ticks};
 use super::text::escape;
 use std::fmt::Write as _;
 
@@ -26,6 +26,8 @@ pub enum Shape {
     Plus,
     /// `x`.
     Cross,
+    /// A dot as large as the style sheet makes the pen: for many points.
+    Dot,
 }
 
 impl Shape {
@@ -54,6 +56,7 @@ impl Shape {
                 number(1.5 * r),
                 number(1.74 * r)
             ),
+            Shape::Dot => format!("{}h0", at(0.0, 0.0)),
             Shape::Plus => format!("{}v{d}{}h{d}", at(0.0, -r), at(-r, 0.0)),
             Shape::Cross => {
                 let full = number(1.5 * r);
@@ -183,6 +186,13 @@ pub struct Frame {
 }
 
 impl Frame {
+    /// Both axes logarithmic: their intervals, and what is drawn, are powers of ten.
+    pub fn logarithmic(mut self, x: &Axis, y: &Axis) -> Self {
+        (self.x_ticks, self.y_ticks) = (decades(self.x), decades(self.y));
+        (self.x_label, self.y_label) = (x.labelled(0), y.labelled(0));
+        self
+    }
+
     fn px(&self, x: f64) -> f64 {
         self.left + self.width * (x - self.x.low) / (self.x.high - self.x.low)
     }

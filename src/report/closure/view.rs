@@ -1,0 +1,244 @@
+//! What the figures of a closure have in common: residuals, the readings that are drawn, axes.
+
+use super::contribution::{self, Contribution};
+use crate::closure::channels::range;
+use crate::closure::close::Closed;
+use crate::record::columns::unit_of;
+use crate::record::stats;
+use crate::report::axis::{Axis, Interval};
+use crate::report::svg::{Frame, Shape};
+use crate::report::text::grouped;
+
+/// Points of a series up to which each is drawn.
+pub const DRAWN: usize = 600;
+
+/// Robust standard deviations beyond which a single reading does not set an axis.
+const STANDS_OUT: f64 = 8.0;
+
+/// Share of the readings that may stand out; more are no accidents.
+const ACCIDENTS: f64 = 0.02;
+
+/// A closure with what is drawn of it.
+pub struct View<'a> {
+    /// The closure.
+    pub closed: &'a Closed,
+    /// Error less the declared model, in the closure's unit, every row; NaN where not measured.
+    pub before: Vec<f64>,
+    /// Less the steps as well.
+    pub after: Vec<f64>,
+    /// Of each step.
+    pub contributions: Vec<Contribution>,
+}
+
+impl<'a> View<'a> {
+    /// Computes residuals and contributions.
+    pub fn new(closed: &'a Closed) -> Self {
+        let c = &closed.channels;
+        View {
+            closed,
+            before: closed.before.residual(c),
+            after: closed.after.residual(c),
+            contributions: contribution::all(c, &closed.after),
+        }
+    }
+
+    /// Whether there is anything to tell before from after.
+    pub fn has_steps(&self) -> bool {
+        !self.contributions.is_empty()
+    }
+
+    /// Time in a unit for people: (values, unit, seconds of one).
+    pub fn time(&self) -> (Vec<f64>, &'static str, f64) {
+        let c = &self.closed.channels;
+        let (unit, per) = match c.span_s() {
+            s if s > 3.0 * 3600.0 => ("h", 3600.0),
+            s if s > 600.0 => ("min", 60.0),
+            _ => ("s", 1.0),
+        };
+        (c.time_s.iter().map(|t| t / per).collect(), unit, per)
+    }
+
+    /// Readings of a channel in its own unit; `None` if the record lacks it.
+    pub fn channel(&self, name: &str) -> Option<Vec<f64>> {
+        let c = &self.closed.channels;
+        if name == c.thermometer {
+            return Some(c.u.iter().map(|u| c.centre + c.half * u).collect());
+        }
+        match name {
+            "time_s" => Some(c.time_s.clone()),
+            "time_since_power_on_s" => Some(c.on_s.clone()),
+            other => c.column(other).map(<[f64]>::to_vec),
+        }
+    }
+
+    /// All channels but the record's own time: those that move, and the names of those that do not.
+    pub fn channels(&self) -> (Vec<(String, Vec<f64>)>, Vec<String>) {
+        let c = &self.closed.channels;
+        let mut names = vec![c.thermometer.clone()];
+        if c.on_known {
+            names.push("time_since_power_on_s".to_owned());
+        }
+        names.extend(c.columns.keys().cloned());
+        let (mut moving, mut still) = (Vec::new(), Vec::new());
+        for name in names {
+            let Some(values) = self.channel(&name) else {
+                continue;
+            };
+            let (low, high) = range(&values);
+            if high > low {
+                moving.push((name, values));
+            } else {
+                still.push(name);
+            }
+        }
+        (moving, still)
+    }
+
+    /// From when to when each held-out block lasts, s; the border is halfway between rows.
+    pub fn blocks(&self) -> Vec<(f64, f64)> {
+        let (time, held) = (&self.closed.channels.time_s, &self.closed.split.heldout);
+        let mut out = Vec::new();
+        let mut start = None;
+        for i in 0..=held.len().min(time.len()) {
+            let border = match (i.checked_sub(1).and_then(|k| time.get(k)), time.get(i)) {
+                (Some(a), Some(b)) => 0.5 * (a + b),
+                (a, b) => *a.or(b).unwrap_or(&0.0),
+            };
+            match (start, held.get(i).copied().unwrap_or(false)) {
+                (None, true) => start = Some(border),
+                (Some(from), false) => {
+                    out.push((from, border));
+                    start = None;
+                }
+                _ => {}
+            }
+        }
+        out
+    }
+
+    /// The axis of a channel.
+    pub fn channel_axis(&self, name: &str, values: &[f64]) -> Axis {
+        Axis {
+            interval: Interval::of(values.iter().copied()).padded(0.04),
+            quantity: name.to_owned(),
+            unit: unit_of(name).to_owned(),
+        }
+    }
+
+    /// The axis of a residual: readings that stand out alone do not set it.
+    pub fn residual_axis(&self, quantity: &str, series: &[&[f64]]) -> Axis {
+        let usual = series.iter().flat_map(|values| usual(values));
+        Axis {
+            interval: Interval::of(usual.chain([0.0])).padded(0.07),
+            quantity: quantity.to_owned(),
+            unit: self.closed.closure.unit.to_owned(),
+        }
+    }
+
+    /// Said where not all readings are drawn.
+    pub fn thinned(&self) -> String {
+        let rows = self.closed.channels.len();
+        if stretch(rows) <= 2 {
+            return String::new();
+        }
+        format!(
+            " Of {} readings the least and the greatest residual of each {} in a row are drawn.",
+            grouped(rows as u64),
+            stretch(rows)
+        )
+    }
+}
+
+/// The values that an axis has to show.
+fn usual(values: &[f64]) -> Vec<f64> {
+    let finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    let (centre, limit) = (
+        stats::median(&finite),
+        STANDS_OUT * stats::robust_std(&finite),
+    );
+    let kept: Vec<f64> = finite
+        .iter()
+        .copied()
+        .filter(|v| (v - centre).abs() <= limit)
+        .collect();
+    let left = (finite.len() - kept.len()) as f64;
+    if limit > 0.0 && left <= ACCIDENTS * finite.len() as f64 {
+        kept
+    } else {
+        finite
+    }
+}
+
+/// Rows in a row of which two are drawn.
+fn stretch(rows: usize) -> usize {
+    (2 * rows).div_ceil(DRAWN).max(1)
+}
+
+/// The rows that are drawn of a series: all, or the least and the greatest of each stretch.
+pub fn thin(values: &[f64]) -> Vec<usize> {
+    let stretch = stretch(values.len());
+    let rows = (0..values.len()).filter(|i| values[*i].is_finite());
+    if stretch <= 2 {
+        return rows.take(DRAWN).collect();
+    }
+    let rows: Vec<usize> = rows.collect();
+    let mut drawn = Vec::new();
+    for part in rows.chunk_by(|a, b| a / stretch == b / stretch) {
+        let by = |a: &&usize, b: &&usize| values[**a].total_cmp(&values[**b]);
+        let least = part.iter().min_by(by).copied().unwrap_or(0);
+        let greatest = part.iter().max_by(by).copied().unwrap_or(0);
+        drawn.push(least.min(greatest));
+        if least != greatest {
+            drawn.push(least.max(greatest));
+        }
+    }
+    drawn
+}
+
+/// Draws points as dots; what lies above or below the interval as a triangle at its edge.
+pub fn scatter(frame: &mut Frame, class: &str, y: Interval, points: &[(f64, f64)]) {
+    let within = |p: &&(f64, f64)| p.1 >= y.low && p.1 <= y.high;
+    let inside: Vec<(f64, f64)> = points.iter().filter(within).copied().collect();
+    let many = if inside.len() > 200 { " many" } else { "" };
+    frame.markers(&format!("{class} dots{many}"), Shape::Dot, 1.0, &inside);
+    let inset = 0.03 * (y.high - y.low);
+    let edge = |out: &dyn Fn(f64) -> bool, at: f64| -> Vec<(f64, f64)> {
+        let beyond = points.iter().filter(|p| out(p.1));
+        beyond.map(|p| (p.0, at)).collect()
+    };
+    let above = edge(&|v| v > y.high, y.high - inset);
+    frame.markers(class, Shape::Up, 4.0, &above);
+    let below = edge(&|v| v < y.low, y.low + inset);
+    frame.markers(class, Shape::Down, 4.0, &below);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thinning_keeps_the_extremes_and_few_points() {
+        let mut values: Vec<f64> = (0..10_000).map(|i| f64::from(i % 7)).collect();
+        values[1234] = 99.0;
+        values[4321] = f64::NAN;
+        let drawn = thin(&values);
+        assert!(drawn.len() <= DRAWN && drawn.len() > DRAWN / 2);
+        assert!(drawn.contains(&1234) && !drawn.contains(&4321));
+        assert!(drawn.windows(2).all(|w| w[0] < w[1]));
+        assert_eq!(thin(&values[..500]).len(), 500);
+        assert!(thin(&[f64::NAN; 3]).is_empty());
+    }
+
+    #[test]
+    fn single_readings_do_not_set_an_axis_but_structure_does() {
+        let mut values: Vec<f64> = (0..500).map(|i| f64::from(i % 10)).collect();
+        values[7] = 1e4;
+        assert!(usual(&values).iter().all(|v| *v < 10.0));
+        // A twentieth of the record is no accident.
+        for v in &mut values[100..125] {
+            *v = 1e4;
+        }
+        assert_eq!(usual(&values).len(), 500);
+        assert_eq!(usual(&[2.0; 9]).len(), 9);
+    }
+}
