@@ -1,0 +1,63 @@
+//! How many phase bits the oscillator's table is addressed with, if truncation shows in the codes.
+
+use super::columns::Model;
+use super::input::Capture;
+use super::spur::ADDRESS_BITS;
+use std::f64::consts::TAU;
+
+/// Least gain in log-likelihood for a number of bits to be looked at.
+const LEAST_GAIN: f64 = 8.0;
+
+/// The number of address bits whose truncated tone explains most of the residuals (zero where rows are
+/// left out; constant and tone already taken off); `None` if none does, or the tuning word is not known.
+pub fn best(
+    capture: &Capture,
+    model: &Model,
+    residuals: [&[f64]; 2],
+    variances: [f64; 2],
+) -> Option<u32> {
+    let word = model.tone.word?;
+    let mut best: Option<(f64, u32)> = None;
+    for bits in ADDRESS_BITS {
+        let modulus = 1u64 << (32 - bits);
+        if u64::from(word) % modulus == 0 {
+            continue;
+        }
+        let gain = gain(capture, model, residuals, variances, bits);
+        if gain > LEAST_GAIN && best.is_none_or(|b| gain > b.0) {
+            best = Some((gain, bits));
+        }
+    }
+    best.map(|b| b.1)
+}
+
+fn gain(
+    capture: &Capture,
+    model: &Model,
+    residuals: [&[f64]; 2],
+    variances: [f64; 2],
+    bits: u32,
+) -> f64 {
+    let steps = f64::powi(2.0, bits as i32);
+    // Phase error a turn, 0 .. 2^-bits: its constant half is the tone itself, late.
+    let half = 0.5 / steps;
+    let mut with = [[0.0; 2]; 2];
+    let mut energy = 0.0;
+    for row in 0..capture.rows() {
+        let phase = model.tone.phase(row);
+        let late = (phase * steps).floor() / steps - phase + half;
+        let (sin, cos) = (TAU * phase).sin_cos();
+        let small = TAU * late;
+        energy += 0.5 * small * small;
+        for (with, residual) in with.iter_mut().zip(residuals) {
+            let r = residual.get(row).copied().unwrap_or(0.0);
+            with[0] += r * small * cos;
+            with[1] -= r * small * sin;
+        }
+    }
+    if energy <= 0.0 {
+        return 0.0;
+    }
+    let of = |c: usize| with[c].iter().map(|w| w * w).sum::<f64>() / (2.0 * energy * variances[c]);
+    of(0).max(of(1)).max(of(0) + of(1) - 2.0)
+}
