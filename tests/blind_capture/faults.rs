@@ -95,7 +95,6 @@ impl Fault {
 
     /// Draws a kind (0 .. 11); `None` where this bench cannot show it.
     pub fn draw(bench: &Bench, kind: usize, z: f64, d: &mut Dice) -> Option<Fault> {
-        let full = bench.full_scale();
         let fault = match kind {
             0 => Fault::Offset([[1.0, 1.0], [1.0, 0.0], [0.0, 1.0], [1.0, -0.6]][d.below(4)]),
             1 => Fault::Gain(if d.odds(0.5) { 1.0 } else { -1.0 }),
@@ -142,8 +141,10 @@ impl Fault {
             }
             _ => return None,
         };
-        let _ = full;
-        Some(bench.sized(&fault, z))
+        let fault = bench.sized(&fault, z);
+        // Some never get that large: jitter is part of the noise it is seen against.
+        let seen = bench.visible(&Faults::of(vec![fault.clone()]));
+        (seen > 0.9 * z).then_some(fault)
     }
 }
 

@@ -179,13 +179,31 @@ pub fn base(known: &Known) -> Vec<Combo> {
     out
 }
 
+/// One over the prior variances of the base: the quantiser's error is no larger than itself, and must
+/// not stand for other effects where few phases make all columns alike.
+pub fn base_ridge(base: &[Combo]) -> Vec<f64> {
+    base.iter()
+        .map(|c| match c.name.as_str() {
+            "saw" => 1.0,
+            "wave" => 10.0,
+            _ => 0.0,
+        })
+        .collect()
+}
+
 /// All ways of all linear effects, near the model. `free` are the sine and cosine of both channels' tones
 /// as they are in the codes.
-pub fn variants(known: &Known, model: &Model, free: [[f64; 2]; 2], rows: usize) -> Vec<Variant> {
+pub fn variants(
+    known: &Known,
+    model: &Model,
+    free: [[f64; 2]; 2],
+    rows: usize,
+    coupled: bool,
+) -> Vec<Variant> {
     let mut out = super::offset::variants();
     out.extend(super::gain::variants(known, model));
     out.extend(super::latency::variants(known, model, free));
-    out.extend(super::feedthrough::variants(known));
+    out.extend(super::feedthrough::variants(known, coupled));
     out.extend(super::nonlinearity::variants(known, model));
     out.extend(super::harmonics::variants(known, model));
     out.extend(super::mains::variants(known, model, rows));

@@ -4,7 +4,7 @@
 //! noise is limited with the signal, the outermost code is far more frequent than those next to it.
 //! What is limited is left out of all other fits.
 
-use super::columns::{CHUNK, Model, Rows, chunks};
+use super::columns::Model;
 use super::input::{Capture, Part};
 use super::normal;
 
@@ -242,30 +242,4 @@ fn pile(capture: &Capture, channel: usize, sigma: f64) -> (Limits, f64) {
         }
     }
     (out, gain)
-}
-
-/// Gain in log-likelihood from the limited training rows: they are at their level instead of where the
-/// tones put them. `coefficients` are the model's.
-pub fn gain(capture: &Capture, model: &Model) -> f64 {
-    let mut rows = Rows::new();
-    let mut sum = 0.0;
-    for segment in capture.segments.iter().filter(|s| s.part != Part::HeldOut) {
-        for chunk in chunks(segment.rows.clone()) {
-            let n = chunk.len().min(CHUNK);
-            rows.fill(capture, model, chunk);
-            for channel in 0..2 {
-                let base = model.variance.base[channel];
-                let limits = model.limits[channel];
-                for i in (0..n).filter(|_| limits.any()) {
-                    let signal = rows.signal[channel][i];
-                    if rows.weight[channel][i] == 0.0 {
-                        let with = rows.code(channel, i) - signal - limits.shift(signal, base.sqrt());
-                        let target = rows.target[channel][i];
-                        sum += 0.5 * (target * target - with * with) / base;
-                    }
-                }
-            }
-        }
-    }
-    sum
 }

@@ -223,13 +223,15 @@ impl Rows {
             let declared = sin * dense[SIN][i] + cos * dense[COS][i];
             let added: f64 = straight.iter().map(|(k, b)| b * dense[*k][i]).sum();
             let x = declared + added;
-            let u = x / model.span_codes;
+            // The bend is a function of the tone: a line or a harmonic in it is of second order.
+            let tone = declared + at(ONE) + at(SIN) * dense[SIN][i] + at(COS) * dense[COS][i];
+            let u = tone / model.span_codes;
             let mut power = 1.0;
             for k in 0..POWERS {
                 power *= u;
                 dense[POWER + k][i] = power;
             }
-            let place = ((x + model.span_codes) * scale).clamp(0.0, (HATS - 1) as f64 - 1e-9);
+            let place = ((tone + model.span_codes) * scale).clamp(0.0, (HATS - 1) as f64 - 1e-9);
             self.hats[channel][i] = (place as usize, place.fract());
             let bend: f64 = if bent {
                 let (k, part) = self.hats[channel][i];

@@ -11,6 +11,8 @@ pub struct Judged {
     pub errors: Errors,
     /// Sum of squares over variances, held-out rows.
     pub heldout_chi: f64,
+    /// The same of the training rows.
+    pub train_chi: f64,
 }
 
 /// With the model's own coefficients.
@@ -33,9 +35,11 @@ pub fn judge(capture: &Capture, model: &Model) -> Judged {
                     let error = rows.target[channel][i] - value - shift;
                     sums[held][0] += 1.0;
                     sums[held][1] += error * error;
-                    if held == 1 {
-                        let slope = rows.slope[channel][i];
-                        let variance = base + model.variance.jitter * slope * slope;
+                    let slope = rows.slope[channel][i];
+                    let variance = base + model.variance.jitter * slope * slope;
+                    if held == 0 {
+                        out.train_chi += error * error / variance;
+                    } else {
                         out.heldout_chi += error * error / variance;
                         let largest = &mut out.errors.heldout_max_abs;
                         *largest = largest.max(error.abs());

@@ -1,6 +1,6 @@
 //! The rounds of the fit: noise, lines and nonlinear parts around the model, then the set of effects.
 
-use super::candidates::{Effect, Known, Variant, base, variants};
+use super::candidates::{Effect, Known, Variant, base, base_ridge, variants};
 use super::clipping::{self, Limits};
 use super::columns::{ALL, COS, Model, ONE, Rows, SIN, TRUNCATED, Variance, chunks, harmonic};
 use super::gram::{Combo, Detail, Gram, Solved, solve};
@@ -10,7 +10,7 @@ use super::search::Search;
 use super::spectrum::{self, Spectrum};
 use super::tone::Tone;
 use super::wander::{self, Series};
-use super::{jitter, mains, nonlinearity, truncation};
+use super::{feedthrough, jitter, mains, nonlinearity, truncation};
 
 /// Least variance of a channel's noise, codes squared: below it the quantiser's pattern is not white.
 pub const LEAST_VARIANCE: f64 = 0.01;
@@ -134,7 +134,6 @@ fn generous(base: &[Combo], model: &Model) -> Vec<Combo> {
 
 /// What is known of the noise and of the tones, around a model.
 struct Around {
-    gram: Gram,
     residuals: [Vec<f64>; 2],
     training: [Vec<f64>; 2],
     free: [[f64; 2]; 2],
@@ -145,7 +144,9 @@ fn around(capture: &Capture, model: &mut Model, base: &[Combo]) -> Around {
     let gram = Gram::of(capture, model);
     let combos = generous(base, model);
     let combos: Vec<&Combo> = combos.iter().collect();
-    let solved = solve(gram.all(), &combos, &vec![0.0; combos.len()], Detail::All);
+    let mut ridge = base_ridge(base);
+    ridge.resize(combos.len(), 0.0);
+    let solved = solve(gram.all(), &combos, &ridge, Detail::All);
     let coefficients = spread(&combos, &solved);
     let mut free = model.declared;
     for (free, coefficients) in free.iter_mut().zip(&coefficients) {
@@ -165,7 +166,6 @@ fn around(capture: &Capture, model: &mut Model, base: &[Combo]) -> Around {
     let spectrum = spectrum_of(capture, &training);
     let noise = [0, 1].map(|c: usize| spectrum.variance(c).max(LEAST_VARIANCE));
     Around {
-        gram,
         residuals,
         training,
         free,
@@ -225,7 +225,7 @@ pub fn rounds(capture: &Capture, known: &Known, start: &Model) -> Fitted {
     let base = base(known);
     let first = Gram::of(capture, &model);
     let combos: Vec<&Combo> = base.iter().collect();
-    let solved = solve(first.all(), &combos, &vec![0.0; combos.len()], Detail::All);
+    let solved = solve(first.all(), &combos, &base_ridge(&base), Detail::All);
     model.coefficients = spread(&combos, &solved);
     let mut last: Option<Fitted> = None;
     for round in 0..ROUNDS {
@@ -272,7 +272,9 @@ pub fn rounds(capture: &Capture, known: &Known, start: &Model) -> Fitted {
         }
         let gram = Gram::of(capture, &model);
         let nuisance = wander::nuisance(&series);
-        let variants = variants(known, &model, seen.free, capture.rows());
+        let [drive, sense] = &seen.residuals;
+        let coupled = feedthrough::is_coupled(capture, &model, [drive, sense]);
+        let variants = variants(known, &model, seen.free, capture.rows(), coupled);
         let mut search = Search::new(gram.all(), &base, &nuisance, &variants);
         let (set, objective) = search.best();
         let (combos, solved) = search.solution(&set);
@@ -336,7 +338,7 @@ pub fn fit(capture: &Capture, known: &Known, tone: Tone) -> Fitted {
     let plain = rounds(capture, known, &start);
     let mut best = with_limits(capture, known, &start, plain);
     if let Some(found) = missing::find(capture, &best.model) {
-        let mut start = start.clone();
+            let mut start = start.clone();
         start.limits = best.model.limits;
         start.missing = found.missing.clone();
         let mut again = rounds(capture, known, &start);
@@ -366,12 +368,19 @@ fn with_limits(capture: &Capture, known: &Known, start: &Model, plain: Fitted) -
     }
     limited.variance = plain.model.variance;
     let mut other = rounds(capture, known, &limited);
-    // Both gains in the units of the same noise.
-    let ratio: f64 = (0..2).map(|c| plain.noise[c] / other.noise[c]).fold(1.0, f64::max);
-    let gain = clipping::gain(capture, &other.model) + piled;
+    // Both in the units of the same noise: half the chi-square of all training rows, and the costs.
+    let costs = |fit: &Fitted| -> f64 {
+        let chosen = fit.set.iter().filter_map(|k| fit.variants.get(*k));
+        chosen.map(|v| v.cost).sum()
+    };
+    let chi = |fit: &Fitted| {
+        let mut model = fit.model.clone();
+        model.variance = other.model.variance;
+        0.5 * super::errors::judge(capture, &model).train_chi
+    };
     let cost = 7.0 + 2.0 * sides + 4.0;
-    let plain_gain = plain.objective.max(0.0) * ratio;
-    if other.objective + gain - cost > plain_gain {
+    let gain = chi(&plain) + costs(&plain) - chi(&other) - costs(&other) + piled;
+    if gain > cost {
         other.clipping = Some(gain);
         return other;
     }

@@ -63,6 +63,8 @@ const LEAST_GAIN: f64 = 12.0;
 const SPACING: i64 = 8192;
 /// Codes to each side that share an expectation.
 const SIDE: usize = 3;
+/// Codes on each side whose counts bound an expectation.
+const NEAR: usize = 24;
 /// Widest range of codes that is looked at.
 const WIDEST: i64 = 1 << 20;
 
@@ -88,7 +90,7 @@ impl Histogram {
         let size = (range + 2 * pad + 1) as usize;
         let (mut counts, mut means) = (vec![0.0; size], vec![0.0; size]);
         let mut rows = Rows::new();
-        let mut add = |to: &mut Vec<f64>, code: f64, share: f64| {
+        let add = |to: &mut Vec<f64>, code: f64, share: f64| {
             if let Some(v) = to.get_mut((code as i64 - first).max(0) as usize) {
                 *v += share;
             }
@@ -123,7 +125,8 @@ impl Histogram {
         let expected = (0..size)
             .map(|k| {
                 let near = means.get(k.saturating_sub(SIDE)..(k + SIDE + 1).min(size));
-                near.unwrap_or_default().iter().copied().fold(f64::INFINITY, f64::min)
+                let least = near.unwrap_or_default().iter().copied().fold(f64::INFINITY, f64::min);
+                least.min(around(&counts, k))
             })
             .collect();
         Some(Histogram {
@@ -147,6 +150,17 @@ impl Histogram {
             })
             .collect()
     }
+}
+
+/// The smaller of the mean counts of the codes below and above `k`, its neighbours left out: where a
+/// coherent tone or what the model lacks leaves gaps, nothing is expected.
+fn around(counts: &[f64], k: usize) -> f64 {
+    let mean = |from: usize, to: usize| {
+        let cells = counts.get(from..to.min(counts.len())).unwrap_or_default();
+        cells.iter().sum::<f64>() / NEAR as f64
+    };
+    let below = mean(k.saturating_sub(NEAR + 1), k.saturating_sub(1));
+    below.min(mean(k + 2, k + 2 + NEAR))
 }
 
 /// A histogram under Gaussian noise of `sigma` codes, by four passes of a moving mean.
@@ -235,26 +249,43 @@ pub fn find(capture: &Capture, model: &Model) -> Option<Found> {
 /// The best even spacing: gain (the search taken off), spacing, residue.
 fn spaced(channels: &[&[(i64, f64, f64)]]) -> Option<(f64, i64, i64)> {
     let total: f64 = channels.iter().flat_map(|c| c.iter()).map(|x| x.2).sum();
-    let widest = channels.iter().map(|c| c.len()).max().unwrap_or(0) as i64;
-    let longest = SPACING.min((total / 20.0) as i64).min(widest / 3);
+    let widest = channels.iter().map(|c| c.len()).max().unwrap_or(0);
+    let longest = SPACING.min((total / 20.0) as i64).min(widest as i64 / 3);
     let mut best: Option<(f64, i64, i64)> = None;
     for spacing in 2..=longest {
-        let mut classes = vec![(0.0, 0.0); spacing as usize];
-        for (code, count, expected) in channels.iter().flat_map(|c| c.iter()) {
-            if let Some(class) = classes.get_mut(code.rem_euclid(spacing) as usize) {
-                class.0 += count;
-                class.1 += expected;
+        for residue in 0..spacing {
+            let classes = channels.iter().map(|cells| class(cells, spacing, residue));
+            // What appears at all is not missing: most classes end within a few codes.
+            let allowed = 0.002 * total / spacing as f64;
+            let mut count = 0.0;
+            for cell in classes.clone().flatten() {
+                count += cell.1;
+                if count > allowed {
+                    break;
+                }
             }
-        }
-        for (residue, (count, expected)) in classes.iter().enumerate() {
-            let gain = poisson_gain(*count, *expected) - 2.0 * (spacing as f64).ln() - 2.0;
-            // What appears at all is not missing.
-            if *count <= 0.002 * expected && best.is_none_or(|b| gain > b.0) {
-                best = Some((gain, spacing, residue as i64));
+            if count > allowed {
+                continue;
+            }
+            let expected: f64 = classes.flatten().map(|x| x.2).sum();
+            let gain = poisson_gain(count, expected) - 2.0 * (spacing as f64).ln() - 2.0;
+            if best.is_none_or(|b| gain > b.0) {
+                best = Some((gain, spacing, residue));
             }
         }
     }
     best
+}
+
+/// The cells (of ascending, contiguous codes) of a residue.
+fn class(
+    cells: &[(i64, f64, f64)],
+    spacing: i64,
+    residue: i64,
+) -> impl Iterator<Item = &(i64, f64, f64)> + Clone {
+    let first = cells.first().map_or(0, |x| x.0);
+    let skip = (residue - first).rem_euclid(spacing) as usize;
+    cells.get(skip..).unwrap_or_default().iter().step_by(spacing.max(1) as usize)
 }
 
 /// Codes that are missing each for itself, and their gain together.

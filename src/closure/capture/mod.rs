@@ -153,7 +153,7 @@ fn baseline(capture: &Capture, known: &Known, tone: Tone) -> Model {
     // Twice: the quantiser's error needs the signal.
     for _ in 0..2 {
         let gram = Gram::of(capture, &model);
-        let solved = solve(gram.all(), &combos, &vec![0.0; combos.len()], Detail::All);
+        let solved = solve(gram.all(), &combos, &candidates::base_ridge(&base), Detail::All);
         model.coefficients = fit::spread(&combos, &solved);
     }
     model

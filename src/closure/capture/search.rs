@@ -44,7 +44,7 @@ impl<'a> Search<'a> {
     /// Combos of a set, the base and the nuisance first, and their ridges.
     fn combos(&self, set: &[usize]) -> (Vec<&'a Combo>, Vec<f64>) {
         let mut combos: Vec<&Combo> = self.base.iter().collect();
-        let mut ridge = vec![0.0; combos.len()];
+        let mut ridge = super::candidates::base_ridge(self.base);
         for (combo, variance) in self.nuisance {
             combos.push(combo);
             ridge.push(1.0 / variance);

@@ -1,7 +1,7 @@
 //! What is left after the last step: lines, and a mean that goes with the phase or with the code.
 
 use super::columns::{CHUNK, Model, Rows, chunks};
-use super::fit::{LEAST_VARIANCE, residuals};
+use super::fit::residuals;
 use super::input::Capture;
 use super::spectrum::Spectrum;
 use crate::closure::likelihood::tail::chi_square_surprise;
@@ -9,6 +9,8 @@ use crate::closure::verdict::Structure;
 
 /// Bins of the phase and of the code.
 const BINS: usize = 64;
+/// Least variance of noise that whitens the quantiser's pattern, codes squared.
+const LEAST_WHITE: f64 = 0.08;
 /// Minus the logarithm of the probability below which something is left: one in ten thousand.
 const SURPRISE: f64 = 9.2;
 
@@ -26,7 +28,7 @@ pub fn left(capture: &Capture, model: &Model, coefficients: &[Vec<f64>; 2]) -> S
     }
     let [drive, sense] = &residuals;
     let spectrum = Spectrum::of([drive, sense], capture.rows());
-    let lines = spectrum.lines(&model.tone, 1, 3.0, [LEAST_VARIANCE; 2]);
+    let lines = spectrum.lines(&model.tone, 1, 3.0, [LEAST_WHITE; 2]);
     if let Some(line) = lines.first() {
         let surprise = line.surprise - (capture.rows() as f64).ln();
         if surprise > worst.0 {
@@ -58,7 +60,8 @@ fn binned(
         let n = chunk.len().min(CHUNK);
         rows.fill(capture, model, chunk);
         for i in 0..n {
-            let weight = rows.weight[channel][i];
+            // With less noise the quantiser's pattern is not white.
+            let weight = rows.weight[channel][i].min(1.0 / LEAST_WHITE);
             if weight == 0.0 {
                 continue;
             }

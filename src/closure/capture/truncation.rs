@@ -23,6 +23,16 @@ pub fn best(
         if u64::from(word) % modulus == 0 {
             continue;
         }
+        // Lines near the tone or near zero frequency may be noise of the amplitude or of the offset.
+        let near = |k: i64| {
+            let steps = (1 + k * (1i64 << bits)) * i64::from(word);
+            let place = super::tone::fold(steps.rem_euclid(1i64 << 32) as f64 / 4_294_967_296.0);
+            let apart = (place - model.tone.folded()).abs().min(place);
+            apart * (capture.rows() as f64) < 60.0
+        };
+        if near(1) || near(-1) {
+            continue;
+        }
         let gain = gain(capture, model, residuals, variances, bits);
         if gain > LEAST_GAIN && best.is_none_or(|b| gain > b.0) {
             best = Some((gain, bits));
