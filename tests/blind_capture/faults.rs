@@ -144,7 +144,14 @@ impl Fault {
         let fault = bench.sized(&fault, z);
         // Some never get that large: jitter is part of the noise it is seen against.
         let seen = bench.visible(&Faults::of(vec![fault.clone()]));
-        (seen > 0.9 * z).then_some(fault)
+        let sane = match &fault {
+            Fault::Jitter(turns, _) => *turns < 0.05,
+            // A larger step skips codes: these are missing.
+            Fault::Inl(a, Shape::Steps(_)) => *a < 0.4,
+            Fault::Latency(samples) => *samples < 2.0,
+            _ => true,
+        };
+        (sane && seen > 0.9 * z).then_some(fault)
     }
 }
 

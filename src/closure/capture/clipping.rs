@@ -179,16 +179,18 @@ impl Profile {
         for upper in [true, false] {
             let level = if upper { limits.high } else { limits.low };
             let sign = if upper { 1.0 } else { -1.0 };
-            let (mut n, mut gain) = (0.0, 0.0);
+            let (mut n, mut gain, mut deepest) = (0.0, 0.0, 0.0f64);
             for b in self.filled() {
                 let x = value(tone, b);
                 if sign * (x - level) > 0.0 {
+                    deepest = deepest.max(sign * (x - level));
                     let (with, without) = (b[1] - level, b[1] - x);
                     gain += 0.5 * b[0] * (without * without - with * with) / (sigma * sigma);
                     n += b[0];
                 }
             }
-            if gain > 12.0 && n >= 3.0 {
+            // The quantiser itself is flat for half a code.
+            if gain > 12.0 && n >= 3.0 && deepest > 0.75 {
                 rows += n as usize;
                 if upper {
                     out.high = level;

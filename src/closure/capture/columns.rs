@@ -8,7 +8,7 @@
 use super::clipping::Limits;
 use super::input::Capture;
 use super::missing::Missing;
-use super::tone::Tone;
+use super::tone::{Phases, Tone};
 use std::f64::consts::TAU;
 use std::ops::Range;
 
@@ -69,10 +69,15 @@ pub struct Variance {
 pub struct Model {
     /// Phases.
     pub tone: Tone,
+    /// Their sines and cosines.
+    pub phases: Phases,
     /// Sine and cosine of the declared tones, codes.
     pub declared: [[f64; 2]; 2],
     /// Coefficients of all columns: what is beyond the declared tones.
     pub coefficients: [Vec<f64>; 2],
+    /// Coefficients of a fit with every freedom: where the codes are, whatever effect put them there. The
+    /// quantiser's error is taken at it, so that it takes no side.
+    pub neutral: [Vec<f64>; 2],
     /// Frequencies of the lines, turns a sample.
     pub lines: Vec<f64>,
     /// Address bits of a truncated oscillator.
@@ -164,8 +169,7 @@ impl Rows {
         }
         let dense = &mut self.dense[0];
         for (i, row) in rows.enumerate() {
-            let phase = model.tone.phase(row);
-            let (sin, cos) = (TAU * phase).sin_cos();
+            let (sin, cos) = model.phases.at(row);
             dense[ONE][i] = 1.0;
             let (mut s, mut c) = (sin, cos);
             for k in 1..=HARMONICS {
@@ -176,6 +180,7 @@ impl Rows {
             }
             if let Some(bits) = model.truncation {
                 let steps = f64::powi(2.0, bits as i32);
+                let phase = model.tone.phase(row);
                 let (ts, tc) = (TAU * (phase * steps).floor() / steps).sin_cos();
                 dense[TRUNCATED][i] = ts - sin;
                 dense[TRUNCATED + 1][i] = tc - cos;
@@ -208,11 +213,12 @@ impl Rows {
         let coefficients = &model.coefficients[channel];
         let [sin, cos] = model.declared[channel];
         let at = |k: usize| coefficients.get(k).copied().unwrap_or(0.0);
-        let straight: Vec<(usize, f64)> = (ONE..POWER)
-            .chain(LINE..HAT)
-            .map(|k| (k, at(k)))
-            .filter(|(_, b)| *b != 0.0)
-            .collect();
+        let straight = straight_terms(coefficients);
+        let neutral = &model.neutral[channel];
+        let neutral_straight = straight_terms(neutral);
+        let neutral_hat = |k: usize| neutral.get(HAT + k).copied().unwrap_or(0.0);
+        // Noise of one code leaves nothing of the wave.
+        let with_wave = model.variance.base[channel] < 1.0;
         let bent = (POWER..SAW).chain(HAT..ALL).any(|k| at(k) != 0.0);
         let (sin_all, cos_all) = (sin + at(SIN), cos + at(COS));
         let angle = model.tone.angle();
@@ -241,8 +247,11 @@ impl Rows {
                 0.0
             };
             let signal = x + bend;
-            dense[SAW][i] = (signal + 0.5).floor() - signal;
-            dense[WAVE][i] = (TAU * signal.fract()).sin();
+            let (k, part) = self.hats[channel][i];
+            let there: f64 = neutral_straight.iter().map(|(k, b)| b * dense[*k][i]).sum();
+            let there = declared + there + neutral_hat(k) * (1.0 - part) + neutral_hat(k + 1) * part;
+            dense[SAW][i] = (there + 0.5).floor() - there;
+            dense[WAVE][i] = if with_wave { (TAU * there.fract()).sin() } else { 0.0 };
             dense[OTHER][i] = 0.0;
             let slope = angle * (sin_all * dense[COS][i] - cos_all * dense[SIN][i]);
             let code = f64::from(capture.codes[channel].get(row).copied().unwrap_or(0));
@@ -267,6 +276,15 @@ impl Rows {
             self.dense[1][OTHER][i] = if self.weight[0][i] > 0.0 { rest } else { 0.0 };
         }
     }
+}
+
+/// The columns that do not depend on the signal, with coefficients that are not 0.
+fn straight_terms(coefficients: &[f64]) -> Vec<(usize, f64)> {
+    (ONE..POWER)
+        .chain(LINE..HAT)
+        .filter_map(|k| Some((k, *coefficients.get(k)?)))
+        .filter(|(_, b)| *b != 0.0)
+        .collect()
 }
 
 impl Default for Rows {

@@ -8,12 +8,13 @@ use super::input::{Capture, Part};
 use super::missing::{self, Missing};
 use super::search::Search;
 use super::spectrum::{self, Spectrum};
-use super::tone::Tone;
+use super::tone::{Phases, Tone};
 use super::wander::{self, Series};
 use super::{feedthrough, jitter, mains, nonlinearity, truncation};
 
-/// Least variance of a channel's noise, codes squared: below it the quantiser's pattern is not white.
-pub const LEAST_VARIANCE: f64 = 0.01;
+/// Least variance of a channel's noise, codes squared: nearly that of an ideal quantiser's error, whose
+/// pattern is not white without noise.
+pub const LEAST_VARIANCE: f64 = 0.07;
 /// Rounds at most.
 const ROUNDS: usize = 6;
 /// Gain that jitter has to make: one free parameter.
@@ -56,6 +57,8 @@ pub fn declared(capture: &Capture, known: &Known, tone: Tone) -> Model {
     let largest = capture.codes.iter().flatten().map(|c| c.unsigned_abs()).max();
     Model {
         tone,
+        phases: Phases::of(&tone, capture.rows()),
+        neutral: [vec![0.0; ALL], vec![0.0; ALL]],
         declared: [[0.0, -amplitude], sense],
         coefficients: [vec![0.0; ALL], vec![0.0; ALL]],
         lines: Vec::new(),
@@ -107,7 +110,8 @@ pub fn spread(combos: &[&Combo], solved: &Solved) -> [Vec<f64>; 2] {
     out
 }
 
-/// A generous description of all that goes with the phase, and of the lines known so far.
+/// A generous description of all that goes with the phase, and of the lines known so far; tables of both
+/// channels come last, [`TABLES`] columns.
 fn generous(base: &[Combo], model: &Model) -> Vec<Combo> {
     let mut out = base.to_vec();
     for channel in 0..2 {
@@ -127,10 +131,15 @@ fn generous(base: &[Combo], model: &Model) -> Vec<Combo> {
             one(TRUNCATED);
             one(TRUNCATED + 1);
         }
+    }
+    for channel in 0..2 {
         out.extend(nonlinearity::table(model, 4, &[channel]));
     }
     out
 }
+
+/// Columns of the tables in a generous description.
+const TABLES: usize = 66;
 
 /// What is known of the noise and of the tones, around a model.
 struct Around {
@@ -140,7 +149,7 @@ struct Around {
     noise: [f64; 2],
 }
 
-fn around(capture: &Capture, model: &mut Model, base: &[Combo]) -> Around {
+fn around(capture: &Capture, model: &mut Model, base: &[Combo], neutral: bool) -> Around {
     let gram = Gram::of(capture, model);
     let combos = generous(base, model);
     let combos: Vec<&Combo> = combos.iter().collect();
@@ -155,6 +164,15 @@ fn around(capture: &Capture, model: &mut Model, base: &[Combo]) -> Around {
         }
     }
     let residuals = residuals(capture, model, &coefficients, true);
+    if neutral {
+        // Without the tables, unless they are needed: where the codes are is then known better.
+        let few = combos.len().saturating_sub(TABLES);
+        let (fewer, less) = (combos.get(..few), ridge.get(..few));
+        let fewer = fewer.unwrap_or_default();
+        let without = solve(gram.all(), fewer, less.unwrap_or_default(), Detail::All);
+        let needed = solved.gain - without.gain > 2.0 * TABLES as f64;
+        model.neutral = if needed { coefficients } else { spread(fewer, &without) };
+    }
     let mut training = residuals.clone();
     for segment in capture.segments.iter().filter(|s| s.part == Part::HeldOut) {
         for channel in &mut training {
@@ -178,22 +196,31 @@ fn spectrum_of(capture: &Capture, training: &[Vec<f64>; 2]) -> Spectrum {
     Spectrum::of([drive, sense], capture.training_rows())
 }
 
-/// Looks for a new line; true if one was added.
+/// Looks for new lines; true if any was added. Besides the strongest, those are taken that are no sidelobe
+/// of a stronger one.
 fn add_lines(capture: &Capture, model: &mut Model, around: &Around) -> bool {
-    if model.lines.len() >= super::columns::LINES {
-        return false;
-    }
     let rows = capture.rows() as f64;
     let spectrum = spectrum_of(capture, &around.training);
     let [drive, sense] = &around.training;
-    let found = spectrum.lines(&model.tone, 12, 3.0, [LEAST_VARIANCE; 2]);
-    // A line that is known is not found again: its rest is the frequency's error.
-    let new = found.into_iter().find(|l| {
-        model.lines.iter().all(|known| (known - l.turns).abs() > 1.0 / rows)
-    });
-    let Some(line) = new else { return false };
-    model.lines.push(spectrum::refine([drive, sense], around.noise, line.turns));
-    true
+    let before = model.lines.len();
+    let mut stronger: Vec<spectrum::Line> = Vec::new();
+    for line in spectrum.lines(&model.tone, 12, 3.0, [LEAST_VARIANCE; 2]) {
+        if model.lines.len() >= super::columns::LINES {
+            break;
+        }
+        // A line that is known is not found again: its rest is the frequency's error.
+        let known = model.lines.iter().any(|t| (t - line.turns).abs() * rows < 1.0);
+        let sidelobe = stronger.iter().any(|s| {
+            let apart = (s.turns - line.turns) * rows;
+            apart.abs() < 8.0 || line.surprise * apart * apart < 4.0 * s.surprise
+        });
+        if !known && !sidelobe {
+            let turns = spectrum::refine([drive, sense], around.noise, line.turns);
+            model.lines.push(turns);
+            stronger.push(line);
+        }
+    }
+    model.lines.len() > before
 }
 
 /// Adds the mains' own frequencies where they are too slow for the spectrum.
@@ -227,19 +254,26 @@ pub fn rounds(capture: &Capture, known: &Known, start: &Model) -> Fitted {
     let combos: Vec<&Combo> = base.iter().collect();
     let solved = solve(first.all(), &combos, &base_ridge(&base), Detail::All);
     model.coefficients = spread(&combos, &solved);
+    model.neutral = model.coefficients.clone();
     let mut last: Option<Fitted> = None;
     for round in 0..ROUNDS {
-        let mut seen = around(capture, &mut model, &base);
+        let mut seen = around(capture, &mut model, &base, round == 0);
         model.variance.base = seen.noise;
         if round == 0 {
-            model.truncation = truncation::best(capture, &model, [&seen.training[0], &seen.training[1]], seen.noise);
-            seen = around(capture, &mut model, &base);
+            find_steps(capture, &mut model, &base);
+            // Again, now that it is known where the codes are.
+            let sharp = is_sharp(&model.neutral, &model);
+            seen = around(capture, &mut model, &base, !sharp);
+            let spectrum = spectrum_of(capture, &seen.training);
+            let [drive, sense] = &seen.training;
+            model.truncation = truncation::best(capture, &model, [drive, sense], &spectrum);
+            seen = around(capture, &mut model, &base, false);
         }
-        for _ in 0..super::columns::LINES {
+        for _ in 0..3 {
             if !add_lines(capture, &mut model, &seen) {
                 break;
             }
-            seen = around(capture, &mut model, &base);
+            seen = around(capture, &mut model, &base, false);
         }
         let series = [0, 1].map(|c: usize| {
             wander::series(&seen.residuals[c], seen.noise[c], &model.tone)
@@ -247,7 +281,7 @@ pub fn rounds(capture: &Capture, known: &Known, start: &Model) -> Fitted {
         let lines = model.lines.len();
         add_slow_mains(capture, known, &mut model, &series);
         if model.lines.len() > lines {
-            seen = around(capture, &mut model, &base);
+            seen = around(capture, &mut model, &base, false);
         }
         let series = [0, 1].map(|c: usize| {
             wander::series(&seen.residuals[c], seen.noise[c], &model.tone)
@@ -271,7 +305,10 @@ pub fn rounds(capture: &Capture, known: &Known, start: &Model) -> Fitted {
             model.declared[0] = [0.0, -amplitude * less.max(0.0)];
         }
         let gram = Gram::of(capture, &model);
-        let nuisance = wander::nuisance(&series);
+        let mut nuisance = wander::nuisance(&series);
+        let spectrum = spectrum_of(capture, &seen.training);
+        let rows = capture.training_rows();
+        nuisance.extend(wander::of_harmonics(&spectrum, &model.tone, seen.noise, rows));
         let [drive, sense] = &seen.residuals;
         let coupled = feedthrough::is_coupled(capture, &model, [drive, sense]);
         let variants = variants(known, &model, seen.free, capture.rows(), coupled);
@@ -279,8 +316,16 @@ pub fn rounds(capture: &Capture, known: &Known, start: &Model) -> Fitted {
         let (set, objective) = search.best();
         let (combos, solved) = search.solution(&set);
         let coefficients = spread(&combos, &solved);
-        let same = last.as_ref().is_some_and(|l| is_same(l, &variants, &set, &model, jitter_taken));
+        let sharp = is_sharp(&coefficients, &model);
+        let same = (round > 1 || !sharp)
+            && last
+                .as_ref()
+                .is_some_and(|l| is_same(l, &variants, &set, &model, jitter_taken));
+        model.neutral.clone_from(&coefficients);
         model.coefficients = coefficients;
+        if sharp {
+            settle(capture, &mut model, &base, &nuisance, &variants, &set);
+        }
         last = Some(Fitted {
             model: model.clone(),
             gram,
@@ -315,6 +360,62 @@ pub fn rounds(capture: &Capture, known: &Known, start: &Model) -> Fitted {
         base,
         model,
     })
+}
+
+/// Whether the quantiser's error shows undithered in a channel: the place of the steps then matters.
+fn is_sharp(coefficients: &[Vec<f64>; 2], model: &Model) -> bool {
+    coefficients.iter().zip(model.variance.base).any(|(c, v)| {
+        v < 16.0 && c.get(super::columns::SAW).copied().unwrap_or(0.0).abs() > 0.3
+    })
+}
+
+/// Finds where the codes are before anything is chosen, where the quantiser's error shows undithered: of
+/// descriptions of growing freedom, each with the steps at its own signal, the one that gains most.
+fn find_steps(capture: &Capture, model: &mut Model, base: &[Combo]) {
+    if !is_sharp(&model.neutral, model) && !is_sharp(&model.coefficients, model) {
+        return;
+    }
+    let all = generous(base, model);
+    let ridge = base_ridge(base);
+    let mut best: Option<(f64, [Vec<f64>; 2])> = None;
+    for count in [base.len(), all.len().saturating_sub(TABLES), all.len()] {
+        let combos: Vec<&Combo> = all.iter().take(count).collect();
+        let mut ridge = ridge.clone();
+        ridge.resize(combos.len(), 0.0);
+        let mut trial = model.clone();
+        trial.neutral.clone_from(&model.coefficients);
+        let mut gain = 0.0;
+        for _ in 0..4 {
+            let gram = Gram::of(capture, &trial);
+            let solved = solve(gram.all(), &combos, &ridge, Detail::All);
+            trial.neutral = spread(&combos, &solved);
+            gain = solved.gain - 2.0 * solved.rank as f64;
+        }
+        if best.as_ref().is_none_or(|b| gain > b.0) {
+            best = Some((gain, trial.neutral));
+        }
+    }
+    if let Some((_, neutral)) = best {
+        model.neutral = neutral;
+    }
+}
+
+/// Fits a set again until the quantiser's steps are where its own signal puts them.
+fn settle(
+    capture: &Capture,
+    model: &mut Model,
+    base: &[Combo],
+    nuisance: &[(Combo, f64)],
+    variants: &[Variant],
+    set: &[usize],
+) {
+    for _ in 0..2 {
+        let gram = Gram::of(capture, model);
+        let search = Search::new(gram.all(), base, nuisance, variants);
+        let (combos, solved) = search.solution(set);
+        model.coefficients = spread(&combos, &solved);
+        model.neutral.clone_from(&model.coefficients);
+    }
 }
 
 /// Whether a round changed nothing of the choice and little of the tones.

@@ -58,23 +58,13 @@ impl Gram {
     /// One pass over the training rows.
     pub fn of(capture: &Capture, model: &Model) -> Gram {
         let zero = || [vec![0.0; SIDE * SIDE], vec![0.0; SIDE * SIDE]];
+        // One thread a group, each with its own sums: the bits do not depend on their number.
         let mut sums: Vec<[Vec<f64>; 2]> = (0..GROUPS).map(|_| zero()).collect();
-        let mut rows = Rows::new();
-        let mut weighted = vec![0.0; super::columns::CHUNK];
-        let columns = [active(model, 0), active(model, 1)];
-        for segment in &capture.segments {
-            let Part::Train(group) = segment.part else {
-                continue;
-            };
-            for chunk in chunks(segment.rows.clone()) {
-                let n = chunk.len();
-                rows.fill(capture, model, chunk);
-                for (channel, used) in columns.iter().enumerate() {
-                    let sum = &mut sums[group][channel];
-                    add_chunk(&rows, channel, used, n, &mut weighted, sum);
-                }
+        std::thread::scope(|scope| {
+            for (group, sums) in sums.iter_mut().enumerate() {
+                scope.spawn(move || add_group(capture, model, group, sums));
             }
-        }
+        });
         let mut total = zero();
         for group in &mut sums {
             for (channel, sum) in group.iter_mut().enumerate() {
@@ -103,6 +93,22 @@ impl Gram {
             }
         }
         out
+    }
+}
+
+fn add_group(capture: &Capture, model: &Model, group: usize, sums: &mut [Vec<f64>; 2]) {
+    let mut rows = Rows::new();
+    let mut weighted = vec![0.0; super::columns::CHUNK];
+    let columns = [active(model, 0), active(model, 1)];
+    for segment in capture.segments.iter().filter(|s| s.part == Part::Train(group)) {
+        for chunk in chunks(segment.rows.clone()) {
+            let n = chunk.len();
+            rows.fill(capture, model, chunk);
+            for (channel, used) in columns.iter().enumerate() {
+                let sum = &mut sums[channel];
+                add_chunk(&rows, channel, used, n, &mut weighted, sum);
+            }
+        }
     }
 }
 

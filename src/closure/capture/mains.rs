@@ -46,22 +46,21 @@ pub fn variants(known: &Known, model: &Model, rows: usize) -> Vec<Variant> {
     let own: Vec<usize> = (0..model.lines.len())
         .filter(|i| !spur::is_spur(known, model, *i, rows))
         .collect();
-    groups(known, model, &own, rows, Effect::Mains)
+    groups(model, &own, Effect::Mains, &|turns| search_cost(known, turns, rows))
 }
 
-/// Leading groups of lines as variants of an effect.
+/// Leading groups of lines as variants of an effect; `cost` is that of the search for a line's frequency.
 pub fn groups(
-    known: &Known,
     model: &Model,
     lines: &[usize],
-    rows: usize,
     effect: Effect,
+    cost: &dyn Fn(f64) -> f64,
 ) -> Vec<Variant> {
     let mut out = Vec::new();
     for count in 1..=lines.len() {
         let taken = lines.get(..count).unwrap_or_default();
         let turns = |i: &usize| model.lines.get(*i).copied().unwrap_or(0.0);
-        let search: f64 = taken.iter().map(|i| search_cost(known, turns(i), rows)).sum();
+        let search: f64 = taken.iter().map(|i| cost(turns(i))).sum();
         for channels in [&[0usize, 1][..], &[0], &[1]] {
             let combos = taken
                 .iter()

@@ -155,6 +155,7 @@ fn baseline(capture: &Capture, known: &Known, tone: Tone) -> Model {
         let gram = Gram::of(capture, &model);
         let solved = solve(gram.all(), &combos, &candidates::base_ridge(&base), Detail::All);
         model.coefficients = fit::spread(&combos, &solved);
+        model.neutral = model.coefficients.clone();
     }
     model
 }

@@ -9,6 +9,9 @@ use super::gram::Combo;
 /// less natural one, as they are an offset and a gain error.
 const LINE_TERMS: f64 = 3.0;
 
+/// Least distance of knots, codes: closer ones would follow the quantiser's own pattern.
+const LEAST_APART_CODES: f64 = 4.0;
+
 /// Power k of the signal in some channels; the parameter is its value at full scale.
 fn power(known: &Known, model: &Model, k: usize, channels: &[usize]) -> Combo {
     let prefix = match channels {
@@ -81,6 +84,10 @@ pub fn variants(known: &Known, model: &Model) -> Vec<Variant> {
             }
         }
         for stride in [8, 4, 1] {
+            let apart = 2.0 * model.span_codes / (HATS - 1) as f64 * stride as f64;
+            if apart < LEAST_APART_CODES && stride != 8 {
+                continue;
+            }
             let combos = table(model, stride, channels);
             let further = further + 2.0 * LINE_TERMS;
             out.push(Variant::new(Effect::Nonlinearity, combos, further));

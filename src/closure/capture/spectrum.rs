@@ -90,6 +90,25 @@ impl Spectrum {
         out
     }
 
+    /// Surprise of what is at a frequency (turns a sample), the two nearest bins together.
+    pub fn surprise_at(&self, turns: f64, tone: &Tone, least: [f64; 2]) -> f64 {
+        let floors = [self.floor(0, tone, least[0]), self.floor(1, tone, least[1])];
+        let at = |c: usize| {
+            let bin = (turns * self.bins as f64) as usize;
+            let of = |k: usize| Some(self.power[c].get(k)? / floors[c].get(k)?);
+            of(bin).unwrap_or(0.0).max(of(bin + 1).unwrap_or(0.0))
+        };
+        at(0).max(at(1))
+    }
+
+    /// The noise around a frequency (turns a sample) in a channel over the white noise, 1 or more.
+    pub fn excess(&self, channel: usize, turns: f64, tone: &Tone, least: f64) -> f64 {
+        let floor = self.floor(channel, tone, least);
+        let bin = (super::tone::fold(turns) * self.bins as f64).round() as usize;
+        let here = floor.get(bin.min(floor.len().saturating_sub(1)));
+        here.copied().unwrap_or(least) / self.variance(channel).max(least)
+    }
+
     /// Lines above their surroundings, strongest first, with less than one in a thousand by chance. Harmonics
     /// of the tone up to `harmonics`, zero frequency, and what is within `apart` resolutions of
     /// either are none.

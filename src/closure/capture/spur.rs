@@ -13,6 +13,8 @@ use super::tone::{Tone, fold};
 
 /// Address bits that an oscillator may have.
 pub const ADDRESS_BITS: std::ops::RangeInclusive<u32> = 3..=16;
+/// What the search among the places costs.
+const PLACES_COST: f64 = 5.0;
 /// Orders k of single lines.
 const ORDERS: [i64; 8] = [-1, 1, -2, 2, -3, 3, -4, 4];
 
@@ -69,10 +71,6 @@ pub fn variants(known: &Known, model: &Model, rows: usize) -> Vec<Variant> {
         .filter(|i| is_spur(known, model, *i, rows))
         .collect();
     // A hundred places instead of all frequencies.
-    let mut groups = mains::groups(known, model, &own, rows, Effect::Spur);
-    for variant in &mut groups {
-        variant.cost += 2.0;
-    }
-    out.extend(groups);
+    out.extend(mains::groups(model, &own, Effect::Spur, &|_| PLACES_COST));
     out
 }

@@ -53,6 +53,28 @@ impl Tone {
     }
 }
 
+/// Sine and cosine of the phase of every row, computed once.
+#[derive(Debug, Clone)]
+pub struct Phases(std::sync::Arc<Vec<[f64; 2]>>);
+
+impl Phases {
+    /// Of the first `rows` rows.
+    pub fn of(tone: &Tone, rows: usize) -> Phases {
+        let at = |row| (TAU * tone.phase(row)).sin_cos();
+        let pairs = (0..rows).map(|row| {
+            let (sin, cos) = at(row);
+            [sin, cos]
+        });
+        Phases(std::sync::Arc::new(pairs.collect()))
+    }
+
+    /// Sine and cosine at a row.
+    #[inline]
+    pub fn at(&self, row: usize) -> (f64, f64) {
+        self.0.get(row).map_or((0.0, 1.0), |[s, c]| (*s, *c))
+    }
+}
+
 /// A frequency in turns a sample folded into 0 ..= 1/2.
 pub fn fold(turns: f64) -> f64 {
     let turns = turns.rem_euclid(1.0);

@@ -2,11 +2,17 @@
 
 use super::columns::Model;
 use super::input::Capture;
+use super::fit::LEAST_VARIANCE;
+use super::spectrum::Spectrum;
 use super::spur::ADDRESS_BITS;
+use super::tone::fold;
 use std::f64::consts::TAU;
 
 /// Least gain in log-likelihood for a number of bits to be looked at.
 const LEAST_GAIN: f64 = 8.0;
+
+/// Least surprise of the two strongest lines together.
+const LEAST_SURPRISE: f64 = 12.0;
 
 /// The number of address bits whose truncated tone explains most of the residuals (zero where rows are
 /// left out; constant and tone already taken off); `None` if none does, or the tuning word is not known.
@@ -14,23 +20,28 @@ pub fn best(
     capture: &Capture,
     model: &Model,
     residuals: [&[f64]; 2],
-    variances: [f64; 2],
+    spectrum: &Spectrum,
 ) -> Option<u32> {
     let word = model.tone.word?;
+    let variances = [0, 1].map(|c: usize| spectrum.variance(c).max(LEAST_VARIANCE));
     let mut best: Option<(f64, u32)> = None;
     for bits in ADDRESS_BITS {
         let modulus = 1u64 << (32 - bits);
         if u64::from(word) % modulus == 0 {
             continue;
         }
-        // Lines near the tone or near zero frequency may be noise of the amplitude or of the offset.
-        let near = |k: i64| {
+        // Lines near the tone or near zero frequency may be noise of the amplitude or of the offset, and
+        // a line must stand out of what is around it.
+        let place = |k: i64| {
             let steps = (1 + k * (1i64 << bits)) * i64::from(word);
-            let place = super::tone::fold(steps.rem_euclid(1i64 << 32) as f64 / 4_294_967_296.0);
-            let apart = (place - model.tone.folded()).abs().min(place);
+            fold(steps.rem_euclid(1i64 << 32) as f64 / 4_294_967_296.0)
+        };
+        let near = |k: i64| {
+            let apart = (place(k) - model.tone.folded()).abs().min(place(k));
             apart * (capture.rows() as f64) < 60.0
         };
-        if near(1) || near(-1) {
+        let seen = |k: i64| spectrum.surprise_at(place(k), &model.tone, [LEAST_VARIANCE; 2]);
+        if near(1) || near(-1) || seen(1) + seen(-1) < LEAST_SURPRISE {
             continue;
         }
         let gain = gain(capture, model, residuals, variances, bits);
@@ -56,7 +67,7 @@ fn gain(
     for row in 0..capture.rows() {
         let phase = model.tone.phase(row);
         let late = (phase * steps).floor() / steps - phase + half;
-        let (sin, cos) = (TAU * phase).sin_cos();
+        let (sin, cos) = model.phases.at(row);
         let small = TAU * late;
         energy += 0.5 * small * small;
         for (with, residual) in with.iter_mut().zip(residuals) {

@@ -4,8 +4,9 @@
 //! The residual is demodulated in blocks; of each series the cosine transform's modes j >= 1 have the
 //! variance w + h / j, w by the white noise, h fitted. The mean itself, mode 0, is not looked at.
 
-use super::columns::{COS, ONE, SIN};
+use super::columns::{COS, HARMONICS, ONE, SIN, harmonic};
 use super::gram::Combo;
+use super::spectrum::Spectrum;
 use super::tone::Tone;
 use std::f64::consts::{PI, TAU};
 
@@ -109,6 +110,29 @@ pub fn nuisance(series: &[Option<Series>; 2]) -> Vec<(Combo, f64)> {
             let variance = of_mean(series, column);
             if variance > 0.0 {
                 out.push((Combo::one("wander", channel, column), variance));
+            }
+        }
+    }
+    out
+}
+
+/// The same of the harmonics, which lie in the skirts that noise of the amplitude has around the tone: what
+/// the spectrum has there beyond the white noise, four times, as its level is known to a factor.
+pub fn of_harmonics(
+    spectrum: &Spectrum,
+    tone: &Tone,
+    variances: [f64; 2],
+    rows: usize,
+) -> Vec<(Combo, f64)> {
+    let mut out = Vec::new();
+    for (channel, variance) in variances.iter().enumerate() {
+        for k in 2..=HARMONICS {
+            let excess = spectrum.excess(channel, k as f64 * tone.turns, tone, *variance) - 1.0;
+            if excess > 0.05 {
+                let of_mean = 4.0 * excess * 2.0 * variance / rows as f64;
+                let (sin, cos) = harmonic(k);
+                out.push((Combo::one("wander", channel, sin), of_mean));
+                out.push((Combo::one("wander", channel, cos), of_mean));
             }
         }
     }
