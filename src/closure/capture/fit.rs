@@ -157,8 +157,14 @@ fn around(capture: &Capture, model: &mut Model, base: &[Combo], neutral: bool) -
     ridge.resize(combos.len(), 0.0);
     let solved = solve(gram.all(), &combos, &ridge, Detail::All);
     let coefficients = spread(&combos, &solved);
+    // Tables contain the tone: what it is comes from the fit without them.
+    let few = combos.len().saturating_sub(TABLES);
+    let (fewer, less) = (combos.get(..few), ridge.get(..few));
+    let fewer = fewer.unwrap_or_default();
+    let without = solve(gram.all(), fewer, less.unwrap_or_default(), Detail::All);
+    let plain = spread(fewer, &without);
     let mut free = model.declared;
-    for (free, coefficients) in free.iter_mut().zip(&coefficients) {
+    for (free, coefficients) in free.iter_mut().zip(&plain) {
         for (value, column) in free.iter_mut().zip([SIN, COS]) {
             *value += coefficients.get(column).copied().unwrap_or(0.0);
         }
@@ -166,12 +172,8 @@ fn around(capture: &Capture, model: &mut Model, base: &[Combo], neutral: bool) -
     let residuals = residuals(capture, model, &coefficients, true);
     if neutral {
         // Without the tables, unless they are needed: where the codes are is then known better.
-        let few = combos.len().saturating_sub(TABLES);
-        let (fewer, less) = (combos.get(..few), ridge.get(..few));
-        let fewer = fewer.unwrap_or_default();
-        let without = solve(gram.all(), fewer, less.unwrap_or_default(), Detail::All);
         let needed = solved.gain - without.gain > 2.0 * TABLES as f64;
-        model.neutral = if needed { coefficients } else { spread(fewer, &without) };
+        model.neutral = if needed { coefficients } else { plain };
     }
     let mut training = residuals.clone();
     for segment in capture.segments.iter().filter(|s| s.part == Part::HeldOut) {

@@ -7,7 +7,7 @@ use super::gram::Combo;
 
 /// Gain that a free constant or a free slope costs beyond a column: a bend that needs them is the
 /// less natural one, as they are an offset and a gain error.
-const LINE_TERMS: f64 = 3.0;
+const LINE_TERMS: f64 = 5.0;
 
 /// Least distance of knots, codes: closer ones would follow the quantiser's own pattern.
 const LEAST_APART_CODES: f64 = 4.0;

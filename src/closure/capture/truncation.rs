@@ -38,7 +38,7 @@ pub fn best(
         };
         let near = |k: i64| {
             let apart = (place(k) - model.tone.folded()).abs().min(place(k));
-            apart * (capture.rows() as f64) < 60.0
+            apart * (capture.rows() as f64) < 12.0
         };
         let seen = |k: i64| spectrum.surprise_at(place(k), &model.tone, [LEAST_VARIANCE; 2]);
         if near(1) || near(-1) || seen(1) + seen(-1) < LEAST_SURPRISE {
