@@ -23,7 +23,9 @@ fn analysed(bench: &Bench, faults: &Faults) -> Findings {
         drive_amplitude_codes: Some(bench.amplitude),
         sense_codes_per_dps: Some(bench.codes_per_dps),
         sense_phase_rad: Some(bench.sense_phase),
-        rate_dps: bench.rate_known.then_some(bench.in_phase / bench.codes_per_dps),
+        rate_dps: bench
+            .rate_known
+            .then_some(bench.in_phase / bench.codes_per_dps),
     };
     let capture = Capture::new(bench.codes(faults).codes, meta, 16).unwrap();
     capture::analyse(&capture).unwrap()
@@ -32,7 +34,9 @@ fn analysed(bench: &Bench, faults: &Faults) -> Findings {
 fn answer(found: &Findings) -> Answer {
     let steps = found.steps.iter();
     Answer {
-        steps: steps.map(|s| (s.effect.clone(), s.indistinguishable_from.clone())).collect(),
+        steps: steps
+            .map(|s| (s.effect.clone(), s.indistinguishable_from.clone()))
+            .collect(),
     }
 }
 
@@ -61,7 +65,10 @@ fn run(cases: Vec<(u64, Bench, Faults)>) -> (Vec<Mark>, Confusion) {
         let truth: Vec<&str> = faults.0.iter().map(Fault::id).collect();
         let mark = mark(answer, &truth);
         if !mark.first || !mark.all || mark.extra > 0 {
-            println!("seed {seed}: {:?} was answered by {:?}", faults.0, answer.steps);
+            println!(
+                "seed {seed}: {:?} was answered by {:?}",
+                faults.0, answer.steps
+            );
         }
         confusion.add(&truth.join("+"), answer);
         mark
@@ -92,7 +99,10 @@ fn single_effects_are_named() {
     assert!(marks.len() > 40, "{}", marks.len());
     let first = share(&marks, |m| m.first);
     let extra = share(&marks, |m| m.extra > 0);
-    println!("{} singles: first {first:.3}, with more {extra:.3}", marks.len());
+    println!(
+        "{} singles: first {first:.3}, with more {extra:.3}",
+        marks.len()
+    );
     assert!(first >= 0.95 && extra <= 0.06, "{first} {extra}");
 }
 

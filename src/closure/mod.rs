@@ -4,10 +4,12 @@
 //! [`polynomial`] (algebra and least squares), [`weights`] (spikes, dwells), [`noise`] (its
 //! correlation, and the coefficients' covariance), [`folds`] (held-out blocks), [`order`] (its
 //! choice), [`sweep`] (heating against cooling) and [`checks`] (what a user should know of before
-//! believing the fit). [`likelihood`] is what tells an effect from noise with a memory. Nothing
+//! believing the fit). [`likelihood`] is what tells an effect from noise with a memory. [`capture`] does the
+//! same for ADC codes. Nothing
 //! here knows the plant (law 4).
 
 pub mod baseline;
+pub mod capture;
 pub mod checks;
 pub mod folds;
 pub mod likelihood;

@@ -80,11 +80,17 @@ impl Bench {
         let rows = d.spread(2000.0, 200_000.0) as usize;
         let fs_hz = d.spread(2e4, 1e6).round();
         let least = (40.0 / rows as f64).max(0.004);
-        let turns = if d.odds(0.3) { d.between(0.2, 0.46) } else { d.spread(least, 0.3) };
+        let turns = if d.odds(0.3) {
+            d.between(0.2, 0.46)
+        } else {
+            d.spread(least, 0.3)
+        };
         let mut ftw = (turns * 4_294_967_296.0) as u32;
         if d.odds(0.3) {
             let bits = 18 + d.below(8);
-            ftw = ((ftw >> bits) << bits).max(1 << bits).max((least * 4_294_967_296.0) as u32 >> bits << bits);
+            ftw = ((ftw >> bits) << bits)
+                .max(1 << bits)
+                .max((least * 4_294_967_296.0) as u32 >> bits << bits);
         }
         let bits = 8 + d.below(9) as u32;
         let full = f64::powi(2.0, bits as i32 - 1);
@@ -127,7 +133,10 @@ impl Bench {
     pub fn ideal(&self, turns: f64) -> [f64; 2] {
         let drive = self.amplitude * (TAU * turns - TAU / 4.0).sin();
         let sense = TAU * turns + self.sense_phase;
-        [drive, self.in_phase * sense.sin() + self.quadrature * sense.cos()]
+        [
+            drive,
+            self.in_phase * sense.sin() + self.quadrature * sense.cos(),
+        ]
     }
 
     /// Signals with faults, no noise, no rounding.
@@ -161,7 +170,12 @@ impl Bench {
                 let mut x = signals[channel][row];
                 let jitter = faults.jitter();
                 if jitter > 0.0 {
-                    let late = jitter * if faults.is_common() { common } else { d.gauss() };
+                    let late = jitter
+                        * if faults.is_common() {
+                            common
+                        } else {
+                            d.gauss()
+                        };
                     x = faults.signal_late(self, row, late / (angle / TAU))[channel];
                 }
                 x *= 1.0 + wander[channel].get(row).copied().unwrap_or(0.0);
@@ -211,8 +225,11 @@ impl Bench {
         let mut chi = 0.0;
         for channel in 0..2 {
             let bend = |x: &f64| faults.bend(channel, *x, full);
-            let change: Vec<f64> =
-                with[channel].iter().zip(&without[channel]).map(|(a, b)| bend(a) - b).collect();
+            let change: Vec<f64> = with[channel]
+                .iter()
+                .zip(&without[channel])
+                .map(|(a, b)| bend(a) - b)
+                .collect();
             let mut free: Vec<Vec<f64>> = Vec::new();
             if channel == 1 {
                 let part = |quarter: f64| -> Vec<f64> {
@@ -238,7 +255,9 @@ impl Bench {
                 (self.ideal(t + h)[channel] - self.ideal(t - h)[channel]) / (2.0 * h)
             };
             let turns_late = jitter;
-            let part: Vec<f64> = (0..self.rows).map(|r| (slope(r) * turns_late).powi(2)).collect();
+            let part: Vec<f64> = (0..self.rows)
+                .map(|r| (slope(r) * turns_late).powi(2))
+                .collect();
             let mean = part.iter().sum::<f64>() / part.len() as f64;
             let all = self.variance(channel) + mean;
             chi += part.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / (2.0 * all * all);

@@ -99,7 +99,13 @@ impl Fault {
             0 => Fault::Offset([[1.0, 1.0], [1.0, 0.0], [0.0, 1.0], [1.0, -0.6]][d.below(4)]),
             1 => Fault::Gain(if d.odds(0.5) { 1.0 } else { -1.0 }),
             2 => {
-                let shapes = [Shape::Cubic, Shape::Mixed, Shape::Bow, Shape::SShape, Shape::Steps(16)];
+                let shapes = [
+                    Shape::Cubic,
+                    Shape::Mixed,
+                    Shape::Bow,
+                    Shape::SShape,
+                    Shape::Steps(16),
+                ];
                 Fault::Inl(1.0, shapes[d.below(5)])
             }
             3 => return missing(bench, z, d),
@@ -107,7 +113,13 @@ impl Fault {
             5 => Fault::Jitter(1.0, d.odds(0.7)),
             6 => {
                 let count = 1 + d.below(3);
-                let lines = (0..count).map(|k| (2 + ((d.below(2) + k) % 4) as u32, d.between(0.3, 1.0), d.unit()));
+                let lines = (0..count).map(|k| {
+                    (
+                        2 + ((d.below(2) + k) % 4) as u32,
+                        d.between(0.3, 1.0),
+                        d.unit(),
+                    )
+                });
                 Fault::Harmonics(1.0, lines.collect(), d.odds(0.5))
             }
             7 if bench.rate_known => Fault::Feedthrough(1.0, d.unit(), d.odds(0.5)),
@@ -169,7 +181,10 @@ fn missing(bench: &Bench, z: f64, d: &mut Dice) -> Option<Fault> {
             return None;
         }
         let spacing = 16 + d.below((longest - 15) as usize) as i64;
-        return Some(Fault::MissingEvery(spacing, d.below(spacing as usize) as i64));
+        return Some(Fault::MissingEvery(
+            spacing,
+            d.below(spacing as usize) as i64,
+        ));
     }
     let per_code = 0.75 * bench.rows as f64 / (PI * bench.amplitude);
     if per_code < 40.0 {
@@ -177,7 +192,11 @@ fn missing(bench: &Bench, z: f64, d: &mut Dice) -> Option<Fault> {
     }
     let reach = (0.8 * bench.amplitude) as usize;
     let count = 1 + d.below(4);
-    Some(Fault::MissingSome((0..count).map(|_| d.below(2 * reach) as i64 - reach as i64).collect()))
+    Some(Fault::MissingSome(
+        (0..count)
+            .map(|_| d.below(2 * reach) as i64 - reach as i64)
+            .collect(),
+    ))
 }
 
 /// A level below the drive's peak that a matched filter sees at z or more.
@@ -233,7 +252,13 @@ impl Faults {
     }
 
     pub fn noise_coupling(&self) -> f64 {
-        let of = |f: &Fault| if let Fault::Feedthrough(a, _, true) = f { *a } else { 0.0 };
+        let of = |f: &Fault| {
+            if let Fault::Feedthrough(a, _, true) = f {
+                *a
+            } else {
+                0.0
+            }
+        };
         self.0.iter().map(of).sum()
     }
 
@@ -278,12 +303,16 @@ impl Faults {
                     sense += a * bench.amplitude * (TAU * (turns - 0.25 + phase)).sin();
                 }
                 Fault::Mains(a, lines, channels) => {
-                    let wave: f64 = lines.iter().map(|(hz, r)| r * (TAU * hz * time + 0.4).sin()).sum();
+                    let wave: f64 = lines
+                        .iter()
+                        .map(|(hz, r)| r * (TAU * hz * time + 0.4).sin())
+                        .sum();
                     drive += channels[0] * a * wave;
                     sense += channels[1] * a * wave;
                 }
                 Fault::SpurLine(a, k) => {
-                    let steps = (i128::from(*k) * i128::from(bench.ftw) * row as i128).rem_euclid(1 << 32);
+                    let steps =
+                        (i128::from(*k) * i128::from(bench.ftw) * row as i128).rem_euclid(1 << 32);
                     let wave = a * (TAU * steps as f64 / 4_294_967_296.0 + 1.1).sin();
                     drive += bench.amplitude * wave;
                     sense += sense_size * wave;

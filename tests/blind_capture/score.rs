@@ -44,14 +44,20 @@ impl Confusion {
     pub fn add(&mut self, truth: &str, answer: &Answer) {
         let named = match answer.steps.as_slice() {
             [] => "nothing".to_owned(),
-            steps => steps.iter().map(|s| s.0.as_str()).collect::<Vec<_>>().join("+"),
+            steps => steps
+                .iter()
+                .map(|s| s.0.as_str())
+                .collect::<Vec<_>>()
+                .join("+"),
         };
         *self.cells.entry((truth.to_owned(), named)).or_default() += 1;
     }
 
     /// One line a cell.
     pub fn table(&self) -> String {
-        let line = |((truth, named), n): (&(String, String), &usize)| format!("{truth:44} {n:5}  {named}\n");
+        let line = |((truth, named), n): (&(String, String), &usize)| {
+            format!("{truth:44} {n:5}  {named}\n")
+        };
         self.cells.iter().map(line).collect()
     }
 }

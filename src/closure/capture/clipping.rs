@@ -230,7 +230,9 @@ fn pile(capture: &Capture, channel: usize, sigma: f64) -> (Limits, f64) {
     for (outermost, step) in [(*high, -1), (*low, 1)] {
         let count = |code: i32| codes.iter().filter(|c| **c == code).count() as f64;
         let here = count(outermost);
-        let next = (1..=3).map(|k| count(outermost + k * step)).fold(0.0, f64::max);
+        let next = (1..=3)
+            .map(|k| count(outermost + k * step))
+            .fold(0.0, f64::max);
         // Expected not more than the largest of its neighbours, and one.
         let expected = next + 1.0;
         let more = here * (here / expected).ln() - (here - expected);

@@ -133,7 +133,9 @@ impl Rows {
     /// What the coefficients make of row `i` (within the chunk) of a channel, beyond the declared tone.
     pub fn value(&self, channel: usize, i: usize, coefficients: &[f64]) -> f64 {
         let dense = self.dense[channel].iter().zip(coefficients);
-        let sum: f64 = dense.map(|(c, b)| if *b == 0.0 { 0.0 } else { b * c[i] }).sum();
+        let sum: f64 = dense
+            .map(|(c, b)| if *b == 0.0 { 0.0 } else { b * c[i] })
+            .sum();
         let (at, part) = self.hats[channel][i];
         let hat = |k: usize| coefficients.get(HAT + k).copied().unwrap_or(0.0);
         sum + hat(at) * (1.0 - part) + hat(at + 1) * part
@@ -249,9 +251,14 @@ impl Rows {
             let signal = x + bend;
             let (k, part) = self.hats[channel][i];
             let there: f64 = neutral_straight.iter().map(|(k, b)| b * dense[*k][i]).sum();
-            let there = declared + there + neutral_hat(k) * (1.0 - part) + neutral_hat(k + 1) * part;
+            let there =
+                declared + there + neutral_hat(k) * (1.0 - part) + neutral_hat(k + 1) * part;
             dense[SAW][i] = (there + 0.5).floor() - there;
-            dense[WAVE][i] = if with_wave { (TAU * there.fract()).sin() } else { 0.0 };
+            dense[WAVE][i] = if with_wave {
+                (TAU * there.fract()).sin()
+            } else {
+                0.0
+            };
             dense[OTHER][i] = 0.0;
             let slope = angle * (sin_all * dense[COS][i] - cos_all * dense[SIN][i]);
             let code = f64::from(capture.codes[channel].get(row).copied().unwrap_or(0));
@@ -296,5 +303,6 @@ impl Default for Rows {
 /// The chunks of a stretch of rows.
 pub fn chunks(rows: Range<usize>) -> impl Iterator<Item = Range<usize>> {
     let end = rows.end;
-    rows.step_by(CHUNK).map(move |start| start..end.min(start + CHUNK))
+    rows.step_by(CHUNK)
+        .map(move |start| start..end.min(start + CHUNK))
 }

@@ -73,10 +73,20 @@ fn surely_constant(points: &[[f64; 3]], with: usize) -> bool {
     let mean = |f: &dyn Fn(&[f64; 3]) -> f64| points.iter().map(f).sum::<f64>() / n;
     let (mp, mx) = (mean(&|p| p[0]), mean(&|p| p[with]));
     let xx = mean(&|p| (p[with] - mx).powi(2));
-    let slope = if xx > 0.0 { mean(&|p| (p[with] - mx) * p[0]) / xx } else { 0.0 };
+    let slope = if xx > 0.0 {
+        mean(&|p| (p[with] - mx) * p[0]) / xx
+    } else {
+        0.0
+    };
     let constant = mp - slope * mx;
     // The constant is a weighted mean of p; its variance from the residuals themselves.
-    let weight = |p: &[f64; 3]| 1.0 - if xx > 0.0 { mx * (p[with] - mx) / xx } else { 0.0 };
+    let weight = |p: &[f64; 3]| {
+        1.0 - if xx > 0.0 {
+            mx * (p[with] - mx) / xx
+        } else {
+            0.0
+        }
+    };
     let rest = |p: &[f64; 3]| p[0] - constant - slope * p[with];
     let variance = mean(&|p| (weight(p) * rest(p)).powi(2)) / n;
     constant.abs() > COMMON * variance.sqrt()
@@ -95,6 +105,8 @@ fn detrended(residual: &[f64], model: &Model, rows: std::ops::Range<usize>) -> V
         sums += row(r) * row(r).transpose();
         right += row(r) * value(r);
     }
-    let fit = sums.try_inverse().map_or(right * 0.0, |inverse| inverse * right);
+    let fit = sums
+        .try_inverse()
+        .map_or(right * 0.0, |inverse| inverse * right);
     rows.map(|r| value(r) - row(r).dot(&fit)).collect()
 }

@@ -25,10 +25,15 @@ pub fn corrected(
             for channel in 0..2 {
                 let effects = &effects[channel];
                 // What the base puts beyond the declared tone is no error: rate and quadrature.
-                let base: Vec<f64> = all[channel].iter().zip(effects).map(|(a, e)| a - e).collect();
+                let base: Vec<f64> = all[channel]
+                    .iter()
+                    .zip(effects)
+                    .map(|(a, e)| a - e)
+                    .collect();
                 for i in 0..n {
                     let code = rows.code(channel, i);
-                    let correction = bend(model, effects, code) + phased(&rows, channel, i, effects);
+                    let correction =
+                        bend(model, effects, code) + phased(&rows, channel, i, effects);
                     let corrected = (code - correction + 0.5).floor();
                     let declared = code - rows.target[channel][i];
                     let error = corrected - declared - rows.value(channel, i, &base);
@@ -50,7 +55,9 @@ pub fn corrected(
 fn bend(model: &Model, coefficients: &[f64], code: f64) -> f64 {
     let at = |k: usize| coefficients.get(k).copied().unwrap_or(0.0);
     let u = code / model.span_codes;
-    let powers: f64 = (0..POWERS).map(|k| at(POWER + k) * u.powi(k as i32 + 1)).sum();
+    let powers: f64 = (0..POWERS)
+        .map(|k| at(POWER + k) * u.powi(k as i32 + 1))
+        .sum();
     let place = ((u + 1.0) * 0.5 * (HATS - 1) as f64).clamp(0.0, (HATS - 1) as f64 - 1e-9);
     let (k, part) = (place as usize, place.fract());
     powers + at(HAT + k) * (1.0 - part) + at(HAT + k + 1) * part
@@ -58,9 +65,8 @@ fn bend(model: &Model, coefficients: &[f64], code: f64) -> f64 {
 
 /// Constant and tone by the phase.
 fn phased(rows: &Rows, channel: usize, i: usize, coefficients: &[f64]) -> f64 {
-    let columns = (ONE..ALL).filter(|k| {
-        *k < POWER || (*k > WAVE && *k < HAT && *k != SAW) || *k == OTHER
-    });
+    let columns =
+        (ONE..ALL).filter(|k| *k < POWER || (*k > WAVE && *k < HAT && *k != SAW) || *k == OTHER);
     let at = |k: usize| coefficients.get(k).copied().unwrap_or(0.0);
     columns
         .filter(|k| at(*k) != 0.0)

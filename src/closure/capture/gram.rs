@@ -100,7 +100,11 @@ fn add_group(capture: &Capture, model: &Model, group: usize, sums: &mut [Vec<f64
     let mut rows = Rows::new();
     let mut weighted = vec![0.0; super::columns::CHUNK];
     let columns = [active(model, 0), active(model, 1)];
-    for segment in capture.segments.iter().filter(|s| s.part == Part::Train(group)) {
+    for segment in capture
+        .segments
+        .iter()
+        .filter(|s| s.part == Part::Train(group))
+    {
         for chunk in chunks(segment.rows.clone()) {
             let n = chunk.len();
             rows.fill(capture, model, chunk);
@@ -192,14 +196,31 @@ fn product(sums: &[Vec<f64>; 2], a: &Combo, b: &Combo) -> f64 {
     out
 }
 
+/// Weighted sum of squares, by channel, of a sum of combos.
+pub fn energy(sums: &[Vec<f64>; 2], combos: &[&Combo], values: &[f64]) -> [f64; 2] {
+    let mut columns = [vec![0.0; ALL], vec![0.0; ALL]];
+    for (combo, value) in combos.iter().zip(values) {
+        for (channel, column, factor) in &combo.parts {
+            columns[*channel][*column] += factor * value;
+        }
+    }
+    [0, 1].map(|c: usize| {
+        let used: Vec<(usize, f64)> = columns[c].iter().copied().enumerate().collect();
+        let used: Vec<_> = used.into_iter().filter(|(_, v)| *v != 0.0).collect();
+        let mut sum = 0.0;
+        for (a, va) in &used {
+            sum += used
+                .iter()
+                .map(|(b, vb)| va * vb * sums[c][a * SIDE + b])
+                .sum::<f64>();
+        }
+        sum.max(0.0)
+    })
+}
+
 /// Weighted least squares of the target on combos; `ridge` is one over the prior variance of each
 /// (0: free). Combos that lie in the span of those before them are left out.
-pub fn solve(
-    sums: &[Vec<f64>; 2],
-    combos: &[&Combo],
-    ridge: &[f64],
-    detail: Detail,
-) -> Solved {
+pub fn solve(sums: &[Vec<f64>; 2], combos: &[&Combo], ridge: &[f64], detail: Detail) -> Solved {
     let n = combos.len();
     let mut matrix = vec![0.0; n * n];
     let mut right = vec![0.0; n];
@@ -270,7 +291,8 @@ fn back(lower: &[f64], right: &[f64], used: &[bool], detail: Detail) -> Solved {
         let mut variance = 0.0;
         for k in (i..n).filter(|k| used[*k]) {
             let unit = if k == i { 1.0 } else { 0.0 };
-            column[k] = (unit - dot(&lower[k * n + i..k * n + k], &column[i..k])) / lower[k * n + k];
+            column[k] =
+                (unit - dot(&lower[k * n + i..k * n + k], &column[i..k])) / lower[k * n + k];
             variance += column[k] * column[k];
         }
         stds[i] = variance.sqrt();

@@ -79,7 +79,11 @@ impl Capture {
     /// Number of training rows.
     pub fn training_rows(&self) -> usize {
         let train = |s: &&Segment| s.part != Part::HeldOut;
-        self.segments.iter().filter(train).map(|s| s.rows.len()).sum()
+        self.segments
+            .iter()
+            .filter(train)
+            .map(|s| s.rows.len())
+            .sum()
     }
 }
 

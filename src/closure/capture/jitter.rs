@@ -123,7 +123,8 @@ impl Squares {
             for [count, r, r2, _, slope2, _] in &self.bins[c] {
                 if *count > 1.0 {
                     // Where the slope is steep the difference is uncertain.
-                    let weight = 1.0 / (1.0 + jitter * slope2 / count / 0.01f64.max(r2 / count)).powi(2);
+                    let weight =
+                        1.0 / (1.0 + jitter * slope2 / count / 0.01f64.max(r2 / count)).powi(2);
                     n += weight * count;
                     sum += weight * (r2 - r * r / count - jitter * slope2);
                 }

@@ -39,7 +39,12 @@ pub fn variants(known: &Known, model: &Model, free: [[f64; 2]; 2]) -> Vec<Varian
             let now = gs * cs + gc * cc;
             let (bs, bc) = (gs * cos - gc * sin, gc * cos + gs * sin);
             let change = (now - (bs * cs + bc * cc)) / samples;
-            let parts = [drive[0], drive[1], (1, SIN, cs * change), (1, COS, cc * change)];
+            let parts = [
+                drive[0],
+                drive[1],
+                (1, SIN, cs * change),
+                (1, COS, cc * change),
+            ];
             let both = Combo::new(name, unit, &parts);
             out.push(Variant::new(Effect::Latency, vec![both], 0.0));
         }

@@ -27,7 +27,9 @@ impl Missing {
         // A little noise is always there; a wide one is looked at in its middle only.
         let sigma = sigma.clamp(0.05, 1e4);
         let reach = 4.0 * sigma + 1.0;
-        let first = self.codes.partition_point(|c| f64::from(*c) < signal - reach);
+        let first = self
+            .codes
+            .partition_point(|c| f64::from(*c) < signal - reach);
         let mut sum = 0.0;
         for code in self.codes.iter().skip(first) {
             let distance = f64::from(*code) - signal;
@@ -125,7 +127,11 @@ impl Histogram {
         let expected = (0..size)
             .map(|k| {
                 let near = means.get(k.saturating_sub(SIDE)..(k + SIDE + 1).min(size));
-                let least = near.unwrap_or_default().iter().copied().fold(f64::INFINITY, f64::min);
+                let least = near
+                    .unwrap_or_default()
+                    .iter()
+                    .copied()
+                    .fold(f64::INFINITY, f64::min);
                 least.min(around(&counts, k))
             })
             .collect();
@@ -141,7 +147,10 @@ impl Histogram {
         let occupied = |(k, n): (usize, &f64)| (*n > 0.0).then_some(k);
         let mut all = self.counts.iter().enumerate();
         let low = all.clone().find_map(occupied).unwrap_or(0) + 2;
-        let high = all.rfind(|(_, n)| **n > 0.0).map_or(0, |(k, _)| k).saturating_sub(2);
+        let high = all
+            .rfind(|(_, n)| **n > 0.0)
+            .map_or(0, |(k, _)| k)
+            .saturating_sub(2);
         (low..high.max(low))
             .filter_map(|k| {
                 let code = self.first + k as i64;
@@ -189,7 +198,11 @@ fn poisson_gain(count: f64, expected: f64) -> f64 {
     if count >= expected {
         return 0.0;
     }
-    let log = if count > 0.0 { count * (count / expected).ln() } else { 0.0 };
+    let log = if count > 0.0 {
+        count * (count / expected).ln()
+    } else {
+        0.0
+    };
     expected - count + log
 }
 
@@ -199,10 +212,16 @@ pub fn find(capture: &Capture, model: &Model) -> Option<Found> {
     let histograms: Vec<Option<Vec<(i64, f64, f64)>>> = (0..2)
         .map(|c| Histogram::of(capture, model, c).map(|h| h.inside(model.limits[c])))
         .collect();
-    let cells = |c: usize| histograms.get(c).and_then(Option::as_deref).unwrap_or_default();
+    let cells = |c: usize| {
+        histograms
+            .get(c)
+            .and_then(Option::as_deref)
+            .unwrap_or_default()
+    };
     let mut best: Option<(f64, Vec<usize>, i64, i64)> = None;
     for channels in [vec![0, 1], vec![0], vec![1]] {
-        if let Some((gain, spacing, residue)) = spaced(&channels.iter().map(|c| cells(*c)).collect::<Vec<_>>())
+        if let Some((gain, spacing, residue)) =
+            spaced(&channels.iter().map(|c| cells(*c)).collect::<Vec<_>>())
             && best.as_ref().is_none_or(|b| gain > b.0)
         {
             best = Some((gain, channels, spacing, residue));
@@ -217,7 +236,11 @@ pub fn find(capture: &Capture, model: &Model) -> Option<Found> {
             (gain, spacing) = (even, Some((step, residue)));
             for c in channels {
                 let of = |(code, ..): &(i64, f64, f64)| code.rem_euclid(step) == residue;
-                missing[c].codes = cells(c).iter().filter(|x| of(x)).map(|x| x.0 as i32).collect();
+                missing[c].codes = cells(c)
+                    .iter()
+                    .filter(|x| of(x))
+                    .map(|x| x.0 as i32)
+                    .collect();
             }
         }
         _ => {
@@ -233,9 +256,18 @@ pub fn find(capture: &Capture, model: &Model) -> Option<Found> {
     for (c, m) in missing.iter_mut().enumerate() {
         let of = |code: i64| cells(c).binary_search_by_key(&code, |x| x.0).ok();
         let count = |code: i64| of(code).and_then(|k| cells(c).get(k)).map_or(0.0, |x| x.1);
-        let side = |step: i64| m.codes.iter().map(|k| count(i64::from(*k) + step)).sum::<f64>();
+        let side = |step: i64| {
+            m.codes
+                .iter()
+                .map(|k| count(i64::from(*k) + step))
+                .sum::<f64>()
+        };
         m.toward = if side(1) > side(-1) { 1.0 } else { -1.0 };
-        let expected = |k: &i32| of(i64::from(*k)).and_then(|k| cells(c).get(k)).map_or(0.0, |x| x.2);
+        let expected = |k: &i32| {
+            of(i64::from(*k))
+                .and_then(|k| cells(c).get(k))
+                .map_or(0.0, |x| x.2)
+        };
         expected_rows += m.codes.iter().map(expected).sum::<f64>();
     }
     Some(Found {
@@ -285,7 +317,11 @@ fn class(
 ) -> impl Iterator<Item = &(i64, f64, f64)> + Clone {
     let first = cells.first().map_or(0, |x| x.0);
     let skip = (residue - first).rem_euclid(spacing) as usize;
-    cells.get(skip..).unwrap_or_default().iter().step_by(spacing.max(1) as usize)
+    cells
+        .get(skip..)
+        .unwrap_or_default()
+        .iter()
+        .step_by(spacing.max(1) as usize)
 }
 
 /// Codes that are missing each for itself, and their gain together.

@@ -10,9 +10,11 @@
 //! [`harmonics`], [`mains`], [`spur`] with [`truncation`]); [`gram`] their sums and least squares;
 //! [`search`] chooses. Outside of the linear part are [`clipping`], [`missing`] (the histogram), [`jitter`] (the
 //! variance). [`spectrum`] gives noise and lines, [`wander`] the slow noise that must not pass for an
-//! effect. [`fit`] runs them in rounds; [`report`] judges on held-out rows, with [`errors`], [`rivals`],
+//! effect. [`around`] is what a fit with every freedom leaves, [`quantiser`] the error of rounding where no noise
+//! whitens it. [`fit`] runs all in rounds; [`report`] judges on held-out rows, with [`errors`], [`rivals`],
 //! [`structure`] and [`firmware`].
 
+pub mod around;
 pub mod candidates;
 pub mod clipping;
 pub mod columns;
@@ -31,6 +33,7 @@ pub mod missing;
 pub mod nonlinearity;
 pub mod normal;
 pub mod offset;
+pub mod quantiser;
 pub mod report;
 pub mod rivals;
 pub mod search;
@@ -131,14 +134,18 @@ fn known(capture: &Capture, tone: Tone) -> (Known, Model) {
         full_scale_codes: capture.full_scale_codes,
     };
     let free = baseline(capture, &known, tone);
-    if let (Some(rate), Some(scale), Some(phase)) =
-        (meta.rate_dps, meta.sense_codes_per_dps, meta.sense_phase_rad)
-    {
+    if let (Some(rate), Some(scale), Some(phase)) = (
+        meta.rate_dps,
+        meta.sense_codes_per_dps,
+        meta.sense_phase_rad,
+    ) {
         let at = |k: usize| free.coefficients[1].get(k).copied().unwrap_or(0.0);
         let (sin, cos) = phase.sin_cos();
         let carriers = [[cos, sin], [-sin, cos], [-cos, -sin], [sin, -cos]];
         let off = |c: &[f64; 2]| (c[0] * at(SIN) + c[1] * at(COS) - rate * scale).abs();
-        let nearest = carriers.into_iter().min_by(|a, b| off(a).total_cmp(&off(b)));
+        let nearest = carriers
+            .into_iter()
+            .min_by(|a, b| off(a).total_cmp(&off(b)));
         known.in_phase = nearest.map(|c| (c, rate * scale));
     }
     let plain = baseline(capture, &known, tone);
@@ -153,8 +160,13 @@ fn baseline(capture: &Capture, known: &Known, tone: Tone) -> Model {
     // Twice: the quantiser's error needs the signal.
     for _ in 0..2 {
         let gram = Gram::of(capture, &model);
-        let solved = solve(gram.all(), &combos, &candidates::base_ridge(&base), Detail::All);
-        model.coefficients = fit::spread(&combos, &solved);
+        let solved = solve(
+            gram.all(),
+            &combos,
+            &candidates::base_ridge(&base),
+            Detail::All,
+        );
+        model.coefficients = around::spread(&combos, &solved);
         model.neutral = model.coefficients.clone();
     }
     model
@@ -169,8 +181,16 @@ fn key_warnings(capture: &Capture, design_bits: u32) -> Vec<Warning> {
             out.push(Warning::general("missing_key", message));
         }
     };
-    missing("fs_hz", meta.fs_hz.is_some(), "times and frequencies are in samples");
-    missing("ftw", meta.ftw.is_some(), "the tone is fitted, and latency and spurs cannot be seen");
+    missing(
+        "fs_hz",
+        meta.fs_hz.is_some(),
+        "times and frequencies are in samples",
+    );
+    missing(
+        "ftw",
+        meta.ftw.is_some(),
+        "the tone is fitted, and latency and spurs cannot be seen",
+    );
     missing(
         "drive_amplitude_codes",
         meta.drive_amplitude_codes.is_some(),

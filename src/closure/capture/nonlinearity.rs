@@ -7,7 +7,7 @@ use super::gram::Combo;
 
 /// Gain that a free constant or a free slope costs beyond a column: a bend that needs them is the
 /// less natural one, as they are an offset and a gain error.
-const LINE_TERMS: f64 = 5.0;
+const LINE_TERMS: f64 = 3.0;
 
 /// Least distance of knots, codes: closer ones would follow the quantiser's own pattern.
 const LEAST_APART_CODES: f64 = 4.0;
@@ -21,7 +21,11 @@ fn power(known: &Known, model: &Model, k: usize, channels: &[usize]) -> Combo {
     };
     let parts: Vec<_> = channels.iter().map(|c| (*c, POWER + k - 1, 1.0)).collect();
     let unit = (known.full_scale_codes / model.span_codes).powi(k as i32);
-    Combo::new(&format!("{prefix}order{k}_at_full_scale_codes"), unit, &parts)
+    Combo::new(
+        &format!("{prefix}order{k}_at_full_scale_codes"),
+        unit,
+        &parts,
+    )
 }
 
 /// A hat of `stride` fine intervals in some channels.
@@ -67,20 +71,25 @@ pub fn variants(known: &Known, model: &Model) -> Vec<Variant> {
             &[2, 4],
             &[2, 3, 4, 5],
         ] {
-            let of = |lines: usize| {
-                let line = (0..lines).map(|k| match k {
-                    0 => power(known, model, 1, channels),
-                    _ => constant(channels),
-                });
-                let bend = orders.iter().map(|k| power(known, model, *k, channels));
-                let combos = line.chain(bend).collect();
-                let further = further + LINE_TERMS * lines as f64;
-                Variant::new(Effect::Nonlinearity, combos, further)
-            };
-            out.push(of(0));
-            out.push(of(1));
-            if orders.len() > 1 || orders == [2] {
-                out.push(of(2));
+            let is_even = orders.iter().any(|k| k % 2 == 0);
+            let is_odd = orders.iter().any(|k| k % 2 == 1);
+            // With a slope of its own if odd, a constant if even (as an end-point line leaves).
+            for (slope, level) in [(false, false), (true, false), (false, true), (true, true)] {
+                if slope && !is_odd || level && !is_even {
+                    continue;
+                }
+                let mut combos = Vec::new();
+                let mut further = further;
+                if slope {
+                    combos.push(power(known, model, 1, channels));
+                    further += LINE_TERMS;
+                }
+                if level {
+                    combos.push(constant(channels));
+                    further += LINE_TERMS;
+                }
+                combos.extend(orders.iter().map(|k| power(known, model, *k, channels)));
+                out.push(Variant::new(Effect::Nonlinearity, combos, further));
             }
         }
         for stride in [8, 4, 1] {
@@ -97,6 +106,9 @@ pub fn variants(known: &Known, model: &Model) -> Vec<Variant> {
 }
 
 fn constant(channels: &[usize]) -> Combo {
-    let parts: Vec<_> = channels.iter().map(|c| (*c, super::columns::ONE, 1.0)).collect();
+    let parts: Vec<_> = channels
+        .iter()
+        .map(|c| (*c, super::columns::ONE, 1.0))
+        .collect();
     Combo::new("order0_codes", 1.0, &parts)
 }

@@ -1,13 +1,14 @@
 //! From the fit to `closure.json`: steps in order, judged on held-out rows; evidence; what is left.
 
+use super::around::spread;
 use super::candidates::{Effect, Known};
 use super::columns::{ALL, Model};
 use super::errors::{Judged, judge};
-use super::fit::{Fitted, spread};
+use super::fit::Fitted;
 use super::gram::{Combo, Solved};
-use super::input::{Capture, Part};
+use super::input::Capture;
 use super::search::Search;
-use super::{firmware, jitter, mains, rivals, structure};
+use super::{firmware, jitter, rivals, structure};
 use crate::closure::likelihood::tail::chi_square_surprise;
 use crate::closure::verdict::{Errors, Evidence, FirmwareErrors, Step, Structure};
 use crate::record::Warning;
@@ -85,7 +86,15 @@ pub fn findings(capture: &Capture, known: &Known, plain: &Model, fitted: &Fitted
     let mut steps = Vec::new();
     for (turn, judged) in &order {
         let mut step = match turn {
-            Turn::Linear(k) => linear_step(capture, known, fitted, &mut search, &set, *k, (&combos, &solved)),
+            Turn::Linear(k) => linear_step(
+                capture,
+                known,
+                fitted,
+                &mut search,
+                &set,
+                *k,
+                (&combos, &solved),
+            ),
             Turn::Clipping => clipping_step(capture, fitted),
             Turn::Missing => missing_step(fitted),
             Turn::Jitter => {
@@ -100,7 +109,6 @@ pub fn findings(capture: &Capture, known: &Known, plain: &Model, fitted: &Fitted
         step.heldout_rms = judged.errors.heldout_rms;
         steps.push(step);
     }
-    let has_jitter = order.iter().any(|o| o.0 == Turn::Jitter);
     let mut last = fitted.model.clone();
     last.coefficients = without_nuisance(fitted, &combos, &solved);
     let after = if order.is_empty() {
@@ -110,10 +118,19 @@ pub fn findings(capture: &Capture, known: &Known, plain: &Model, fitted: &Fitted
     };
     let with_wander = spread(&combos, &solved);
     let structure = structure::left(capture, &last, &with_wander);
-    let taken: Vec<Effect> = order.iter().filter_map(|(t, _)| effect(fitted, *t)).collect();
-    let firmware = firmware_errors(capture, &last, fitted, &taken, (&combos, &solved), &mut warnings);
+    let taken: Vec<Effect> = order
+        .iter()
+        .filter_map(|(t, _)| effect(fitted, *t))
+        .collect();
+    let firmware = firmware_errors(
+        capture,
+        &last,
+        fitted,
+        &taken,
+        (&combos, &solved),
+        &mut warnings,
+    );
     let evidence = rivals::evidence(capture, known, fitted, &mut search, &steps, &taken);
-    let _ = has_jitter;
     Findings {
         before: before.errors,
         steps,
@@ -272,7 +289,10 @@ fn parameters(step: &mut Step, combos: &[&Combo], solved: &Solved, own: std::ops
     if own.len() > 12 {
         let extreme = |sign: f64| own.clone().map(|k| sign * value(k)).fold(0.0, f64::max) * sign;
         let worst = own.clone().map(deviation).fold(0.0, f64::max);
-        for (name, v) in [("largest_codes", extreme(1.0)), ("smallest_codes", extreme(-1.0))] {
+        for (name, v) in [
+            ("largest_codes", extreme(1.0)),
+            ("smallest_codes", extreme(-1.0)),
+        ] {
             step.parameters.insert(name.to_owned(), v);
             step.parameter_std.insert(name.to_owned(), worst);
         }
@@ -337,12 +357,16 @@ fn missing_step(fitted: &Fitted) -> Step {
     if let Some(found) = &fitted.missing {
         let count = found.missing.iter().map(|m| m.codes.len()).sum::<usize>();
         step.parameters.insert("count".to_owned(), count as f64);
-        step.parameters.insert("expected_rows".to_owned(), found.expected_rows);
+        step.parameters
+            .insert("expected_rows".to_owned(), found.expected_rows);
         if let Some((spacing, first)) = found.spacing {
-            step.parameters.insert("spacing_codes".to_owned(), spacing as f64);
-            step.parameters.insert("first_code".to_owned(), first as f64);
+            step.parameters
+                .insert("spacing_codes".to_owned(), spacing as f64);
+            step.parameters
+                .insert("first_code".to_owned(), first as f64);
         } else if let Some(first) = found.missing.iter().flat_map(|m| &m.codes).min() {
-            step.parameters.insert("first_code".to_owned(), f64::from(*first));
+            step.parameters
+                .insert("first_code".to_owned(), f64::from(*first));
         }
         step.p_value = (-found.gain).exp().min(1.0);
     }
@@ -360,7 +384,9 @@ fn jitter_step(known: &Known, fitted: &Fitted) -> Step {
         };
         step.parameters.insert(name.to_owned(), samples * unit);
         step.parameter_std.insert(name.to_owned(), std * unit);
-        step.p_value = (3.0 - chi_square_surprise(1, 2.0 * found.gain).min(1e6)).exp().min(1.0);
+        step.p_value = (3.0 - chi_square_surprise(1, 2.0 * found.gain).min(1e6))
+            .exp()
+            .min(1.0);
     }
     step
 }
@@ -374,7 +400,11 @@ fn firmware_errors(
     (combos, solved): (&[&Combo], &Solved),
     warnings: &mut Vec<Warning>,
 ) -> FirmwareErrors {
-    let not: Vec<&str> = taken.iter().filter(|e| !e.is_compensable()).map(|e| e.id()).collect();
+    let not: Vec<&str> = taken
+        .iter()
+        .filter(|e| !e.is_compensable())
+        .map(|e| e.id())
+        .collect();
     if !not.is_empty() {
         warnings.push(Warning::general(
             "not_compensable",
@@ -387,22 +417,14 @@ fn firmware_errors(
     }
     let from = fitted.base.len() + fitted.nuisance.len();
     let mut own = solved.clone();
-    own.coefficients.iter_mut().take(from).for_each(|c| *c = 0.0);
+    own.coefficients
+        .iter_mut()
+        .take(from)
+        .for_each(|c| *c = 0.0);
     let effects = if taken.is_empty() {
         [vec![0.0; ALL], vec![0.0; ALL]]
     } else {
         spread(combos, &own)
     };
     firmware::corrected(capture, last, &last.coefficients, &effects)
-}
-
-/// Rows that are held out.
-pub fn heldout_rows(capture: &Capture) -> usize {
-    let held = capture.segments.iter().filter(|s| s.part == Part::HeldOut);
-    held.map(|s| s.rows.len()).sum()
-}
-
-/// Whether a line is that of a power line.
-pub fn is_power_line(known: &Known, turns: f64, rows: usize) -> bool {
-    mains::is_mains(known, turns, 0.5 / rows as f64)
 }

@@ -84,7 +84,10 @@ pub fn evidence(
     steps: &[Step],
     taken: &[Effect],
 ) -> Vec<Evidence> {
-    let alike: Vec<&String> = steps.iter().flat_map(|s| &s.indistinguishable_from).collect();
+    let alike: Vec<&String> = steps
+        .iter()
+        .flat_map(|s| &s.indistinguishable_from)
+        .collect();
     Effect::ALL
         .into_iter()
         .map(|effect| {
@@ -125,7 +128,12 @@ pub fn evidence(
 /// Gain and chance of an effect's best variant before any step.
 fn single(fitted: &Fitted, search: &mut Search, effect: Effect) -> (Option<f64>, Option<f64>) {
     match effect {
-        Effect::Clipping => return (fitted.clipping, fitted.clipping.map(|g| (13.0 - g).exp().min(1.0))),
+        Effect::Clipping => {
+            return (
+                fitted.clipping,
+                fitted.clipping.map(|g| (13.0 - g).exp().min(1.0)),
+            );
+        }
         Effect::MissingCodes => {
             let gain = fitted.missing.as_ref().map(|m| m.gain);
             return (gain, gain.map(|g| (-g).exp()));
@@ -140,7 +148,12 @@ fn single(fitted: &Fitted, search: &mut Search, effect: Effect) -> (Option<f64>,
     let none = search.gain(&[]);
     let tried = (fitted.variants.len() as f64).ln();
     let mut best: Option<(f64, f64, f64)> = None;
-    for (k, v) in fitted.variants.iter().enumerate().filter(|(_, v)| v.effect == effect) {
+    for (k, v) in fitted
+        .variants
+        .iter()
+        .enumerate()
+        .filter(|(_, v)| v.effect == effect)
+    {
         let gain = search.gain(&[k]) - none;
         let columns = v.combos.len();
         let further = v.cost - 7.0 - 2.0 * columns as f64;
@@ -157,7 +170,11 @@ fn single(fitted: &Fitted, search: &mut Search, effect: Effect) -> (Option<f64>,
 fn lacks(capture: &Capture, known: &Known, effect: Effect) -> Option<String> {
     let meta = &capture.meta;
     let keys = |wanted: &[(&str, bool)]| {
-        let absent: Vec<&str> = wanted.iter().filter(|(_, there)| !there).map(|(k, _)| *k).collect();
+        let absent: Vec<&str> = wanted
+            .iter()
+            .filter(|(_, there)| !there)
+            .map(|(k, _)| *k)
+            .collect();
         (!absent.is_empty()).then(|| format!("the capture does not say {}", absent.join(", ")))
     };
     let rate = [
@@ -169,7 +186,10 @@ fn lacks(capture: &Capture, known: &Known, effect: Effect) -> Option<String> {
         Effect::Gain if known.in_phase.is_none() => {
             keys(&[("drive_amplitude_codes", known.amplitude)])
         }
-        Effect::Latency => keys(&[("ftw", known.phase), ("drive_amplitude_codes", known.amplitude)]),
+        Effect::Latency => keys(&[
+            ("ftw", known.phase),
+            ("drive_amplitude_codes", known.amplitude),
+        ]),
         Effect::Feedthrough => keys(&rate),
         Effect::Spur => keys(&[("ftw", known.phase)]),
         Effect::Mains => keys(&[("fs_hz", known.fs_hz.is_some())]),

@@ -24,6 +24,8 @@ pub struct Line {
     pub surprise: f64,
     /// Channel in which it is stronger.
     pub channel: usize,
+    /// Amplitude there, in the residual's unit.
+    pub amplitude: f64,
 }
 
 impl Spectrum {
@@ -34,9 +36,14 @@ impl Spectrum {
         let mut buffer: Vec<Complex<f64>> = Vec::with_capacity(bins);
         buffer.extend(drive.iter().zip(sense).map(|(d, s)| Complex::new(*d, *s)));
         buffer.resize(bins, Complex::new(0.0, 0.0));
-        FftPlanner::new().plan_fft_forward(bins).process(&mut buffer);
+        FftPlanner::new()
+            .plan_fft_forward(bins)
+            .process(&mut buffer);
         let rows = rows.max(1) as f64;
-        let mut power = [Vec::with_capacity(bins / 2 + 1), Vec::with_capacity(bins / 2 + 1)];
+        let mut power = [
+            Vec::with_capacity(bins / 2 + 1),
+            Vec::with_capacity(bins / 2 + 1),
+        ];
         for k in 0..=bins / 2 {
             // Two real sequences in one transform.
             let (Some(a), Some(b)) = (buffer.get(k), buffer.get((bins - k) % bins)) else {
@@ -66,9 +73,16 @@ impl Spectrum {
             let mut from = 1i64;
             while from < 3 * n as i64 {
                 let to = (from + (from / 2).clamp(16, 256)).min(3 * n as i64);
-                let index = |d: i64| usize::try_from(start as i64 + sign * d).ok().filter(|k| *k < n);
-                let mut block: Vec<f64> =
-                    (from..to).filter_map(index).filter_map(|k| power.get(k)).copied().collect();
+                let index = |d: i64| {
+                    usize::try_from(start as i64 + sign * d)
+                        .ok()
+                        .filter(|k| *k < n)
+                };
+                let mut block: Vec<f64> = (from..to)
+                    .filter_map(index)
+                    .filter_map(|k| power.get(k))
+                    .copied()
+                    .collect();
                 let count = block.len();
                 if count == 0 {
                     break;
@@ -135,6 +149,7 @@ impl Spectrum {
                     turns: k as f64 / self.bins as f64,
                     surprise: here.0,
                     channel: here.1,
+                    amplitude: 2.0 * (self.power[here.1].get(k).unwrap_or(&0.0) / self.rows).sqrt(),
                 });
             }
         }
@@ -160,7 +175,10 @@ pub fn refine(residuals: [&[f64]; 2], variances: [f64; 2], turns: f64) -> f64 {
                 turn *= step;
             }
         }
-        sums.iter().zip(variances).map(|(s, v)| s.norm_sqr() / v).sum()
+        sums.iter()
+            .zip(variances)
+            .map(|(s, v)| s.norm_sqr() / v)
+            .sum()
     };
     let mut centre = turns;
     let mut width = 0.5 / n as f64;

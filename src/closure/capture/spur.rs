@@ -47,7 +47,9 @@ pub fn is_spur(known: &Known, model: &Model, i: usize, rows: usize) -> bool {
         .any(|p| (p - turns).abs() < 0.3 * resolution && (p - tone).abs() > 2.0 * resolution);
     let mirrored = fold(2.0 * tone - turns);
     let others = model.lines.iter().enumerate().filter(|(k, _)| *k != i);
-    let pair = others.into_iter().any(|(_, t)| (t - mirrored).abs() < 0.5 * resolution);
+    let pair = others
+        .into_iter()
+        .any(|(_, t)| (t - mirrored).abs() < 0.5 * resolution);
     at || pair
 }
 

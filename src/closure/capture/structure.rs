@@ -1,7 +1,7 @@
 //! What is left after the last step: lines, and a mean that goes with the phase or with the code.
 
+use super::around::residuals;
 use super::columns::{CHUNK, Model, Rows, chunks};
-use super::fit::residuals;
 use super::input::Capture;
 use super::spectrum::Spectrum;
 use crate::closure::likelihood::tail::chi_square_surprise;
@@ -18,10 +18,13 @@ const SURPRISE: f64 = 9.2;
 pub fn left(capture: &Capture, model: &Model, coefficients: &[Vec<f64>; 2]) -> Structure {
     let residuals = residuals(capture, model, coefficients, true);
     let mut worst = (SURPRISE, None);
-    for channel in 0..2 {
-        for (surprise, what) in binned(capture, model, channel, &residuals[channel]) {
+    for (channel, residual) in residuals.iter().enumerate() {
+        for (surprise, what) in binned(capture, model, channel, residual) {
             if surprise > worst.0 {
-                let name = ["drive_code", "sense_code"].get(channel).copied().unwrap_or("");
+                let name = ["drive_code", "sense_code"]
+                    .get(channel)
+                    .copied()
+                    .unwrap_or("");
                 worst = (surprise, Some(format!("{name} against {what}")));
             }
         }
@@ -32,7 +35,10 @@ pub fn left(capture: &Capture, model: &Model, coefficients: &[Vec<f64>; 2]) -> S
     if let Some(line) = lines.first() {
         let surprise = line.surprise - (capture.rows() as f64).ln();
         if surprise > worst.0 {
-            let name = ["drive_code", "sense_code"].get(line.channel).copied().unwrap_or("");
+            let name = ["drive_code", "sense_code"]
+                .get(line.channel)
+                .copied()
+                .unwrap_or("");
             let place = match capture.meta.fs_hz {
                 Some(fs) => format!("{:.3} Hz", line.turns * fs),
                 None => format!("{:.6} per sample", line.turns),

@@ -1,8 +1,8 @@
 //! How many phase bits the oscillator's table is addressed with, if truncation shows in the codes.
 
 use super::columns::Model;
-use super::input::Capture;
 use super::fit::LEAST_VARIANCE;
+use super::input::Capture;
 use super::spectrum::Spectrum;
 use super::spur::ADDRESS_BITS;
 use super::tone::fold;

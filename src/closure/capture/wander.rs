@@ -58,9 +58,8 @@ pub fn modes(values: &[f64]) -> Vec<f64> {
     let n = values.len();
     (1..n)
         .map(|j| {
-            let term = |(m, v): (usize, &f64)| {
-                v * (PI * j as f64 * (m as f64 + 0.5) / n as f64).cos()
-            };
+            let term =
+                |(m, v): (usize, &f64)| v * (PI * j as f64 * (m as f64 + 0.5) / n as f64).cos();
             let sum: f64 = values.iter().enumerate().map(term).sum();
             sum * (2.0 / n as f64).sqrt()
         })
@@ -91,13 +90,13 @@ pub fn strength(modes: &[f64], white: f64) -> (f64, f64) {
 }
 
 /// Variance of the mean coefficient from a wander. A 1/f noise that began a hundred records ago has 4 h in
-/// mode 0; a wander that is seen gets four times that, as few modes tell its strength.
+/// mode 0; it gets twice that, and a wander that is seen six times, as few modes tell its strength.
 pub fn of_mean(series: &Series, column: usize) -> f64 {
     let (Some(values), Some(white)) = (series.values.get(column), series.white.get(column)) else {
         return 0.0;
     };
     let (slow, gain) = strength(&modes(values), *white);
-    let factor = if gain > 3.0 { 16.0 } else { 4.0 };
+    let factor = if gain > 3.0 { 25.0 } else { 8.0 };
     factor * slow / values.len() as f64
 }
 
@@ -171,7 +170,11 @@ pub fn slow_line_gain(series: &[Option<Series>; 2], rows: usize, turns: f64) -> 
 fn without(modes: &[f64], a: &[f64], b: &[f64], white: f64, slow: f64) -> Vec<f64> {
     let weight = |k: usize| 1.0 / (white + slow / (k + 1) as f64);
     let dot = |x: &[f64], y: &[f64]| -> f64 {
-        x.iter().zip(y).enumerate().map(|(k, (x, y))| weight(k) * x * y).sum()
+        x.iter()
+            .zip(y)
+            .enumerate()
+            .map(|(k, (x, y))| weight(k) * x * y)
+            .sum()
     };
     let (aa, ab, bb) = (dot(a, a), dot(a, b), dot(b, b));
     let (ay, by) = (dot(a, modes), dot(b, modes));
@@ -179,6 +182,13 @@ fn without(modes: &[f64], a: &[f64], b: &[f64], white: f64, slow: f64) -> Vec<f6
     if determinant <= 1e-9 * aa * bb {
         return modes.to_vec();
     }
-    let (p, q) = ((bb * ay - ab * by) / determinant, (aa * by - ab * ay) / determinant);
-    modes.iter().zip(a.iter().zip(b)).map(|(m, (a, b))| m - p * a - q * b).collect()
+    let (p, q) = (
+        (bb * ay - ab * by) / determinant,
+        (aa * by - ab * ay) / determinant,
+    );
+    modes
+        .iter()
+        .zip(a.iter().zip(b))
+        .map(|(m, (a, b))| m - p * a - q * b)
+        .collect()
 }
