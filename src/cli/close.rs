@@ -1,19 +1,25 @@
 //! `gyrogen close`: what a measurement says beyond its declared model.
 
 use super::OutputFormat;
+use crate::closure::capture;
 use crate::closure::close::{self, Closed};
 use crate::closure::search::Effort;
 use crate::closure::verdict::{Closure, Verdict};
+use crate::correction::firmware::{self, Origin};
+use crate::emit::views::Language;
 use crate::error::Result;
 use std::io::IsTerminal;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// From measured data to a named cause, or an honest refusal, and new firmware.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// A measured thermal record.
-    #[arg(long, required = true)]
+    /// A measured thermal record: CSV, PX4 ULog or ArduPilot DataFlash.
+    #[arg(long, required_unless_present = "capture")]
     record: Option<PathBuf>,
+    /// Captured ADC codes instead: CSV, or NPY with its keys in a TOML file beside it.
+    #[arg(long, conflicts_with = "record")]
+    capture: Option<PathBuf>,
     /// Design file; the embedded default if left out.
     #[arg(long)]
     design: Option<PathBuf>,
@@ -31,36 +37,69 @@ pub struct Arguments {
 /// An unusable design or record (exit 2).
 pub fn run(arguments: &Arguments) -> Result<()> {
     let design = super::design(arguments.design.as_deref())?;
-    let Some(path) = &arguments.record else {
+    let loud = std::io::stderr().is_terminal();
+    let called = |what: &str, path: &Path| {
+        let mut command = format!("gyrogen close --{what} {}", path.display());
+        if let Some(design) = &arguments.design {
+            command += &format!(" --design {}", design.display());
+        }
+        if loud {
+            eprintln!("closing {} ...", path.display());
+        }
+        command
+    };
+    let out = &arguments.out;
+    let closure = if let Some(path) = &arguments.capture {
+        let (closure, _) = capture::close(path, &design, &called("capture", path))?;
+        super::make_folder(out)?;
+        closure
+    } else if let Some(path) = &arguments.record {
+        let command = called("record", path);
+        let (record, warnings) = crate::record::read_any(path, &design.record)?;
+        let closed = close::close(&record, warnings, &design, &command, Effort::default())?;
+        write(&closed, path, out)?;
+        closed.closure
+    } else {
         return Ok(());
     };
-    let mut command = format!("gyrogen close --record {}", path.display());
-    if let Some(design) = &arguments.design {
-        command += &format!(" --design {}", design.display());
-    }
-    if std::io::stderr().is_terminal() {
-        eprintln!("reading {} ...", path.display());
-    }
-    let (record, warnings) = crate::record::read_any(path, &design.record)?;
-    let closed = close::close(&record, warnings, &design, &command, Effort::default())?;
-    let json = super::json(&closed.closure);
-    super::make_folder(&arguments.out)?;
-    crate::output::write_whole(&arguments.out.join("closure.json"), json.as_bytes())?;
-    let name = path.file_name().unwrap_or(path.as_os_str());
-    let page = crate::report::closure::html(&closed, &name.to_string_lossy())?;
-    crate::output::write_whole(&arguments.out.join("report.html"), page.as_bytes())?;
+    let json = super::json(&closure);
+    crate::output::write_whole(&out.join("closure.json"), json.as_bytes())?;
     match arguments.format {
         OutputFormat::Json => say!("{}", json.trim_end()),
-        OutputFormat::Text => print(&closed, &arguments.out),
+        OutputFormat::Text => print(&closure, out),
     }
-    for warning in &closed.closure.warnings {
+    for warning in &closure.warnings {
         eprintln!("warning: {} [{}]", warning.message, warning.code);
     }
     Ok(())
 }
 
-fn print(closed: &Closed, out: &std::path::Path) {
-    let c = &closed.closure;
+/// The report, and the correction's sources where there is one.
+fn write(closed: &Closed, path: &Path, out: &Path) -> Result<()> {
+    let name = path.file_name().unwrap_or(path.as_os_str());
+    let page = crate::report::closure::html(closed, &name.to_string_lossy())?;
+    let mut bundles = Vec::new();
+    if let Some(correction) = &closed.correction {
+        let origin = Origin {
+            prefix: "gyro",
+            sha256: &closed.closure.design_sha256,
+            command: &closed.closure.command,
+        };
+        for (language, folder) in [
+            (Language::C, "firmware/c"),
+            (Language::Rust, "firmware/rust"),
+        ] {
+            bundles.push((firmware::emit(correction, &origin, language)?, folder));
+        }
+    }
+    super::make_folder(out)?;
+    for (files, folder) in &bundles {
+        crate::emit::files::write(files, &out.join(folder))?;
+    }
+    crate::output::write_whole(&out.join("report.html"), page.as_bytes())
+}
+
+fn print(c: &Closure, out: &Path) {
     if !c.steps.is_empty() {
         let mut table = super::table(&["step", "parameters", "held-out rms", "p", "like it"]);
         for s in &c.steps {
@@ -94,6 +133,11 @@ fn print(closed: &Closed, out: &std::path::Path) {
         c.unit,
         c.noise_floor_rms
     );
+    if let Some(rms) = c.firmware.heldout_rms {
+        say!("firmware, bit for bit: held-out rms {rms:.5} {}", c.unit);
+    } else if c.unit == "deg/s" {
+        say!("firmware cannot carry this: it does not see all that is needed");
+    }
     say!("wrote {} ({:.1} s)", out.display(), c.seconds);
 }
 

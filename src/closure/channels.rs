@@ -141,6 +141,18 @@ impl Channels {
         Some(scaled(&raw).0)
     }
 
+    /// [`Channels::tangent`] as a function of u; u itself where there is none.
+    pub fn tangent_at(&self, u: f64) -> f64 {
+        if self.tangent.is_none() {
+            return u;
+        }
+        let resonance = self.resonance_rad();
+        let of = |u: f64| (self.centre + self.half * u - resonance).tan();
+        let raw: Vec<f64> = self.smooth_u.iter().map(|u| of(*u)).collect();
+        let (low, high) = range(&raw);
+        (of(u) - 0.5 * (low + high)) / (0.5 * (high - low)).max(f64::MIN_POSITIVE)
+    }
+
     /// The drive's phase at resonance (an odd multiple of a quarter turn) nearest to the middle of the
     /// range, rad.
     pub fn resonance_rad(&self) -> f64 {

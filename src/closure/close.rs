@@ -2,12 +2,14 @@
 
 use super::channels::Channels;
 use super::effects::{Candidate, Missing};
+use super::firmware;
 use super::likelihood::blocks::{self, Split};
 use super::search::judge::Round;
 use super::search::{Effort, Found, LEVEL, Model, Search};
 use super::verdict::{
     Closure, Errors, Evidence, Fate, FirmwareErrors, SCHEMA, Step, Structure, Verdict,
 };
+use crate::correction::Correction;
 use crate::design::{Design, Gyro, RecordMapping};
 use crate::error::{InputError, Result};
 use crate::record::columns::THERMOMETERS;
@@ -26,6 +28,8 @@ pub struct Closed {
     pub before: Model,
     /// With the named terms.
     pub after: Model,
+    /// What firmware runs, if it can.
+    pub correction: Option<Correction>,
 }
 
 /// The bias model's thermometer in a record, if it has one.
@@ -103,7 +107,7 @@ pub fn close(
     let channels = Channels::new(&record.time_s, &columns, &name, degc)
         .map_err(|missing| refuse(format!("column {missing} holds no measured value")))?;
     let split = blocks::split(&channels.time_s, &channels.u).map_err(|e| refuse(e.to_string()))?;
-    let (closure, before, after) = {
+    let (closure, before, after, correction) = {
         let search = Search::new(&channels, &split, effort, Vec::new());
         let unusable = |e: super::likelihood::Unusable| refuse(e.to_string());
         let found = search.run().map_err(unusable)?;
@@ -117,10 +121,12 @@ pub fn close(
         };
         let mut closure = told.closure().map_err(unusable)?;
         told.warn(&mut warnings);
+        let (correction, errors) = told.firmware(record, &mut warnings);
+        closure.firmware = errors;
         closure.warnings = warnings;
         closure.command = command.to_owned();
         closure.design_sha256 = crate::emit::manifest::sha256(design.source.text.as_bytes());
-        (closure, before, after)
+        (closure, before, after, correction)
     };
     let mut closed = Closed {
         closure,
@@ -128,6 +134,7 @@ pub fn close(
         split,
         before,
         after,
+        correction,
     };
     closed.closure.seconds = start.elapsed().as_secs_f64();
     Ok(closed)
@@ -174,11 +181,7 @@ impl Told<'_> {
             noise_floor_rms: stats::difference_noise(&finite),
             before: self.errors(self.before),
             after: self.errors(self.after),
-            firmware: FirmwareErrors {
-                compensable: self.compensable(),
-                heldout_rms: None,
-                heldout_max_abs: None,
-            },
+            firmware: FirmwareErrors::default(),
             residual_structure: Structure {
                 left,
                 strongest_channel: self.found.left.clone(),
@@ -224,33 +227,29 @@ impl Told<'_> {
         Ok(out)
     }
 
-    /// Whether firmware sees all that the bias model and the steps need.
-    fn compensable(&self) -> bool {
-        let seen = |name: &String| {
-            let sees = [
-                "time_s",
-                "time_since_power_on_s",
-                "rate_out_dps",
-                "phase_rad",
-                "freq_hz",
-                "die_degc",
-                "agc",
-                "quad_dps",
-                "supply_v",
-            ];
-            // A law of the applied rate is taken off by the corrected output itself.
-            sees.contains(&name.as_str()) || name == "rate_dps"
+    /// The correction and its held-out errors; without figures where firmware cannot carry it.
+    fn firmware(
+        &self,
+        record: &ThermalRecord,
+        warnings: &mut Vec<Warning>,
+    ) -> (Option<Correction>, FirmwareErrors) {
+        let c = self.search.channels;
+        let output = record.column("rate_out_dps").unwrap_or(&[]);
+        let (low, high) = stats::extremes(output).unwrap_or((0.0, 0.0));
+        let widest = 1.25 * low.abs().max(high.abs()).max(1e-3);
+        let estimates = self.search.estimates(self.after);
+        let none = (None, FirmwareErrors::default());
+        let Some(plan) = firmware::plan(c, self.after, &estimates, widest) else {
+            return none;
         };
-        let thermometer = &self.search.channels.thermometer;
-        let declared = seen(thermometer) || thermometer == NONE;
-        declared
-            && self.found.terms.iter().all(|t| {
-                let channels = t
-                    .candidate
-                    .channels(self.search.channels)
-                    .unwrap_or_default();
-                t.candidate.sheet().compensable && channels.iter().all(seen)
-            })
+        let noise = self.after.fit.noise.white_rms_dps;
+        match firmware::judged(&plan, record, &self.search.heldout, noise) {
+            Ok((correction, errors)) => (Some(correction), errors),
+            Err(e) => {
+                warnings.push(Warning::general("no_firmware", e.to_string()));
+                none
+            }
+        }
     }
 
     fn evidence(&self, steps: &[Step]) -> Vec<Evidence> {

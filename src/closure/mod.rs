@@ -4,14 +4,18 @@
 //! [`polynomial`] (algebra and least squares), [`weights`] (spikes, dwells), [`noise`] (its
 //! correlation, and the coefficients' covariance), [`folds`] (held-out blocks), [`order`] (its
 //! choice), [`sweep`] (heating against cooling) and [`checks`] (what a user should know of before
-//! believing the fit). [`likelihood`] is what tells an effect from noise with a memory. Nothing
-//! here knows the plant (law 4).
+//! believing the fit). [`likelihood`] is what tells an effect from noise with a memory. [`capture`] does the
+//! same for ADC codes. [`close`] answers for a thermal record: [`channels`], candidate [`effects`] and
+//! their [`search`], [`firmware`]; [`verdict`] is the form of the answer. Nothing here knows the plant
+//! (law 4).
 
 pub mod baseline;
+pub mod capture;
 pub mod channels;
 pub mod checks;
 pub mod close;
 pub mod effects;
+pub mod firmware;
 pub mod folds;
 pub mod likelihood;
 pub mod noise;

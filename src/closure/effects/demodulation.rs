@@ -5,6 +5,8 @@ use super::{
     product,
 };
 use crate::closure::channels::Channels;
+use crate::closure::firmware::Words;
+use crate::correction::Term;
 
 /// All of this file.
 pub fn all() -> Vec<Box<dyn Candidate>> {
@@ -48,6 +50,11 @@ impl Candidate for Leakage {
             .map(<[f64]>::to_vec)
             .into_iter()
             .collect()
+    }
+
+    fn correction(&self, c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
+        let columns = self.columns(c, &f.bias.clone(), &e.point);
+        f.surface(c, "quad_dps", &columns, &e.beta)
     }
 
     fn report(&self, _c: &Channels, e: &Estimate) -> Reported {
@@ -116,6 +123,11 @@ impl Candidate for PhaseDrift {
                 q.to_vec(),
             ],
         }
+    }
+
+    fn correction(&self, c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
+        let columns = self.columns(c, &f.bias.clone(), &e.point);
+        f.surface(c, "quad_dps", &columns, &e.beta)
     }
 
     fn report(&self, c: &Channels, e: &Estimate) -> Reported {

@@ -4,7 +4,9 @@ use super::{
     Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, gain, map, moving,
 };
 use crate::closure::channels::Channels;
+use crate::closure::firmware::Words;
 use crate::closure::likelihood::linear::Basis;
+use crate::correction::Term;
 
 /// All of this file.
 pub fn all() -> Vec<Box<dyn Candidate>> {
@@ -83,6 +85,11 @@ impl Candidate for Damping {
         if point.form == 2 { 2.0 } else { 0.0 }
     }
 
+    fn correction(&self, c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
+        let columns = self.columns(c, &f.bias.clone(), &e.point);
+        f.surface(c, "agc", &columns, &e.beta)
+    }
+
     fn report(&self, _c: &Channels, e: &Estimate) -> Reported {
         let names: &[&str] = match e.point.form {
             0 => &["gain_dps"],
@@ -157,6 +164,11 @@ impl Candidate for Coupling {
 
     fn acts_on_bias(&self) -> bool {
         true
+    }
+
+    fn correction(&self, c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
+        let columns = self.columns(c, &f.bias.clone(), &e.point);
+        f.surface(c, "agc", &columns, &e.beta)
     }
 
     fn report(&self, c: &Channels, e: &Estimate) -> Reported {

@@ -4,6 +4,8 @@ use super::{
     Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, gain, map, moving,
 };
 use crate::closure::channels::Channels;
+use crate::closure::firmware::Words;
+use crate::correction::Term;
 
 /// All of this file.
 pub fn all() -> Vec<Box<dyn Candidate>> {
@@ -92,6 +94,11 @@ impl Candidate for Direct {
     fn columns(&self, c: &Channels, _bias: &Bias, _point: &Point) -> Vec<Vec<f64>> {
         let column = c.column(self.channel).unwrap_or(&[]);
         vec![map(column, |v| v.powi(self.power))]
+    }
+
+    fn correction(&self, c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
+        let columns = self.columns(c, &f.bias.clone(), &e.point);
+        f.surface(c, self.channel, &columns, &e.beta)
     }
 
     fn report(&self, _c: &Channels, e: &Estimate) -> Reported {

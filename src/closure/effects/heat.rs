@@ -5,6 +5,8 @@ use super::{
     map, spaced,
 };
 use crate::closure::channels::{Channels, lag, slope};
+use crate::closure::firmware::{Words, knots};
+use crate::correction::Term;
 
 /// All of this file.
 pub fn all() -> Vec<Box<dyn Candidate>> {
@@ -82,6 +84,29 @@ impl Candidate for ThermalLag {
         true
     }
 
+    fn correction(&self, c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
+        let (gain_dps, tau_s) = (*e.beta.first()?, e.point.theta[0].exp().max(c.period_s()));
+        let input = f.thermometer()?;
+        if e.point.form == 1 {
+            return Some(vec![Term::Lag {
+                gain_dps,
+                input,
+                tau_s,
+            }]);
+        }
+        let bias = f.bias.clone();
+        let curve = |u: f64| match e.point.form {
+            0 => bias.at(u),
+            _ => c.tangent_at(u),
+        };
+        Some(vec![Term::LagOfCurve {
+            gain_dps,
+            input,
+            values: knots(65).map(curve).collect(),
+            tau_s,
+        }])
+    }
+
     fn report(&self, c: &Channels, e: &Estimate) -> Reported {
         let per_k = if e.point.form > 0 {
             gain("gain_dps_per_k", e, 0, 1.0 / c.kelvin_per_u)
@@ -134,6 +159,18 @@ impl Candidate for TemperatureRate {
             k => c.heat(k),
         };
         vec![map(&slope(&c.time_s, heat, rows), |v| v * span)]
+    }
+
+    fn correction(&self, c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
+        if e.point.form >= SLOPES.len() {
+            return None;
+        }
+        // Firmware has no readings to come: a backward difference, half as long, is half as late.
+        Some(vec![Term::Slope {
+            gain_dps_s: e.beta.first()? * c.span_s(),
+            input: f.thermometer()?,
+            rows: SLOPES[e.point.form] as u32,
+        }])
     }
 
     fn report(&self, c: &Channels, e: &Estimate) -> Reported {
@@ -200,6 +237,13 @@ impl Candidate for Warmup {
 
     fn spacing(&self, c: &Channels, _point: &Point) -> Vec<f64> {
         vec![((c.span_s() / c.period_s()).max(4.0)).ln() / 16.0]
+    }
+
+    fn correction(&self, _c: &Channels, e: &Estimate, _f: &mut Words) -> Option<Vec<Term>> {
+        Some(vec![Term::Decay {
+            gain_dps: *e.beta.first()?,
+            tau_s: e.point.theta[0].exp(),
+        }])
     }
 
     fn report(&self, _c: &Channels, e: &Estimate) -> Reported {

@@ -17,6 +17,8 @@ pub mod structure;
 pub mod tone;
 
 use super::channels::Channels;
+use super::firmware::Words;
+use crate::correction::Term;
 use std::collections::BTreeMap;
 
 /// A parameter of an effect.
@@ -177,6 +179,11 @@ pub trait Candidate: Send + Sync {
     /// True if the columns depend on the declared bias.
     fn acts_on_bias(&self) -> bool {
         false
+    }
+
+    /// What firmware subtracts; `None` if it cannot, or does not see what it needs.
+    fn correction(&self, _c: &Channels, _e: &Estimate, _f: &mut Words) -> Option<Vec<Term>> {
+        None
     }
 
     /// Parameters in units.

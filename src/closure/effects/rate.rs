@@ -5,6 +5,8 @@ use super::{
     heated, map, moving, product, spaced,
 };
 use crate::closure::channels::{Channels, range};
+use crate::closure::firmware::Words;
+use crate::correction::Term;
 
 /// All of this file.
 pub fn all() -> Vec<Box<dyn Candidate>> {
@@ -79,6 +81,17 @@ impl Candidate for ScaleTemperature {
         vec![product(&r, c.heat(point.form)), r]
     }
 
+    fn correction(&self, c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
+        if e.point.form > 0 {
+            return None;
+        }
+        Some(vec![Term::ScaleBy {
+            input: Some(f.thermometer()?),
+            s0: e.beta.get(1).copied().unwrap_or(0.0) / top(c),
+            s1: e.beta.first()? / top(c),
+        }])
+    }
+
     fn report(&self, c: &Channels, e: &Estimate) -> Reported {
         let (slope, constant) = (e.beta[0], e.beta.get(1).copied().unwrap_or(0.0));
         let factor = 1e6 / (top(c) * c.kelvin_per_u);
@@ -141,6 +154,21 @@ impl Candidate for Nonlinearity {
         3.0 * point.form as f64
     }
 
+    fn correction(&self, c: &Channels, e: &Estimate, _f: &mut Words) -> Option<Vec<Term>> {
+        let mut out = vec![Term::Cubic {
+            ppm: e.beta.first()? * 1e6 / top(c),
+            rate_max_dps: top(c),
+        }];
+        if let Some(linear) = e.beta.get(1) {
+            out.push(Term::ScaleBy {
+                input: None,
+                s0: linear / top(c),
+                s1: 0.0,
+            });
+        }
+        Some(out)
+    }
+
     fn report(&self, c: &Channels, e: &Estimate) -> Reported {
         let ppm = 1e6 / top(c);
         let mut out: Reported = [
@@ -189,6 +217,14 @@ impl Candidate for Asymmetry {
     fn columns(&self, c: &Channels, _bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
         let r = relative(c);
         vec![map(&r, |x| if point.form == 0 { x * x } else { x.abs() })]
+    }
+
+    fn correction(&self, c: &Channels, e: &Estimate, _f: &mut Words) -> Option<Vec<Term>> {
+        Some(vec![Term::Even {
+            ppm: e.beta.first()? * 1e6 / top(c),
+            rate_max_dps: top(c),
+            absolute: e.point.form == 1,
+        }])
     }
 
     fn report(&self, c: &Channels, e: &Estimate) -> Reported {

@@ -4,6 +4,8 @@ use super::{
     Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, entry, gain, heated, map,
 };
 use crate::closure::channels::Channels;
+use crate::closure::firmware::{Words, knots};
+use crate::correction::Term;
 
 /// All of this file.
 pub fn all() -> Vec<Box<dyn Candidate>> {
@@ -47,6 +49,13 @@ impl Candidate for ThirdOrder {
 
     fn columns(&self, c: &Channels, _bias: &Bias, _point: &Point) -> Vec<Vec<f64>> {
         vec![map(&c.u, |u| u * u * u)]
+    }
+
+    fn correction(&self, _c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
+        Some(vec![Term::Product {
+            gain_dps: *e.beta.first()?,
+            factors: vec![(f.thermometer()?, 3)],
+        }])
     }
 
     fn report(&self, c: &Channels, e: &Estimate) -> Reported {
@@ -142,6 +151,21 @@ impl Candidate for ModeCrossing {
             }
         }
         out
+    }
+
+    fn correction(&self, _c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
+        let (centre, width) = (e.point.theta[0], e.point.theta[1].exp());
+        let (a, d) = (*e.beta.first()?, e.beta.get(1).copied().unwrap_or(0.0));
+        let shape = |u: f64| {
+            let x = (u - centre) / width;
+            (a + 2.0 * d * x) / (1.0 + x * x)
+        };
+        // Sixteen knots over a half width keep the linear interpolation a thousandth off.
+        let count = (32.0 / width).clamp(65.0, 1025.0) as usize;
+        Some(vec![Term::Curve {
+            input: f.thermometer()?,
+            values_dps: knots(count).map(shape).collect(),
+        }])
     }
 
     fn report(&self, c: &Channels, e: &Estimate) -> Reported {
@@ -270,6 +294,24 @@ impl Candidate for StressJump {
             out.push(0.05);
         }
         out
+    }
+
+    fn correction(&self, c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
+        let centre = e.point.theta[0];
+        if e.point.form == 2 && c.smooth_u.first().is_some_and(|u| *u > centre) {
+            // It waits for the cold: the relay of the firmware waits for the warm only.
+            return None;
+        }
+        Some(vec![Term::Step {
+            gain_dps: *e.beta.first()?,
+            input: f.thermometer()?,
+            centre,
+            gap: match e.point.form {
+                1 => e.point.theta[1].abs(),
+                _ => 0.0,
+            },
+            once: e.point.form == 2,
+        }])
     }
 
     fn report(&self, c: &Channels, e: &Estimate) -> Reported {

@@ -1,0 +1,249 @@
+//! `adc_clipping`: the code does not pass a level, on one side or on both.
+//!
+//! Two signs: rows whose phase puts the tone above a level all have the same mean (a flat top), or, where
+//! noise is limited with the signal, the outermost code is far more frequent than those next to it.
+//! What is limited is left out of all other fits.
+
+use super::columns::Model;
+use super::input::{Capture, Part};
+use super::normal;
+
+/// The levels of a channel; infinite where there is none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Lower level, codes.
+    pub low: f64,
+    /// Upper level, codes.
+    pub high: f64,
+}
+
+impl Limits {
+    /// No limit.
+    pub const NONE: Limits = Limits {
+        low: f64::NEG_INFINITY,
+        high: f64::INFINITY,
+    };
+
+    /// Whether there is a limit.
+    pub fn any(&self) -> bool {
+        self.low.is_finite() || self.high.is_finite()
+    }
+
+    /// Whether a signal with this noise is not touched by a limit (beyond one in a thousand rows).
+    pub fn is_free(&self, signal: f64, sigma: f64) -> bool {
+        signal > self.low + 3.0 * sigma && signal < self.high - 3.0 * sigma
+    }
+
+    /// Mean of the limited code less the signal: noise is limited with the signal.
+    pub fn shift(&self, signal: f64, sigma: f64) -> f64 {
+        if !self.any() || self.is_free(signal, 2.0 * sigma) {
+            return 0.0;
+        }
+        let sigma = sigma.max(1e-6);
+        let over = |level: f64, sign: f64| match level.is_finite() {
+            true => sigma * normal::excess(sign * (signal - level) / sigma),
+            false => 0.0,
+        };
+        over(self.low, -1.0) - over(self.high, 1.0)
+    }
+}
+
+/// What a search for limits found in one channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Found {
+    /// The levels.
+    pub limits: Limits,
+    /// Gain in log-likelihood from the outermost codes' frequencies alone.
+    pub pile_gain: f64,
+    /// Limited training rows.
+    pub rows: usize,
+}
+
+/// Rounds of the fit by phase.
+const ROUNDS: usize = 12;
+
+/// Looks for limits in the training rows of a channel. `model` gives the phases and the noise.
+pub fn find(capture: &Capture, model: &Model, channel: usize) -> Option<Found> {
+    let sigma = model.variance.base[channel].sqrt().max(0.05);
+    let profile = Profile::of(capture, model, channel);
+    let mut limits = profile.first_guess()?;
+    let mut tone = [0.0; 3];
+    for _ in 0..ROUNDS {
+        tone = profile.fit(limits, 3.0 * sigma)?;
+        limits = profile.levels(&tone, limits, 3.0 * sigma);
+    }
+    let (mut flat, rows) = profile.significant(&tone, limits, sigma);
+    let (piled, pile_gain) = pile(capture, channel, sigma);
+    if !flat.high.is_finite() {
+        flat.high = piled.high;
+    }
+    if !flat.low.is_finite() {
+        flat.low = piled.low;
+    }
+    // Where noise is limited too, the outermost code is the level itself.
+    flat.any().then_some(Found {
+        limits: flat,
+        pile_gain,
+        rows,
+    })
+}
+
+/// Phases that the mean is taken over.
+const BINS: usize = 1024;
+
+/// Means by phase.
+struct Profile {
+    /// Rows, sum of codes, sums of cos and sin by phase.
+    bins: Vec<[f64; 4]>,
+}
+
+impl Profile {
+    fn of(capture: &Capture, model: &Model, channel: usize) -> Self {
+        let mut bins = vec![[0.0; 4]; BINS];
+        for (row, code) in training(capture, channel) {
+            let phase = model.tone.phase(row);
+            let (sin, cos) = (std::f64::consts::TAU * phase).sin_cos();
+            if let Some(bin) = bins.get_mut((phase * BINS as f64) as usize % BINS) {
+                for (sum, value) in bin.iter_mut().zip([1.0, f64::from(code), sin, cos]) {
+                    *sum += value;
+                }
+            }
+        }
+        for bin in &mut bins {
+            let [n, rest @ ..] = bin;
+            rest.iter_mut().for_each(|v| *v /= n.max(1.0));
+        }
+        Profile { bins }
+    }
+
+    fn filled(&self) -> impl Iterator<Item = &[f64; 4]> {
+        self.bins.iter().filter(|b| b[0] > 0.0)
+    }
+
+    /// Limits a little inside the outermost means.
+    fn first_guess(&self) -> Option<Limits> {
+        let mut means: Vec<f64> = self.filled().map(|b| b[1]).collect();
+        means.sort_by(f64::total_cmp);
+        let n = means.len();
+        if n < 8 {
+            return None;
+        }
+        let at = |share: f64| means.get((share * n as f64) as usize).copied();
+        Some(Limits {
+            low: at(0.02)?,
+            high: at(0.98)?,
+        })
+    }
+
+    /// Least squares of constant, sine and cosine over what is inside the limits by phase; the
+    /// first time by code.
+    fn fit(&self, limits: Limits, margin: f64) -> Option<[f64; 3]> {
+        let mut tone: Option<[f64; 3]> = None;
+        for _ in 0..3 {
+            let inside = |b: &&[f64; 4]| {
+                let x = tone.map_or(b[1], |t| value(&t, b));
+                x < limits.high - margin && x > limits.low + margin
+            };
+            let mut sums = nalgebra::Matrix3::<f64>::zeros();
+            let mut right = nalgebra::Vector3::<f64>::zeros();
+            for b in self.filled().filter(inside) {
+                let row = nalgebra::Vector3::new(1.0, b[2], b[3]);
+                sums += row * row.transpose() * b[0];
+                right += row * (b[0] * b[1]);
+            }
+            let solved = sums.cholesky()?.solve(&right);
+            tone = Some([solved.x, solved.y, solved.z]);
+        }
+        tone
+    }
+
+    /// Means of what the tone puts beyond the limits.
+    fn levels(&self, tone: &[f64; 3], limits: Limits, margin: f64) -> Limits {
+        let mean = |beyond: &dyn Fn(f64) -> bool, old: f64| {
+            let (n, sum) = self
+                .filled()
+                .filter(|b| beyond(value(tone, b)))
+                .fold((0.0, 0.0), |(n, sum), b| (n + b[0], sum + b[0] * b[1]));
+            if n > 0.0 { sum / n } else { old }
+        };
+        Limits {
+            low: mean(&|x| x < limits.low - 0.3 * margin, limits.low),
+            high: mean(&|x| x > limits.high + 0.3 * margin, limits.high),
+        }
+    }
+
+    /// The limits with a flat top: beyond them the mean is the level and not the tone.
+    fn significant(&self, tone: &[f64; 3], limits: Limits, sigma: f64) -> (Limits, usize) {
+        let mut out = Limits::NONE;
+        let mut rows = 0;
+        for upper in [true, false] {
+            let level = if upper { limits.high } else { limits.low };
+            let sign = if upper { 1.0 } else { -1.0 };
+            let (mut n, mut gain, mut deepest) = (0.0, 0.0, 0.0f64);
+            for b in self.filled() {
+                let x = value(tone, b);
+                if sign * (x - level) > 0.0 {
+                    deepest = deepest.max(sign * (x - level));
+                    let (with, without) = (b[1] - level, b[1] - x);
+                    gain += 0.5 * b[0] * (without * without - with * with) / (sigma * sigma);
+                    n += b[0];
+                }
+            }
+            // The quantiser itself is flat for half a code.
+            if gain > 12.0 && n >= 3.0 && deepest > 0.75 {
+                rows += n as usize;
+                if upper {
+                    out.high = level;
+                } else {
+                    out.low = level;
+                }
+            }
+        }
+        (out, rows)
+    }
+}
+
+fn value(tone: &[f64; 3], bin: &[f64; 4]) -> f64 {
+    tone[0] + tone[1] * bin[2] + tone[2] * bin[3]
+}
+
+/// Row and code of the training rows.
+fn training(capture: &Capture, channel: usize) -> impl Iterator<Item = (usize, i32)> + '_ {
+    let train = capture.segments.iter().filter(|s| s.part != Part::HeldOut);
+    let rows = train.flat_map(|s| s.rows.clone());
+    rows.filter_map(move |row| Some((row, *capture.codes[channel].get(row)?)))
+}
+
+/// An outermost code that is at least three times as frequent as each of the three next to it. Without
+/// limiting it is at most 2.4 times: the flat of a sine; with a little noise, less than once.
+fn pile(capture: &Capture, channel: usize, sigma: f64) -> (Limits, f64) {
+    let mut out = Limits::NONE;
+    let mut gain = 0.0;
+    // Without dither few phases of a coherent tone hit a few codes each.
+    if sigma < 0.4 {
+        return (out, gain);
+    }
+    let codes: Vec<i32> = training(capture, channel).map(|(_, c)| c).collect();
+    let (Some(high), Some(low)) = (codes.iter().max(), codes.iter().min()) else {
+        return (out, gain);
+    };
+    for (outermost, step) in [(*high, -1), (*low, 1)] {
+        let count = |code: i32| codes.iter().filter(|c| **c == code).count() as f64;
+        let here = count(outermost);
+        let next = (1..=3)
+            .map(|k| count(outermost + k * step))
+            .fold(0.0, f64::max);
+        // Expected not more than the largest of its neighbours, and one.
+        let expected = next + 1.0;
+        let more = here * (here / expected).ln() - (here - expected);
+        if here >= 3.0 * expected && more > 15.0 {
+            gain += more;
+            if step < 0 {
+                out.high = f64::from(outermost);
+            } else {
+                out.low = f64::from(outermost);
+            }
+        }
+    }
+    (out, gain)
+}

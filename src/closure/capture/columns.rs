@@ -1,0 +1,308 @@
+//! The columns of the linear model, and their values row by row.
+//!
+//! What an effect adds to a channel's code is, near the declared model, a sum of columns: functions
+//! of the oscillator's phase (constant, harmonics), of the signal itself (powers, piecewise linear),
+//! lines at other frequencies, what phase truncation makes of the tone. All that is nonlinear
+//! (frequencies, levels of clipping, truncation) is in [`Model`] and is fixed while coefficients are fitted.
+
+use super::clipping::Limits;
+use super::input::Capture;
+use super::missing::Missing;
+use super::tone::{Phases, Tone};
+use std::f64::consts::TAU;
+use std::ops::Range;
+
+/// Rows that are worked on at once.
+pub const CHUNK: usize = 256;
+/// Constant 1.
+pub const ONE: usize = 0;
+/// sin of the phase.
+pub const SIN: usize = 1;
+/// cos of the phase.
+pub const COS: usize = 2;
+/// First power of u = signal / span; then u^2 to u^5.
+pub const POWER: usize = 11;
+/// Highest power.
+pub const POWERS: usize = 5;
+/// Quantisation error of a code that is rounded before noise is added: round(x) - x.
+pub const SAW: usize = 16;
+/// sin(2 pi x): what is left of it where noise before rounding smoothes it.
+pub const WAVE: usize = 17;
+/// The drive channel's residual, in the sense channel only.
+pub const OTHER: usize = 18;
+/// First line: sine and cosine for each.
+pub const LINE: usize = 19;
+/// Lines at most.
+pub const LINES: usize = 6;
+/// Sine and cosine of the truncated phase, less those of the phase.
+pub const TRUNCATED: usize = LINE + 2 * LINES;
+/// First hat function of the signal over -span .. span.
+pub const HAT: usize = TRUNCATED + 2;
+/// Hat functions.
+pub const HATS: usize = 129;
+/// All columns.
+pub const ALL: usize = HAT + HATS;
+/// Highest harmonic.
+pub const HARMONICS: usize = 5;
+
+/// Columns of the sine and the cosine of harmonic k, 1 ..= [`HARMONICS`].
+pub const fn harmonic(k: usize) -> (usize, usize) {
+    (2 * k - 1, 2 * k)
+}
+
+/// Columns of line i.
+pub const fn line(i: usize) -> (usize, usize) {
+    (LINE + 2 * i, LINE + 2 * i + 1)
+}
+
+/// Variance of a row: base + jitter^2 slope^2.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Variance {
+    /// Of each channel, codes squared.
+    pub base: [f64; 2],
+    /// Variance of the sampling instant, samples squared.
+    pub jitter: f64,
+}
+
+/// All that is not a coefficient, and the coefficients of the last fit (for the signal's value).
+#[derive(Debug, Clone)]
+pub struct Model {
+    /// Phases.
+    pub tone: Tone,
+    /// Their sines and cosines.
+    pub phases: Phases,
+    /// Sine and cosine of the declared tones, codes.
+    pub declared: [[f64; 2]; 2],
+    /// Coefficients of all columns: what is beyond the declared tones.
+    pub coefficients: [Vec<f64>; 2],
+    /// Coefficients of a fit with every freedom: where the codes are, whatever effect put them there. The
+    /// quantiser's error is taken at it, so that it takes no side.
+    pub neutral: [Vec<f64>; 2],
+    /// Frequencies of the lines, turns a sample.
+    pub lines: Vec<f64>,
+    /// Address bits of a truncated oscillator.
+    pub truncation: Option<u32>,
+    /// Limits of each channel.
+    pub limits: [Limits; 2],
+    /// Missing codes of each channel.
+    pub missing: [Missing; 2],
+    /// Of the noise.
+    pub variance: Variance,
+    /// What u is relative to: a little more than the largest code of both channels.
+    pub span_codes: f64,
+}
+
+/// Some rows of all columns.
+#[derive(Debug, Clone)]
+pub struct Rows {
+    /// First row and the one after the last.
+    pub rows: Range<usize>,
+    /// By channel and column; the hat functions are not among them.
+    pub dense: [Vec<Vec<f64>>; 2],
+    /// By channel: the first of two hat functions that are not zero, and the second's value.
+    pub hats: [Vec<(usize, f64)>; 2],
+    code: [Vec<f64>; 2],
+    /// Code less declared tone (and the mean shift by missing codes).
+    pub target: [Vec<f64>; 2],
+    /// The signal before the quantiser.
+    pub signal: [Vec<f64>; 2],
+    /// Its slope, codes a sample.
+    pub slope: [Vec<f64>; 2],
+    /// One over the variance; 0 where the channel is limited.
+    pub weight: [Vec<f64>; 2],
+}
+
+impl Rows {
+    /// Room for a chunk.
+    pub fn new() -> Self {
+        let zeros = || vec![0.0; CHUNK];
+        let pair = || [zeros(), zeros()];
+        let dense = || vec![zeros(); HAT];
+        Rows {
+            rows: 0..0,
+            dense: [dense(), dense()],
+            hats: [vec![(0, 0.0); CHUNK], vec![(0, 0.0); CHUNK]],
+            code: pair(),
+            target: pair(),
+            signal: pair(),
+            slope: pair(),
+            weight: pair(),
+        }
+    }
+
+    /// What the coefficients make of row `i` (within the chunk) of a channel, beyond the declared tone.
+    pub fn value(&self, channel: usize, i: usize, coefficients: &[f64]) -> f64 {
+        let dense = self.dense[channel].iter().zip(coefficients);
+        let sum: f64 = dense
+            .map(|(c, b)| if *b == 0.0 { 0.0 } else { b * c[i] })
+            .sum();
+        let (at, part) = self.hats[channel][i];
+        let hat = |k: usize| coefficients.get(HAT + k).copied().unwrap_or(0.0);
+        sum + hat(at) * (1.0 - part) + hat(at + 1) * part
+    }
+
+    /// The code itself.
+    pub fn code(&self, channel: usize, i: usize) -> f64 {
+        self.code[channel][i]
+    }
+
+    /// Computes rows `rows` (at most [`CHUNK`]).
+    pub fn fill(&mut self, capture: &Capture, model: &Model, rows: Range<usize>) {
+        self.rows = rows.clone();
+        for channel in 0..2 {
+            self.tones(model, channel, rows.clone());
+            self.lines(model, channel, rows.clone());
+            self.signals(capture, model, channel, rows.clone());
+        }
+        self.coupled(model);
+    }
+
+    fn tones(&mut self, model: &Model, channel: usize, rows: Range<usize>) {
+        if channel == 1 {
+            // Same phases: copied.
+            let [drive, sense] = &mut self.dense;
+            for k in 0..=2 * HARMONICS {
+                sense[k].copy_from_slice(&drive[k]);
+            }
+            for k in TRUNCATED..TRUNCATED + 2 {
+                sense[k].copy_from_slice(&drive[k]);
+            }
+            return;
+        }
+        let dense = &mut self.dense[0];
+        for (i, row) in rows.enumerate() {
+            let (sin, cos) = model.phases.at(row);
+            dense[ONE][i] = 1.0;
+            let (mut s, mut c) = (sin, cos);
+            for k in 1..=HARMONICS {
+                let (at_sin, at_cos) = harmonic(k);
+                dense[at_sin][i] = s;
+                dense[at_cos][i] = c;
+                (s, c) = (s * cos + c * sin, c * cos - s * sin);
+            }
+            if let Some(bits) = model.truncation {
+                let steps = f64::powi(2.0, bits as i32);
+                let phase = model.tone.phase(row);
+                let (ts, tc) = (TAU * (phase * steps).floor() / steps).sin_cos();
+                dense[TRUNCATED][i] = ts - sin;
+                dense[TRUNCATED + 1][i] = tc - cos;
+            }
+        }
+    }
+
+    fn lines(&mut self, model: &Model, channel: usize, rows: Range<usize>) {
+        if channel == 1 {
+            let [drive, sense] = &mut self.dense;
+            for k in LINE..LINE + 2 * model.lines.len() {
+                sense[k].copy_from_slice(&drive[k]);
+            }
+            return;
+        }
+        for (k, turns) in model.lines.iter().enumerate() {
+            let (at_sin, at_cos) = line(k);
+            let (mut s, mut c) = (TAU * (turns * rows.start as f64).fract()).sin_cos();
+            let (ds, dc) = (TAU * turns).sin_cos();
+            for i in 0..rows.len() {
+                self.dense[0][at_sin][i] = s;
+                self.dense[0][at_cos][i] = c;
+                (s, c) = (s * dc + c * ds, c * dc - s * ds);
+            }
+        }
+    }
+
+    /// The signal without and with the bend, and the columns that are functions of it.
+    fn signals(&mut self, capture: &Capture, model: &Model, channel: usize, rows: Range<usize>) {
+        let coefficients = &model.coefficients[channel];
+        let [sin, cos] = model.declared[channel];
+        let at = |k: usize| coefficients.get(k).copied().unwrap_or(0.0);
+        let straight = straight_terms(coefficients);
+        let neutral = &model.neutral[channel];
+        let neutral_straight = straight_terms(neutral);
+        let neutral_hat = |k: usize| neutral.get(HAT + k).copied().unwrap_or(0.0);
+        // Noise of one code leaves nothing of the wave.
+        let with_wave = model.variance.base[channel] < 1.0;
+        let bent = (POWER..SAW).chain(HAT..ALL).any(|k| at(k) != 0.0);
+        let (sin_all, cos_all) = (sin + at(SIN), cos + at(COS));
+        let angle = model.tone.angle();
+        let base = model.variance.base[channel].max(1e-12);
+        let scale = (HATS - 1) as f64 / (2.0 * model.span_codes);
+        for (i, row) in rows.enumerate() {
+            let dense = &mut self.dense[channel];
+            let declared = sin * dense[SIN][i] + cos * dense[COS][i];
+            let added: f64 = straight.iter().map(|(k, b)| b * dense[*k][i]).sum();
+            let x = declared + added;
+            // The bend is a function of the tone: a line or a harmonic in it is of second order.
+            let tone = declared + at(ONE) + at(SIN) * dense[SIN][i] + at(COS) * dense[COS][i];
+            let u = tone / model.span_codes;
+            let mut power = 1.0;
+            for k in 0..POWERS {
+                power *= u;
+                dense[POWER + k][i] = power;
+            }
+            let place = ((tone + model.span_codes) * scale).clamp(0.0, (HATS - 1) as f64 - 1e-9);
+            self.hats[channel][i] = (place as usize, place.fract());
+            let bend: f64 = if bent {
+                let (k, part) = self.hats[channel][i];
+                let powers: f64 = (POWER..SAW).map(|k| at(k) * dense[k][i]).sum();
+                powers + at(HAT + k) * (1.0 - part) + at(HAT + k + 1) * part
+            } else {
+                0.0
+            };
+            let signal = x + bend;
+            let (k, part) = self.hats[channel][i];
+            let there: f64 = neutral_straight.iter().map(|(k, b)| b * dense[*k][i]).sum();
+            let there =
+                declared + there + neutral_hat(k) * (1.0 - part) + neutral_hat(k + 1) * part;
+            dense[SAW][i] = (there + 0.5).floor() - there;
+            dense[WAVE][i] = if with_wave {
+                (TAU * there.fract()).sin()
+            } else {
+                0.0
+            };
+            dense[OTHER][i] = 0.0;
+            let slope = angle * (sin_all * dense[COS][i] - cos_all * dense[SIN][i]);
+            let code = f64::from(capture.codes[channel].get(row).copied().unwrap_or(0));
+            self.code[channel][i] = code;
+            self.signal[channel][i] = signal;
+            self.slope[channel][i] = slope;
+            self.target[channel][i] =
+                code - declared - model.missing[channel].shift(signal, base.sqrt());
+            let variance = base + model.variance.jitter * slope * slope;
+            let free = model.limits[channel].is_free(signal, base.sqrt());
+            self.weight[channel][i] = if free { 1.0 / variance } else { 0.0 };
+        }
+    }
+
+    /// The drive's residual as a column of the sense channel.
+    fn coupled(&mut self, model: &Model) {
+        let saw = model.coefficients[0].get(SAW).copied().unwrap_or(0.0);
+        let wave = model.coefficients[0].get(WAVE).copied().unwrap_or(0.0);
+        for i in 0..self.rows.len() {
+            let quantised = saw * self.dense[0][SAW][i] + wave * self.dense[0][WAVE][i];
+            let rest = self.code[0][i] - self.signal[0][i] - quantised;
+            self.dense[1][OTHER][i] = if self.weight[0][i] > 0.0 { rest } else { 0.0 };
+        }
+    }
+}
+
+/// The columns that do not depend on the signal, with coefficients that are not 0.
+fn straight_terms(coefficients: &[f64]) -> Vec<(usize, f64)> {
+    (ONE..POWER)
+        .chain(LINE..HAT)
+        .filter_map(|k| Some((k, *coefficients.get(k)?)))
+        .filter(|(_, b)| *b != 0.0)
+        .collect()
+}
+
+impl Default for Rows {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// The chunks of a stretch of rows.
+pub fn chunks(rows: Range<usize>) -> impl Iterator<Item = Range<usize>> {
+    let end = rows.end;
+    rows.step_by(CHUNK)
+        .map(move |start| start..end.min(start + CHUNK))
+}

@@ -1,0 +1,55 @@
+//! Errors of a model over the rows, and what its steps change of them.
+
+use super::columns::{Model, Rows, chunks};
+use super::input::{Capture, Part};
+use crate::closure::verdict::Errors;
+
+/// Errors in codes over both columns, and the held-out chi-square (weights one over the variances).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Judged {
+    /// As reported.
+    pub errors: Errors,
+    /// Sum of squares over variances, held-out rows.
+    pub heldout_chi: f64,
+    /// The same of the training rows.
+    pub train_chi: f64,
+}
+
+/// With the model's own coefficients.
+pub fn judge(capture: &Capture, model: &Model) -> Judged {
+    let mut rows = Rows::new();
+    let mut out = Judged::default();
+    // Train, held out: count and sum of squares.
+    let mut sums = [[0.0f64; 2]; 2];
+    for segment in &capture.segments {
+        let held = usize::from(segment.part == Part::HeldOut);
+        for chunk in chunks(segment.rows.clone()) {
+            let n = chunk.len();
+            rows.fill(capture, model, chunk);
+            for channel in 0..2 {
+                let base = model.variance.base[channel];
+                let limits = model.limits[channel];
+                for i in 0..n {
+                    let value = rows.value(channel, i, &model.coefficients[channel]);
+                    let shift = limits.shift(rows.signal[channel][i], base.sqrt());
+                    let error = rows.target[channel][i] - value - shift;
+                    sums[held][0] += 1.0;
+                    sums[held][1] += error * error;
+                    let slope = rows.slope[channel][i];
+                    let variance = base + model.variance.jitter * slope * slope;
+                    if held == 0 {
+                        out.train_chi += error * error / variance;
+                    } else {
+                        out.heldout_chi += error * error / variance;
+                        let largest = &mut out.errors.heldout_max_abs;
+                        *largest = largest.max(error.abs());
+                    }
+                }
+            }
+        }
+    }
+    let rms = |[n, sum]: [f64; 2]| (sum / n.max(1.0)).sqrt();
+    out.errors.train_rms = rms(sums[0]);
+    out.errors.heldout_rms = rms(sums[1]);
+    out
+}

@@ -1,0 +1,143 @@
+//! The capture as the closure uses it: codes of both channels, the keys, the segments of rows.
+
+use crate::error::{InputError, Result};
+use crate::numeric::format::Format;
+use crate::record::Warning;
+use crate::record::capture::{CaptureMeta, CaptureReader};
+use std::path::Path;
+
+/// Rows that are used at most; a longer capture says so.
+pub const MOST_ROWS: usize = 10_000_000;
+/// Rows without which nothing can be said.
+pub const LEAST_ROWS: usize = 256;
+/// Segments of equal length.
+const SEGMENTS: usize = 24;
+/// Segments that are held out: a quarter, at uneven distances, never the first nor the last.
+const HELD_OUT: [usize; 6] = [2, 5, 10, 14, 17, 21];
+/// Groups of training segments, for the half-samples.
+pub const GROUPS: usize = 4;
+
+/// What a segment of rows is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// To fit on, with the number of its group.
+    Train(usize),
+    /// To judge on.
+    HeldOut,
+}
+
+/// A stretch of rows.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Segment {
+    /// First row, and the one after the last.
+    pub rows: std::ops::Range<usize>,
+    /// Its use.
+    pub part: Part,
+}
+
+/// A capture in memory.
+#[derive(Debug, Clone)]
+pub struct Capture {
+    /// Drive and sense codes.
+    pub codes: [Vec<i32>; 2],
+    /// The keys.
+    pub meta: CaptureMeta,
+    /// In the order of the rows.
+    pub segments: Vec<Segment>,
+    /// 2^(adc_bits - 1), codes.
+    pub full_scale_codes: f64,
+}
+
+impl Capture {
+    /// From codes of equal lengths and the keys; `adc_bits` holds where the keys do not say it.
+    ///
+    /// # Errors
+    /// Fewer rows than [`LEAST_ROWS`].
+    pub fn new(codes: [Vec<i32>; 2], meta: CaptureMeta, adc_bits: u32) -> Result<Self> {
+        let rows = codes.iter().map(Vec::len).min().unwrap_or(0);
+        if rows < LEAST_ROWS {
+            return Err(InputError::new(format!(
+                "the capture has {rows} rows, and {LEAST_ROWS} are the least to judge it by"
+            ))
+            .help("capture some thousand rows or more")
+            .into());
+        }
+        let bits = meta.adc_bits.unwrap_or(adc_bits).clamp(2, 32);
+        Ok(Capture {
+            codes,
+            segments: segments(rows),
+            full_scale_codes: f64::powi(2.0, bits as i32 - 1),
+            meta,
+        })
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.segments.last().map_or(0, |s| s.rows.end)
+    }
+
+    /// Number of training rows.
+    pub fn training_rows(&self) -> usize {
+        let train = |s: &&Segment| s.part != Part::HeldOut;
+        self.segments
+            .iter()
+            .filter(train)
+            .map(|s| s.rows.len())
+            .sum()
+    }
+}
+
+fn segments(rows: usize) -> Vec<Segment> {
+    let mut group = 0;
+    (0..SEGMENTS)
+        .map(|k| {
+            let part = if HELD_OUT.contains(&k) {
+                Part::HeldOut
+            } else {
+                group += 1;
+                Part::Train(group % GROUPS)
+            };
+            Segment {
+                rows: k * rows / SEGMENTS..(k + 1) * rows / SEGMENTS,
+                part,
+            }
+        })
+        .collect()
+}
+
+/// Reads a capture: at most [`MOST_ROWS`] rows. Codes must fit `adc_bits` of its own keys, where
+/// these say it. `adc_bits` is the design's.
+///
+/// # Errors
+/// What [`CaptureReader`] refuses; too few rows.
+pub fn read(path: &Path, adc_bits: u32) -> Result<(Capture, Vec<Warning>)> {
+    let widest = Format::q(1, 31);
+    let own = CaptureReader::open(path, widest)?.meta().adc_bits;
+    let format = match own {
+        Some(bits @ 2..=31) => Format::q(1, bits - 1),
+        _ => widest,
+    };
+    let mut reader = CaptureReader::open(path, format)?;
+    let meta = reader.meta().clone();
+    let mut codes = [Vec::new(), Vec::new()];
+    let (mut drive, mut sense) = (Vec::new(), Vec::new());
+    let mut warnings = Vec::new();
+    while reader.read_block(&mut drive, &mut sense, 1 << 16)? > 0 {
+        let [d, s] = &mut codes;
+        let room = MOST_ROWS - d.len();
+        d.extend(drive.iter().take(room));
+        s.extend(sense.iter().take(room));
+        if drive.len() > room {
+            warnings.push(Warning::general(
+                "capture_cut",
+                format!("only the first {MOST_ROWS} rows are used"),
+            ));
+            break;
+        }
+    }
+    let capture = Capture::new(codes, meta, adc_bits).map_err(|e| match e {
+        crate::error::Error::Input(e) => (*e).in_file(path).into(),
+        other => other,
+    })?;
+    Ok((capture, warnings))
+}

@@ -1,0 +1,210 @@
+//! The closure of a capture: which waveform-level effect the declared model of two ADC channels lacks.
+//!
+//! Declared: drive code = round(A sin(p - pi/2)) + noise, sense code = round(rate and quadrature
+//! carriers) + noise, p the oscillator's phase. Free in the baseline are the sense channel's two carriers (with a
+//! known rate only the quadrature's), and how much of the quantiser's own error shows (all if noise is
+//! added after rounding, next to none if before).
+//!
+//! [`input`] reads; [`tone`] is the phase; [`columns`] are the functions of which effects are made, one
+//! file an effect ([`offset`], [`gain`], [`latency`], [`feedthrough`], [`nonlinearity`],
+//! [`harmonics`], [`mains`], [`spur`] with [`truncation`]); [`gram`] their sums and least squares;
+//! [`search`] chooses. Outside of the linear part are [`clipping`], [`missing`] (the histogram), [`jitter`] (the
+//! variance). [`spectrum`] gives noise and lines, [`wander`] the slow noise that must not pass for an
+//! effect. [`around`] is what a fit with every freedom leaves, [`quantiser`] the error of rounding where no noise
+//! whitens it. [`fit`] runs all in rounds; [`report`] judges on held-out rows, with [`errors`], [`rivals`],
+//! [`structure`] and [`firmware`].
+
+pub mod around;
+pub mod candidates;
+pub mod clipping;
+pub mod columns;
+pub mod errors;
+pub mod feedthrough;
+pub mod firmware;
+pub mod fit;
+pub mod gain;
+pub mod gram;
+pub mod harmonics;
+pub mod input;
+pub mod jitter;
+pub mod latency;
+pub mod mains;
+pub mod missing;
+pub mod nonlinearity;
+pub mod normal;
+pub mod offset;
+pub mod quantiser;
+pub mod report;
+pub mod rivals;
+pub mod search;
+pub mod spectrum;
+pub mod spur;
+pub mod structure;
+pub mod tone;
+pub mod truncation;
+pub mod wander;
+
+use super::verdict::{Closure, SCHEMA, Verdict};
+use crate::design::Design;
+use crate::error::{InputError, Result};
+use crate::record::Warning;
+use candidates::Known;
+use columns::{COS, Model, SIN};
+use gram::{Combo, Detail, Gram, solve};
+use input::Capture;
+use report::Findings;
+use std::path::Path;
+use tone::Tone;
+
+/// Fewest periods of the tone in a capture.
+const LEAST_PERIODS: f64 = 4.0;
+
+/// The closure of a capture file, and what a report shows beside it.
+///
+/// # Errors
+/// A file that cannot be read as a capture, too few rows, no tone.
+pub fn close(path: &Path, design: &Design, command: &str) -> Result<(Closure, Findings)> {
+    let start = std::time::Instant::now();
+    let bits = design.circuit.adc.format.bits();
+    let (capture, mut warnings) = input::read(path, bits)?;
+    warnings.extend(key_warnings(&capture, bits));
+    let findings = analyse(&capture).map_err(|e| match e {
+        crate::error::Error::Input(e) => (*e).in_file(path).into(),
+        other => other,
+    })?;
+    warnings.extend(findings.warnings.iter().cloned());
+    let closure = Closure {
+        schema: SCHEMA,
+        version: env!("CARGO_PKG_VERSION"),
+        design_sha256: design.source.sha256.clone(),
+        command: command.to_owned(),
+        verdict: Verdict::of(findings.steps.len(), findings.structure.left),
+        unit: "lsb",
+        noise_floor_rms: findings.noise_floor_rms,
+        before: findings.before,
+        steps: findings.steps.clone(),
+        after: findings.after,
+        firmware: findings.firmware,
+        residual_structure: findings.structure.clone(),
+        evidence: findings.evidence.clone(),
+        warnings,
+        seconds: start.elapsed().as_secs_f64(),
+    };
+    Ok((closure, findings))
+}
+
+/// The same for a capture in memory.
+///
+/// # Errors
+/// A capture without a tone, or with less than four periods of it.
+pub fn analyse(capture: &Capture) -> Result<Findings> {
+    let no_tone = |what: &str| {
+        InputError::new(what)
+            .help("check `ftw` and `fs_hz` against the capture; capture more periods of the drive")
+    };
+    let tone = Tone::of(capture)
+        .ok_or_else(|| no_tone("the drive codes hold no tone, and `ftw` is not given"))?;
+    let rows = capture.rows() as f64;
+    let edge = (0.5 - tone.folded()).min(tone.folded());
+    if edge * rows < LEAST_PERIODS {
+        return Err(no_tone(
+            "the drive tone has less than four periods to zero frequency or to half the sample rate in \
+             this capture",
+        )
+        .into());
+    }
+    let (known, plain) = known(capture, tone);
+    let fitted = fit::fit(capture, &known, tone);
+    let mut plain = plain;
+    plain.variance = fitted.model.variance;
+    plain.variance.jitter = 0.0;
+    Ok(report::findings(capture, &known, &plain, &fitted))
+}
+
+/// What the keys say, and the declared model fitted to the codes. The contract leaves open whether the rate's
+/// carrier is the sine or the cosine at `sense_phase_rad`, and its sign: of the four the one is
+/// taken that is nearest to the known rate, so that only what none explains counts as a deviation.
+fn known(capture: &Capture, tone: Tone) -> (Known, Model) {
+    let meta = &capture.meta;
+    let mut known = Known {
+        fs_hz: meta.fs_hz,
+        amplitude: meta.drive_amplitude_codes.is_some_and(|a| a != 0.0),
+        phase: meta.ftw.is_some(),
+        in_phase: None,
+        full_scale_codes: capture.full_scale_codes,
+    };
+    let free = baseline(capture, &known, tone);
+    if let (Some(rate), Some(scale), Some(phase)) = (
+        meta.rate_dps,
+        meta.sense_codes_per_dps,
+        meta.sense_phase_rad,
+    ) {
+        let at = |k: usize| free.coefficients[1].get(k).copied().unwrap_or(0.0);
+        let (sin, cos) = phase.sin_cos();
+        let carriers = [[cos, sin], [-sin, cos], [-cos, -sin], [sin, -cos]];
+        let off = |c: &[f64; 2]| (c[0] * at(SIN) + c[1] * at(COS) - rate * scale).abs();
+        let nearest = carriers
+            .into_iter()
+            .min_by(|a, b| off(a).total_cmp(&off(b)));
+        known.in_phase = nearest.map(|c| (c, rate * scale));
+    }
+    let plain = baseline(capture, &known, tone);
+    (known, plain)
+}
+
+/// The declared model with its free carriers fitted.
+fn baseline(capture: &Capture, known: &Known, tone: Tone) -> Model {
+    let mut model = fit::declared(capture, known, tone);
+    let base = candidates::base(known);
+    let combos: Vec<&Combo> = base.iter().collect();
+    // Twice: the quantiser's error needs the signal.
+    for _ in 0..2 {
+        let gram = Gram::of(capture, &model);
+        let solved = solve(
+            gram.all(),
+            &combos,
+            &candidates::base_ridge(&base),
+            Detail::All,
+        );
+        model.coefficients = around::spread(&combos, &solved);
+        model.neutral = model.coefficients.clone();
+    }
+    model
+}
+
+fn key_warnings(capture: &Capture, design_bits: u32) -> Vec<Warning> {
+    let meta = &capture.meta;
+    let mut out = Vec::new();
+    let mut missing = |key: &str, there: bool, what: &str| {
+        if !there {
+            let message = format!("the capture does not say `{key}`: {what}");
+            out.push(Warning::general("missing_key", message));
+        }
+    };
+    missing(
+        "fs_hz",
+        meta.fs_hz.is_some(),
+        "times and frequencies are in samples",
+    );
+    missing(
+        "ftw",
+        meta.ftw.is_some(),
+        "the tone is fitted, and latency and spurs cannot be seen",
+    );
+    missing(
+        "drive_amplitude_codes",
+        meta.drive_amplitude_codes.is_some(),
+        "a gain error of the drive channel cannot be seen",
+    );
+    let full = format!("{design_bits} bits of the design are taken");
+    missing("adc_bits", meta.adc_bits.is_some(), &full);
+    let rate = meta.rate_dps.is_some()
+        && meta.sense_codes_per_dps.is_some()
+        && meta.sense_phase_rad.is_some();
+    missing(
+        "rate_dps, sense_codes_per_dps, sense_phase_rad",
+        rate,
+        "the sense channel's amplitude is free, and feedthrough shows in its noise alone",
+    );
+    out
+}

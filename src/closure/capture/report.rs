@@ -1,0 +1,430 @@
+//! From the fit to `closure.json`: steps in order, judged on held-out rows; evidence; what is left.
+
+use super::around::spread;
+use super::candidates::{Effect, Known};
+use super::columns::{ALL, Model};
+use super::errors::{Judged, judge};
+use super::fit::Fitted;
+use super::gram::{Combo, Solved};
+use super::input::Capture;
+use super::search::Search;
+use super::{firmware, jitter, rivals, structure};
+use crate::closure::likelihood::tail::chi_square_surprise;
+use crate::closure::verdict::{Errors, Evidence, FirmwareErrors, Step, Structure};
+use crate::record::Warning;
+use std::collections::BTreeMap;
+
+/// What the report of a capture is made of.
+#[derive(Debug, Clone)]
+pub struct Findings {
+    /// With the declared model alone.
+    pub before: Errors,
+    /// In order.
+    pub steps: Vec<Step>,
+    /// With all steps.
+    pub after: Errors,
+    /// Corrected codes.
+    pub firmware: FirmwareErrors,
+    /// What is left.
+    pub structure: Structure,
+    /// All candidates.
+    pub evidence: Vec<Evidence>,
+    /// Remarks.
+    pub warnings: Vec<Warning>,
+    /// The noise of both columns together, codes rms.
+    pub noise_floor_rms: f64,
+    /// Model before and after all steps.
+    pub models: [Model; 2],
+}
+
+/// A step that is taken in its turn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Turn {
+    Clipping,
+    Missing,
+    Linear(usize),
+    Jitter,
+}
+
+/// Judges the fit, `plain` being the one of the declared model alone.
+pub fn findings(capture: &Capture, known: &Known, plain: &Model, fitted: &Fitted) -> Findings {
+    let mut search = Search::new(
+        fitted.gram.all(),
+        &fitted.base,
+        &fitted.nuisance,
+        &fitted.variants,
+    );
+    let before = judge(capture, plain);
+    let mut warnings = Vec::new();
+    let mut set = fitted.set.clone();
+    let (order, judged) = loop {
+        let order = turns(fitted, &mut search, &set);
+        let judged = prefixes(capture, fitted, &search, &order);
+        let mut last = weighted(capture, plain, fitted);
+        let mut failed = None;
+        for (turn, j) in order.iter().zip(&judged) {
+            match turn {
+                Turn::Linear(k) if j.heldout_chi >= last => {
+                    failed = Some(*k);
+                    break;
+                }
+                Turn::Linear(_) | Turn::Clipping => last = j.heldout_chi,
+                _ => {}
+            }
+        }
+        match failed {
+            Some(k) => set.retain(|s| *s != k),
+            None => break (order, judged),
+        }
+    };
+    let order: Vec<(Turn, Judged)> = order
+        .into_iter()
+        .zip(judged)
+        .filter(|(turn, _)| *turn != Turn::Jitter || jitter_holds(capture, fitted))
+        .collect();
+    let (combos, solved) = search.solution(&set);
+    let mut steps = Vec::new();
+    for (turn, judged) in &order {
+        let mut step = match turn {
+            Turn::Linear(k) => linear_step(
+                capture,
+                known,
+                fitted,
+                &mut search,
+                &set,
+                *k,
+                (&combos, &solved),
+            ),
+            Turn::Clipping => clipping_step(capture, fitted),
+            Turn::Missing => missing_step(fitted),
+            Turn::Jitter => {
+                warnings.push(Warning::general(
+                    "jitter_is_noise",
+                    "aperture_jitter is noise: it changes the variance, not the mean, so the error's \
+                     rms stays; the step is judged by the likelihood of the held-out rows",
+                ));
+                jitter_step(known, fitted)
+            }
+        };
+        step.heldout_rms = judged.errors.heldout_rms;
+        steps.push(step);
+    }
+    let mut last = fitted.model.clone();
+    last.coefficients = without_nuisance(fitted, &combos, &solved);
+    let after = if order.is_empty() {
+        before.errors
+    } else {
+        judge(capture, &last).errors
+    };
+    let with_wander = spread(&combos, &solved);
+    let structure = structure::left(capture, &last, &with_wander);
+    let taken: Vec<Effect> = order
+        .iter()
+        .filter_map(|(t, _)| effect(fitted, *t))
+        .collect();
+    let firmware = firmware_errors(
+        capture,
+        &last,
+        fitted,
+        &taken,
+        (&combos, &solved),
+        &mut warnings,
+    );
+    let evidence = rivals::evidence(capture, known, fitted, &mut search, &steps, &taken);
+    Findings {
+        before: before.errors,
+        steps,
+        after,
+        firmware,
+        structure,
+        evidence,
+        warnings,
+        noise_floor_rms: (0.5 * (fitted.noise[0] + fitted.noise[1])).sqrt(),
+        models: [plain.clone(), last],
+    }
+}
+
+fn effect(fitted: &Fitted, turn: Turn) -> Option<Effect> {
+    match turn {
+        Turn::Clipping => Some(Effect::Clipping),
+        Turn::Missing => Some(Effect::MissingCodes),
+        Turn::Jitter => Some(Effect::Jitter),
+        Turn::Linear(k) => fitted.variants.get(k).map(|v| v.effect),
+    }
+}
+
+/// The chi-square of the declared model on held-out rows, in the units of the fit's noise.
+fn weighted(capture: &Capture, plain: &Model, fitted: &Fitted) -> f64 {
+    let mut model = plain.clone();
+    model.variance = fitted.model.variance;
+    judge(capture, &model).heldout_chi
+}
+
+/// Clipping first (it decides which rows the others see), missing codes, then each time what gains most.
+fn turns(fitted: &Fitted, search: &mut Search, set: &[usize]) -> Vec<Turn> {
+    let mut out = Vec::new();
+    if fitted.clipping.is_some() {
+        out.push(Turn::Clipping);
+    }
+    if fitted.missing.is_some() {
+        out.push(Turn::Missing);
+    }
+    let mut taken: Vec<usize> = Vec::new();
+    while taken.len() < set.len() {
+        let mut best: Option<(f64, usize)> = None;
+        for k in set.iter().filter(|k| !taken.contains(k)) {
+            let mut next = taken.clone();
+            next.push(*k);
+            let gain = search.gain(&next);
+            if best.is_none_or(|b| gain > b.0) {
+                best = Some((gain, *k));
+            }
+        }
+        let Some((_, k)) = best else { break };
+        taken.push(k);
+    }
+    out.extend(taken.into_iter().map(Turn::Linear));
+    if fitted.jitter_taken {
+        out.push(Turn::Jitter);
+    }
+    out
+}
+
+/// The model after each turn, judged.
+fn prefixes(capture: &Capture, fitted: &Fitted, search: &Search, order: &[Turn]) -> Vec<Judged> {
+    let mut set = Vec::new();
+    let mut model = fitted.model.clone();
+    model.missing = Default::default();
+    order
+        .iter()
+        .map(|turn| {
+            match turn {
+                Turn::Linear(k) => set.push(*k),
+                Turn::Missing => model.missing = fitted.model.missing.clone(),
+                _ => {}
+            }
+            let (combos, solved) = search.solution(&set);
+            model.coefficients = without_nuisance(fitted, &combos, &solved);
+            judge(capture, &model)
+        })
+        .collect()
+}
+
+/// Coefficients of base and steps: the wander's are no part of the model.
+fn without_nuisance(fitted: &Fitted, combos: &[&Combo], solved: &Solved) -> [Vec<f64>; 2] {
+    let from = fitted.base.len();
+    let wander = from..from + fitted.nuisance.len();
+    let mut solved = solved.clone();
+    for k in wander {
+        if let Some(c) = solved.coefficients.get_mut(k) {
+            *c = 0.0;
+        }
+    }
+    spread(combos, &solved)
+}
+
+/// Whether jitter makes the held-out rows likelier.
+fn jitter_holds(capture: &Capture, fitted: &Fitted) -> bool {
+    let [drive, sense] = &fitted.residuals;
+    let held = jitter::Squares::of(capture, &fitted.model, [drive, sense], true);
+    let variance = fitted.model.variance;
+    // Without jitter its mean part is in the base of each channel.
+    held.likelihood(variance.base, variance.jitter) > held.likelihood(fitted.noise, 0.0)
+}
+
+#[allow(clippy::too_many_arguments)]
+fn linear_step(
+    capture: &Capture,
+    known: &Known,
+    fitted: &Fitted,
+    search: &mut Search,
+    set: &[usize],
+    member: usize,
+    (combos, solved): (&[&Combo], &Solved),
+) -> Step {
+    let Some(variant) = fitted.variants.get(member) else {
+        return empty(Effect::Offset);
+    };
+    let mut step = empty(variant.effect);
+    let fewer: Vec<usize> = set.iter().copied().filter(|k| *k != member).collect();
+    let gain = search.gain(set) - search.gain(&fewer);
+    let columns = variant.combos.len();
+    let search_cost = variant.cost - 7.0 - 2.0 * columns as f64;
+    let surprise = chi_square_surprise(columns, 2.0 * gain.max(0.0));
+    let tried = (fitted.variants.len() as f64).ln() + search_cost.max(0.0);
+    step.p_value = (tried - surprise).exp().min(1.0);
+    let before: usize = set.iter().take_while(|k| **k != member).count();
+    let skipped: usize = set
+        .iter()
+        .take(before)
+        .filter_map(|k| fitted.variants.get(*k))
+        .map(|v| v.combos.len())
+        .sum();
+    let start = fitted.base.len() + fitted.nuisance.len() + skipped;
+    let own = start..start + columns;
+    parameters(&mut step, combos, solved, own);
+    let names: Vec<String> = step.parameters.keys().cloned().collect();
+    for (i, turns) in fitted.model.lines.iter().enumerate() {
+        let prefix = format!("line{}_", i + 1);
+        if names.iter().any(|n| n.starts_with(&prefix)) {
+            let (name, value) = match known.fs_hz {
+                Some(fs) => (format!("{prefix}frequency_hz"), turns * fs),
+                None => (format!("{prefix}frequency_per_sample"), *turns),
+            };
+            step.parameters.insert(name, value);
+        }
+    }
+    step.selection_frequency = rivals::selection_frequency(fitted, &fewer, member);
+    step.indistinguishable_from = rivals::alike(capture, known, fitted, search, set, member);
+    if !step.indistinguishable_from.is_empty() {
+        step.separating_experiment = Some(variant.effect.experiment().to_owned());
+    }
+    step
+}
+
+/// Values and deviations; of sine and cosine of the same name also the amplitude; of a table its extremes.
+fn parameters(step: &mut Step, combos: &[&Combo], solved: &Solved, own: std::ops::Range<usize>) {
+    let value = |k: usize| solved.coefficients.get(k).copied().unwrap_or(0.0);
+    let deviation = |k: usize| solved.stds.get(k).copied().unwrap_or(0.0);
+    if own.len() > 12 {
+        let extreme = |sign: f64| own.clone().map(|k| sign * value(k)).fold(0.0, f64::max) * sign;
+        let worst = own.clone().map(deviation).fold(0.0, f64::max);
+        for (name, v) in [
+            ("largest_codes", extreme(1.0)),
+            ("smallest_codes", extreme(-1.0)),
+        ] {
+            step.parameters.insert(name.to_owned(), v);
+            step.parameter_std.insert(name.to_owned(), worst);
+        }
+        step.parameters.insert("knots".to_owned(), own.len() as f64);
+        return;
+    }
+    let mut pairs: BTreeMap<String, [f64; 2]> = BTreeMap::new();
+    for k in own {
+        let Some(combo) = combos.get(k) else { continue };
+        let (v, s) = (value(k) * combo.unit, deviation(k) * combo.unit);
+        step.parameters.insert(combo.name.clone(), v);
+        step.parameter_std.insert(combo.name.clone(), s);
+        for part in ["_sin_", "_cos_"] {
+            if combo.name.contains(part) {
+                let name = combo.name.replace(part, "_amplitude_");
+                let pair = pairs.entry(name).or_default();
+                pair[0] += v * v;
+                pair[1] = s.max(pair[1]);
+            }
+        }
+    }
+    for (name, [square, std]) in pairs {
+        step.parameters.insert(name.clone(), square.sqrt());
+        step.parameter_std.insert(name, std);
+    }
+}
+
+fn empty(effect: Effect) -> Step {
+    Step {
+        effect: effect.id().to_owned(),
+        channels: vec!["drive_code".to_owned(), "sense_code".to_owned()],
+        parameters: BTreeMap::new(),
+        parameter_std: BTreeMap::new(),
+        heldout_rms: 0.0,
+        p_value: 0.0,
+        selection_frequency: 1.0,
+        indistinguishable_from: Vec::new(),
+        separating_experiment: None,
+    }
+}
+
+fn clipping_step(capture: &Capture, fitted: &Fitted) -> Step {
+    let mut step = empty(Effect::Clipping);
+    let rows = capture.training_rows() as f64;
+    for (channel, name) in ["drive", "sense"].iter().enumerate() {
+        let limits = fitted.model.limits[channel];
+        let std = (fitted.noise[channel] / rows).sqrt().max(0.01);
+        for (side, level) in [("low", limits.low), ("high", limits.high)] {
+            if level.is_finite() {
+                let key = format!("{name}_{side}_codes");
+                step.parameters.insert(key.clone(), level);
+                step.parameter_std.insert(key, std);
+            }
+        }
+    }
+    step.p_value = (13.0 - fitted.clipping.unwrap_or(0.0)).exp().min(1.0);
+    step
+}
+
+fn missing_step(fitted: &Fitted) -> Step {
+    let mut step = empty(Effect::MissingCodes);
+    if let Some(found) = &fitted.missing {
+        let count = found.missing.iter().map(|m| m.codes.len()).sum::<usize>();
+        step.parameters.insert("count".to_owned(), count as f64);
+        step.parameters
+            .insert("expected_rows".to_owned(), found.expected_rows);
+        if let Some((spacing, first)) = found.spacing {
+            step.parameters
+                .insert("spacing_codes".to_owned(), spacing as f64);
+            step.parameters
+                .insert("first_code".to_owned(), first as f64);
+        } else if let Some(first) = found.missing.iter().flat_map(|m| &m.codes).min() {
+            step.parameters
+                .insert("first_code".to_owned(), f64::from(*first));
+        }
+        step.p_value = (-found.gain).exp().min(1.0);
+    }
+    step
+}
+
+fn jitter_step(known: &Known, fitted: &Fitted) -> Step {
+    let mut step = empty(Effect::Jitter);
+    if let Some(found) = fitted.jitter {
+        let samples = found.jitter.sqrt();
+        let std = found.std / (2.0 * samples.max(1e-12));
+        let (name, unit) = match known.fs_hz {
+            Some(fs) => ("jitter_rms_s", 1.0 / fs),
+            None => ("jitter_rms_samples", 1.0),
+        };
+        step.parameters.insert(name.to_owned(), samples * unit);
+        step.parameter_std.insert(name.to_owned(), std * unit);
+        step.p_value = (3.0 - chi_square_surprise(1, 2.0 * found.gain).min(1e6))
+            .exp()
+            .min(1.0);
+    }
+    step
+}
+
+/// The same error with corrected codes, where arithmetic on code and phase can do it.
+fn firmware_errors(
+    capture: &Capture,
+    last: &Model,
+    fitted: &Fitted,
+    taken: &[Effect],
+    (combos, solved): (&[&Combo], &Solved),
+    warnings: &mut Vec<Warning>,
+) -> FirmwareErrors {
+    let not: Vec<&str> = taken
+        .iter()
+        .filter(|e| !e.is_compensable())
+        .map(|e| e.id())
+        .collect();
+    if !not.is_empty() {
+        warnings.push(Warning::general(
+            "not_compensable",
+            format!(
+                "{} cannot be taken away by arithmetic on codes and phase, so firmware has no figures",
+                not.join(", ")
+            ),
+        ));
+        return FirmwareErrors::default();
+    }
+    let from = fitted.base.len() + fitted.nuisance.len();
+    let mut own = solved.clone();
+    own.coefficients
+        .iter_mut()
+        .take(from)
+        .for_each(|c| *c = 0.0);
+    let effects = if taken.is_empty() {
+        [vec![0.0; ALL], vec![0.0; ALL]]
+    } else {
+        spread(combos, &own)
+    };
+    firmware::corrected(capture, last, &last.coefficients, &effects)
+}

@@ -1,0 +1,174 @@
+//! Which effects the capture calls for: steps forward, with removal and exchange, on the sums of products.
+//!
+//! The objective of a set is its gain in log-likelihood less what each variant costs. A set that
+//! a step forward began wrongly (a table for what are an offset and a clipping) is left by exchange.
+
+use super::candidates::{Effect, Variant};
+use super::gram::{Combo, Detail, Solved, solve};
+use std::collections::BTreeMap;
+
+/// Less than this is no improvement.
+const LEAST: f64 = 0.05;
+
+/// A search over sets of variants.
+pub struct Search<'a> {
+    sums: &'a [Vec<f64>; 2],
+    base: &'a [Combo],
+    nuisance: &'a [(Combo, f64)],
+    variants: &'a [Variant],
+    gains: BTreeMap<Vec<usize>, f64>,
+}
+
+impl<'a> Search<'a> {
+    /// `base` is always there; `nuisance` too, with its prior variances.
+    pub fn new(
+        sums: &'a [Vec<f64>; 2],
+        base: &'a [Combo],
+        nuisance: &'a [(Combo, f64)],
+        variants: &'a [Variant],
+    ) -> Self {
+        Search {
+            sums,
+            base,
+            nuisance,
+            variants,
+            gains: BTreeMap::new(),
+        }
+    }
+
+    /// The variants.
+    pub fn variants(&self) -> &'a [Variant] {
+        self.variants
+    }
+
+    /// Combos of a set, the base and the nuisance first, and their ridges.
+    fn combos(&self, set: &[usize]) -> (Vec<&'a Combo>, Vec<f64>) {
+        let mut combos: Vec<&Combo> = self.base.iter().collect();
+        let mut ridge = super::candidates::base_ridge(self.base);
+        for (combo, variance) in self.nuisance {
+            combos.push(combo);
+            ridge.push(1.0 / variance);
+        }
+        let variants = set.iter().filter_map(|k| self.variants.get(*k));
+        combos.extend(variants.flat_map(|v| &v.combos));
+        ridge.resize(combos.len(), 0.0);
+        (combos, ridge)
+    }
+
+    /// The full solution of a set, with its combos.
+    pub fn solution(&self, set: &[usize]) -> (Vec<&'a Combo>, Solved) {
+        let (combos, ridge) = self.combos(set);
+        let solved = solve(self.sums, &combos, &ridge, Detail::All);
+        (combos, solved)
+    }
+
+    /// Of each member of a set what it moves each channel by: sum of squares over variances.
+    pub fn energies(&self, set: &[usize]) -> Vec<[f64; 2]> {
+        let (combos, solved) = self.solution(set);
+        let mut at = self.base.len() + self.nuisance.len();
+        let variants = set.iter().filter_map(|k| self.variants.get(*k));
+        variants
+            .map(|v| {
+                let own = at..at + v.combos.len();
+                at = own.end;
+                let combos = combos.get(own.clone()).unwrap_or_default();
+                let values = solved.coefficients.get(own).unwrap_or_default();
+                super::gram::energy(self.sums, combos, values)
+            })
+            .collect()
+    }
+
+    /// The gain of a set beyond the base.
+    pub fn gain(&mut self, set: &[usize]) -> f64 {
+        let mut key = set.to_vec();
+        key.sort_unstable();
+        if let Some(gain) = self.gains.get(&key) {
+            return *gain;
+        }
+        let (combos, ridge) = self.combos(&key);
+        let gain = solve(self.sums, &combos, &ridge, Detail::Gain).gain;
+        self.gains.insert(key, gain);
+        gain
+    }
+
+    /// Gain less costs.
+    pub fn objective(&mut self, set: &[usize]) -> f64 {
+        let costs = set
+            .iter()
+            .filter_map(|k| self.variants.get(*k))
+            .map(|v| v.cost);
+        let costs: f64 = costs.sum();
+        self.gain(set) - costs
+    }
+
+    fn effect(&self, variant: usize) -> Option<Effect> {
+        self.variants.get(variant).map(|v| v.effect)
+    }
+
+    /// The variants of effects that are not in the set.
+    fn others(&self, set: &[usize]) -> Vec<usize> {
+        let taken: Vec<_> = set.iter().map(|k| self.effect(*k)).collect();
+        (0..self.variants.len())
+            .filter(|k| !taken.contains(&self.effect(*k)))
+            .collect()
+    }
+
+    /// The best set that the moves find, and its objective.
+    pub fn best(&mut self) -> (Vec<usize>, f64) {
+        let mut set: Vec<usize> = Vec::new();
+        let mut score = self.objective(&set);
+        for _ in 0..40 {
+            let mut better: Option<(Vec<usize>, f64)> = None;
+            let mut offer = |search: &mut Self, candidate: Vec<usize>| {
+                let value = search.objective(&candidate);
+                if value > score + LEAST && better.as_ref().is_none_or(|b| value > b.1) {
+                    better = Some((candidate, value));
+                }
+            };
+            for k in 0..set.len() {
+                let mut fewer = set.clone();
+                fewer.remove(k);
+                for other in self.others(&fewer) {
+                    let mut exchanged = fewer.clone();
+                    exchanged.push(other);
+                    offer(self, exchanged);
+                }
+                offer(self, fewer);
+            }
+            for other in self.others(&set) {
+                let mut more = set.clone();
+                more.push(other);
+                offer(self, more);
+            }
+            match better {
+                Some((next, value)) => (set, score) = (next, value),
+                None => break,
+            }
+        }
+        (set, score)
+    }
+
+    /// The effects that do nearly as well in the place of one of a set: best variant, and its
+    /// objective less that of the set.
+    pub fn rivals(&mut self, set: &[usize], member: usize) -> Vec<(Effect, f64)> {
+        let score = self.objective(set);
+        let fewer: Vec<usize> = set.iter().copied().filter(|k| *k != member).collect();
+        let mut best: BTreeMap<Effect, f64> = BTreeMap::new();
+        for other in self.others(&fewer) {
+            let Some(effect) = self.effect(other) else {
+                continue;
+            };
+            if Some(effect) == self.effect(member) {
+                continue;
+            }
+            let mut exchanged = fewer.clone();
+            exchanged.push(other);
+            let value = self.objective(&exchanged) - score;
+            let entry = best.entry(effect).or_insert(f64::NEG_INFINITY);
+            *entry = entry.max(value);
+        }
+        let mut out: Vec<_> = best.into_iter().collect();
+        out.sort_by(|a, b| b.1.total_cmp(&a.1));
+        out
+    }
+}

@@ -1,0 +1,198 @@
+//! The residual's spectrum: the noise's level, and lines that stand out of what is around them.
+
+use super::normal;
+use super::tone::Tone;
+use rustfft::FftPlanner;
+use rustfft::num_complex::Complex;
+
+/// Periodograms of both channels.
+pub struct Spectrum {
+    /// |sum of residual e^(-i w t)|^2 / rows, by channel and bin: the mean is the variance.
+    power: [Vec<f64>; 2],
+    /// Bins of a whole turn.
+    bins: usize,
+    /// Rows that were summed.
+    rows: f64,
+}
+
+/// A line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Line {
+    /// Turns a sample.
+    pub turns: f64,
+    /// Minus the logarithm of the probability that noise makes it at this place.
+    pub surprise: f64,
+    /// Channel in which it is stronger.
+    pub channel: usize,
+    /// Amplitude there, in the residual's unit.
+    pub amplitude: f64,
+}
+
+impl Spectrum {
+    /// Of residuals that are zero where rows are left out; `rows` are those that are not.
+    pub fn of(residuals: [&[f64]; 2], rows: usize) -> Spectrum {
+        let [drive, sense] = residuals;
+        let bins = drive.len().next_power_of_two().max(2);
+        let mut buffer: Vec<Complex<f64>> = Vec::with_capacity(bins);
+        buffer.extend(drive.iter().zip(sense).map(|(d, s)| Complex::new(*d, *s)));
+        buffer.resize(bins, Complex::new(0.0, 0.0));
+        FftPlanner::new()
+            .plan_fft_forward(bins)
+            .process(&mut buffer);
+        let rows = rows.max(1) as f64;
+        let mut power = [
+            Vec::with_capacity(bins / 2 + 1),
+            Vec::with_capacity(bins / 2 + 1),
+        ];
+        for k in 0..=bins / 2 {
+            // Two real sequences in one transform.
+            let (Some(a), Some(b)) = (buffer.get(k), buffer.get((bins - k) % bins)) else {
+                break;
+            };
+            power[0].push((a + b.conj()).norm_sqr() / (4.0 * rows));
+            power[1].push((a - b.conj()).norm_sqr() / (4.0 * rows));
+        }
+        Spectrum { power, bins, rows }
+    }
+
+    /// The white noise's variance in a channel: the median bin over that of an exponential distribution.
+    pub fn variance(&self, channel: usize) -> f64 {
+        let mut sorted: Vec<f64> = self.power[channel].iter().skip(1).copied().collect();
+        normal::median(&mut sorted).unwrap_or(0.0) / std::f64::consts::LN_2
+    }
+
+    /// The noise around each bin: medians of blocks that widen with the distance from zero frequency and from
+    /// the tone, where noise of the amplitude piles up.
+    fn floor(&self, channel: usize, tone: &Tone, least: f64) -> Vec<f64> {
+        let power = &self.power[channel];
+        let n = power.len();
+        let all = self.variance(channel).max(least);
+        let centre = (tone.folded() * self.bins as f64).round() as usize;
+        let mut out = vec![all; n];
+        for (start, sign) in [(0usize, 1i64), (centre, 1), (centre, -1)] {
+            let mut from = 1i64;
+            while from < 3 * n as i64 {
+                let to = (from + (from / 2).clamp(16, 256)).min(3 * n as i64);
+                let index = |d: i64| {
+                    usize::try_from(start as i64 + sign * d)
+                        .ok()
+                        .filter(|k| *k < n)
+                };
+                let mut block: Vec<f64> = (from..to)
+                    .filter_map(index)
+                    .filter_map(|k| power.get(k))
+                    .copied()
+                    .collect();
+                let count = block.len();
+                if count == 0 {
+                    break;
+                }
+                let middle = normal::median(&mut block).unwrap_or(0.0) / std::f64::consts::LN_2;
+                // A short block is uncertain, and lines are in it.
+                if count >= 12 && middle > all * (1.0 + 3.0 / (count as f64).sqrt()) {
+                    let centre = 0.5 * (from + to) as f64;
+                    for d in from..to {
+                        if let Some(v) = index(d).and_then(|k| out.get_mut(k)) {
+                            let steeper = (centre / d as f64).powf(1.5).max(1.0);
+                            *v = v.max(all + (middle - all) * steeper);
+                        }
+                    }
+                }
+                from = to;
+            }
+        }
+        out
+    }
+
+    /// Surprise of what is at a frequency (turns a sample), the two nearest bins together.
+    pub fn surprise_at(&self, turns: f64, tone: &Tone, least: [f64; 2]) -> f64 {
+        let floors = [self.floor(0, tone, least[0]), self.floor(1, tone, least[1])];
+        let at = |c: usize| {
+            let bin = (turns * self.bins as f64) as usize;
+            let of = |k: usize| Some(self.power[c].get(k)? / floors[c].get(k)?);
+            of(bin).unwrap_or(0.0).max(of(bin + 1).unwrap_or(0.0))
+        };
+        at(0).max(at(1))
+    }
+
+    /// The noise around a frequency (turns a sample) in a channel over the white noise, 1 or more.
+    pub fn excess(&self, channel: usize, turns: f64, tone: &Tone, least: f64) -> f64 {
+        let floor = self.floor(channel, tone, least);
+        let bin = (super::tone::fold(turns) * self.bins as f64).round() as usize;
+        let here = floor.get(bin.min(floor.len().saturating_sub(1)));
+        here.copied().unwrap_or(least) / self.variance(channel).max(least)
+    }
+
+    /// Lines above their surroundings, strongest first, with less than one in a thousand by chance. Harmonics
+    /// of the tone up to `harmonics`, zero frequency, and what is within `apart` resolutions of
+    /// either are none.
+    pub fn lines(&self, tone: &Tone, harmonics: usize, apart: f64, least: [f64; 2]) -> Vec<Line> {
+        let floors = [self.floor(0, tone, least[0]), self.floor(1, tone, least[1])];
+        let stretch = self.bins as f64 / self.rows;
+        let excluded: Vec<f64> = (0..=harmonics)
+            .map(|k| super::tone::fold(k as f64 * tone.turns) * self.bins as f64)
+            .collect();
+        let score = |k: usize| -> (f64, usize) {
+            let of = |c: usize| Some(self.power[c].get(k)? / floors[c].get(k)?);
+            let (d, s) = (of(0).unwrap_or(0.0), of(1).unwrap_or(0.0));
+            let both = d + s - (1.0 + d + s).ln();
+            (both.max(d).max(s), usize::from(s > d))
+        };
+        let threshold = (self.bins as f64).ln() + 7.0;
+        let mut found = Vec::new();
+        for k in 2..self.bins / 2 {
+            let here = score(k);
+            let is_peak = here.0 > threshold && here.0 >= score(k - 1).0 && here.0 > score(k + 1).0;
+            let away = |e: &f64| (e - k as f64).abs() > apart * stretch;
+            if is_peak && excluded.iter().all(away) {
+                found.push(Line {
+                    turns: k as f64 / self.bins as f64,
+                    surprise: here.0,
+                    channel: here.1,
+                    amplitude: 2.0 * (self.power[here.1].get(k).unwrap_or(&0.0) / self.rows).sqrt(),
+                });
+            }
+        }
+        found.sort_by(|a, b| b.surprise.total_cmp(&a.surprise));
+        found
+    }
+}
+
+/// The frequency near `turns` at which both residuals together have most power (weights one over their
+/// variances), by parabolas on the exact sums.
+pub fn refine(residuals: [&[f64]; 2], variances: [f64; 2], turns: f64) -> f64 {
+    let n = residuals[0].len().max(1);
+    let power = |turns: f64| -> f64 {
+        let step = Complex::from_polar(1.0, -std::f64::consts::TAU * turns);
+        let mut sums = [Complex::new(0.0, 0.0); 2];
+        for (block, start) in (0..n).step_by(512).enumerate() {
+            let angle = -std::f64::consts::TAU * (turns * (block * 512) as f64).fract();
+            let mut turn = Complex::from_polar(1.0, angle);
+            for row in start..(start + 512).min(n) {
+                for (sum, residual) in sums.iter_mut().zip(residuals) {
+                    *sum += turn * residual.get(row).copied().unwrap_or(0.0);
+                }
+                turn *= step;
+            }
+        }
+        sums.iter()
+            .zip(variances)
+            .map(|(s, v)| s.norm_sqr() / v)
+            .sum()
+    };
+    let mut centre = turns;
+    let mut width = 0.5 / n as f64;
+    for _ in 0..9 {
+        let (a, b, c) = (power(centre - width), power(centre), power(centre + width));
+        if b >= a && b >= c {
+            let bend = a - 2.0 * b + c;
+            if bend < 0.0 {
+                centre += 0.5 * width * (a - c) / bend;
+            }
+            width *= 0.3;
+        } else {
+            centre += if a > c { -width } else { width };
+        }
+    }
+    centre
+}

@@ -1,0 +1,133 @@
+//! The phase of the oscillator at each row, and the declared tones.
+
+use super::input::Capture;
+use rustfft::FftPlanner;
+use rustfft::num_complex::Complex;
+use std::f64::consts::TAU;
+
+/// 2^-32 turn.
+const WORD: f64 = 1.0 / 4_294_967_296.0;
+
+/// Phase 0 at row 0 (plus `offset_turns` where the tuning word is not known).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tone {
+    /// Tuning word of 32 bits, if known: phases are then exact.
+    pub word: Option<u32>,
+    /// Turns a sample, 0 to 1/2.
+    pub turns: f64,
+    /// Of row 0.
+    pub offset_turns: f64,
+}
+
+impl Tone {
+    /// Of the capture's tuning word; without one, fitted to the drive codes so that these are
+    /// -cos(2 pi phase). `None`: there is no tone.
+    pub fn of(capture: &Capture) -> Option<Tone> {
+        match capture.meta.ftw {
+            Some(word) => Some(Tone {
+                word: Some(word),
+                turns: f64::from(word) * WORD,
+                offset_turns: 0.0,
+            }),
+            None => fitted(&capture.codes[0]),
+        }
+    }
+
+    /// Phase of a row, turns in 0 .. 1.
+    pub fn phase(&self, row: usize) -> f64 {
+        match self.word {
+            Some(word) => f64::from(word.wrapping_mul(row as u32)) * WORD,
+            None => (self.turns * row as f64 + self.offset_turns).rem_euclid(1.0),
+        }
+    }
+
+    /// Turns a sample folded into 0 ..= 1/2.
+    pub fn folded(&self) -> f64 {
+        fold(self.turns)
+    }
+
+    /// Rows after which the phases repeat: 2^32 over the largest power of two in the word; infinite where the
+    /// word is not known.
+    pub fn period_rows(&self) -> f64 {
+        let bits = |word: u32| 32 - word.trailing_zeros().min(32) as i32;
+        self.word
+            .map_or(f64::INFINITY, |word| f64::powi(2.0, bits(word)))
+    }
+
+    /// Angle a sample with its sign, rad: negative above half the sample rate.
+    pub fn angle(&self) -> f64 {
+        let turns = self.turns.rem_euclid(1.0);
+        TAU * if turns > 0.5 { turns - 1.0 } else { turns }
+    }
+}
+
+/// Sine and cosine of the phase of every row, computed once.
+#[derive(Debug, Clone)]
+pub struct Phases(std::sync::Arc<Vec<[f64; 2]>>);
+
+impl Phases {
+    /// Of the first `rows` rows.
+    pub fn of(tone: &Tone, rows: usize) -> Phases {
+        let at = |row| (TAU * tone.phase(row)).sin_cos();
+        let pairs = (0..rows).map(|row| {
+            let (sin, cos) = at(row);
+            [sin, cos]
+        });
+        Phases(std::sync::Arc::new(pairs.collect()))
+    }
+
+    /// Sine and cosine at a row.
+    #[inline]
+    pub fn at(&self, row: usize) -> (f64, f64) {
+        self.0.get(row).map_or((0.0, 1.0), |[s, c]| (*s, *c))
+    }
+}
+
+/// A frequency in turns a sample folded into 0 ..= 1/2.
+pub fn fold(turns: f64) -> f64 {
+    let turns = turns.rem_euclid(1.0);
+    turns.min(1.0 - turns)
+}
+
+/// Least squares frequency and phase of the strongest line: a Hann-windowed transform, then steps
+/// of the phase between the two halves.
+fn fitted(codes: &[i32]) -> Option<Tone> {
+    let n = codes.len();
+    let mean = codes.iter().map(|c| f64::from(*c)).sum::<f64>() / n as f64;
+    let value = |i: usize| f64::from(codes.get(i).copied().unwrap_or(0)) - mean;
+    let mut buffer: Vec<Complex<f64>> = (0..n)
+        .map(|i| {
+            let hann = 0.5 - 0.5 * (TAU * (i as f64 + 0.5) / n as f64).cos();
+            Complex::new(value(i) * hann, 0.0)
+        })
+        .collect();
+    FftPlanner::new().plan_fft_forward(n).process(&mut buffer);
+    let half = buffer.iter().enumerate().take(n / 2).skip(2);
+    let (peak, height) = half
+        .map(|(k, c)| (k, c.norm_sqr()))
+        .fold((0, 0.0), |a, b| if b.1 > a.1 { b } else { a });
+    if peak == 0 || height <= 0.0 {
+        return None;
+    }
+    let mut turns = peak as f64 / n as f64;
+    let sums = |turns: f64, from: usize, to: usize| {
+        (from..to).fold(Complex::new(0.0, 0.0), |sum, i| {
+            sum + Complex::from_polar(value(i), -TAU * (turns * i as f64).fract())
+        })
+    };
+    for _ in 0..12 {
+        let (first, second) = (sums(turns, 0, n / 2), sums(turns, n / 2, n));
+        let step = (second * first.conj()).arg() / (TAU * (n as f64 / 2.0));
+        turns += step;
+        if step.abs() < 1e-14 {
+            break;
+        }
+    }
+    // -cos(2 pi p) = cos(2 pi (p + 1/2)), and the sum's argument is that of a cosine.
+    let offset_turns = sums(turns, 0, n).arg() / TAU + 0.5;
+    Some(Tone {
+        word: None,
+        turns,
+        offset_turns: offset_turns.rem_euclid(1.0),
+    })
+}

@@ -1,0 +1,212 @@
+//! From found effects to the correction that firmware runs.
+
+use super::channels::{Channels, scaled};
+use super::effects::{Bias, Estimate};
+use super::likelihood::linear::{Basis, dot};
+use super::search::Model;
+use super::verdict::FirmwareErrors;
+use crate::correction::{Correction, Formats, Input, Plan, Term, readings};
+use crate::error::Result;
+use crate::record::{ThermalRecord, stats};
+
+/// Columns that firmware sees by itself.
+const SEEN: [&str; 6] = [
+    "phase_rad",
+    "freq_hz",
+    "die_degc",
+    "agc",
+    "quad_dps",
+    "supply_v",
+];
+
+/// `count` equidistant numbers over -1 ..= 1.
+pub fn knots(count: usize) -> impl Iterator<Item = f64> {
+    let last = count.saturating_sub(1).max(1) as f64;
+    (0..count).map(move |k| -1.0 + 2.0 * k as f64 / last)
+}
+
+/// The inputs of a correction while its terms are collected.
+pub struct Words {
+    /// The declared bias in u.
+    pub bias: Bias,
+    inputs: Vec<Input>,
+    thermometer: Option<usize>,
+}
+
+/// Largest error of a polynomial that stands for an effect of two channels, as a share of the effect's
+/// rms.
+const SURFACE: f64 = 0.02;
+
+impl Words {
+    fn new(c: &Channels, bias: &Bias) -> Self {
+        let mut out = Words {
+            bias: bias.clone(),
+            inputs: Vec::new(),
+            thermometer: None,
+        };
+        if SEEN.contains(&c.thermometer.as_str()) {
+            out.thermometer = Some(0);
+            out.inputs.push(Input {
+                column: c.thermometer.clone(),
+                offset: c.centre,
+                scale: c.half,
+            });
+        }
+        out
+    }
+
+    /// The input that is u, if firmware sees the thermometer.
+    pub fn thermometer(&self) -> Option<usize> {
+        self.thermometer
+    }
+
+    /// An input for a column that firmware sees, and the column as it reads it.
+    fn input(&mut self, c: &Channels, name: &str) -> Option<(usize, Vec<f64>)> {
+        if !SEEN.contains(&name) {
+            return None;
+        }
+        let (x, middle, half) = scaled(c.column(name)?);
+        let at = self.inputs.iter().position(|i| i.column == name);
+        let at = at.unwrap_or_else(|| {
+            self.inputs.push(Input {
+                column: name.to_owned(),
+                offset: middle,
+                scale: if half > 0.0 { half } else { 1.0 },
+            });
+            self.inputs.len() - 1
+        });
+        Some((at, x))
+    }
+
+    /// Terms for the sum of `columns` times `beta`, a smooth function of a column and of u: the
+    /// polynomial in both that fits it over the record's rows; `None` if none does well enough.
+    pub fn surface(
+        &mut self,
+        c: &Channels,
+        name: &str,
+        columns: &[Vec<f64>],
+        beta: &[f64],
+    ) -> Option<Vec<Term>> {
+        let (input, x) = self.input(c, name)?;
+        let mut target = vec![0.0; c.len()];
+        for (column, b) in columns.iter().zip(beta) {
+            super::likelihood::linear::add_scaled(&mut target, *b, column);
+        }
+        for (of_x, of_u) in [(1, 0), (1, 1), (2, 2), (2, 4), (3, 6)] {
+            let of_u = if self.thermometer.is_some() { of_u } else { 0 };
+            let powers: Vec<(u32, u32)> = (0..=of_x)
+                .flat_map(|a| (0..=of_u).map(move |b| (a, b)))
+                .collect();
+            let shapes: Vec<Vec<f64>> = powers
+                .iter()
+                .map(|(a, b)| {
+                    let pairs = x.iter().zip(&c.u);
+                    pairs
+                        .map(|(x, u)| x.powi(*a as i32) * u.powi(*b as i32))
+                        .collect()
+                })
+                .collect();
+            let basis = Basis::new(
+                &shapes
+                    .iter()
+                    .map(|s: &Vec<f64>| s.clone())
+                    .collect::<Vec<_>>(),
+            );
+            let mut rest = target.clone();
+            let z = basis.project_off(&mut rest);
+            if dot(&rest, &rest) > SURFACE * SURFACE * dot(&target, &target) {
+                continue;
+            }
+            let terms = powers
+                .iter()
+                .zip(basis.solve(&z))
+                .map(|((a, b), gain_dps)| {
+                    let mut factors = Vec::new();
+                    if *a > 0 {
+                        factors.push((input, *a));
+                    }
+                    if let (Some(u), true) = (self.thermometer, *b > 0) {
+                        factors.push((u, *b));
+                    }
+                    Term::Product { gain_dps, factors }
+                });
+            return Some(terms.collect());
+        }
+        None
+    }
+}
+
+/// The correction that a model calls for; `None` if firmware cannot carry it.
+pub fn plan(
+    c: &Channels,
+    model: &Model,
+    estimates: &[Estimate],
+    full_scale_dps: f64,
+) -> Option<Plan> {
+    let mut words = Words::new(c, &model.bias);
+    let order = model.bias.coefficients_dps.len();
+    let thermometer = words.thermometer();
+    if order > 1 && thermometer.is_none() {
+        return None;
+    }
+    let mut terms: Vec<Term> = model
+        .bias
+        .coefficients_dps
+        .iter()
+        .enumerate()
+        .map(|(k, gain_dps)| Term::Product {
+            gain_dps: *gain_dps,
+            factors: match (k, thermometer) {
+                (1.., Some(u)) => vec![(u, k as u32)],
+                _ => Vec::new(),
+            },
+        })
+        .collect();
+    for (term, estimate) in model.terms.iter().zip(estimates) {
+        terms.extend(term.candidate.correction(c, estimate, &mut words)?);
+    }
+    if order == 1 && words.thermometer == Some(0) && words.inputs.len() == 1 {
+        // A thermometer that did not move is no input.
+        words.inputs.clear();
+    }
+    Some(Plan {
+        period_s: c.period_s(),
+        inputs: words.inputs,
+        full_scale_dps,
+        terms,
+    })
+}
+
+/// The correction of a plan, its words chosen for the record's noise, and its held-out errors, bit for bit.
+///
+/// # Errors
+/// A plan that cannot become firmware, with the rule.
+pub fn judged(
+    plan: &Plan,
+    record: &ThermalRecord,
+    heldout: &[bool],
+    noise_dps: f64,
+) -> Result<(Correction, FirmwareErrors)> {
+    plan.check()?;
+    let formats = Formats::choose(plan, noise_dps)?;
+    let correction = Correction::new(plan, &formats)?;
+    let readings = readings(plan, record)?;
+    let corrected = correction.run(&readings);
+    let applied = record.column("rate_dps");
+    let rows = corrected.iter().enumerate().zip(heldout);
+    let errors: Vec<f64> = rows
+        .filter(|((_, r), h)| **h && r.is_finite())
+        .map(|((i, r), _)| {
+            let rate = applied.map_or(0.0, |a| if a[i].is_nan() { 0.0 } else { a[i] });
+            r - rate
+        })
+        .collect();
+    Ok((
+        correction,
+        FirmwareErrors {
+            compensable: true,
+            heldout_rms: Some(stats::rms(&errors)),
+            heldout_max_abs: Some(errors.iter().fold(0.0, |m: f64, e| m.max(e.abs()))),
+        },
+    ))
+}

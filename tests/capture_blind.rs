@@ -1,0 +1,143 @@
+//! The closure of captures against a bank of captures whose cause only the bank knows.
+//!
+//! `GYROGEN_BLIND_CAPTURES=N` takes N seeds of each kind instead of the committed number.
+
+mod blind_capture;
+
+use blind_capture::bench::{Bench, Dice};
+use blind_capture::faults::{Fault, Faults};
+use blind_capture::score::{Answer, Confusion, Mark, mark};
+use gyrogen::closure::capture::{self, input::Capture, report::Findings};
+use gyrogen::record::capture_meta::CaptureMeta;
+
+fn seeds(committed: u64) -> u64 {
+    let asked = std::env::var("GYROGEN_BLIND_CAPTURES").ok();
+    asked.and_then(|n| n.parse().ok()).unwrap_or(committed)
+}
+
+fn analysed(bench: &Bench, faults: &Faults) -> Findings {
+    let meta = CaptureMeta {
+        fs_hz: Some(bench.fs_hz),
+        ftw: Some(bench.ftw),
+        adc_bits: Some(bench.bits),
+        drive_amplitude_codes: Some(bench.amplitude),
+        sense_codes_per_dps: Some(bench.codes_per_dps),
+        sense_phase_rad: Some(bench.sense_phase),
+        rate_dps: bench
+            .rate_known
+            .then_some(bench.in_phase / bench.codes_per_dps),
+    };
+    let capture = Capture::new(bench.codes(faults).codes, meta, 16).unwrap();
+    capture::analyse(&capture).unwrap()
+}
+
+fn answer(found: &Findings) -> Answer {
+    let steps = found.steps.iter();
+    Answer {
+        steps: steps
+            .map(|s| (s.effect.clone(), s.indistinguishable_from.clone()))
+            .collect(),
+    }
+}
+
+/// The marks of many captures, two at a time.
+fn run(cases: Vec<(u64, Bench, Faults)>) -> (Vec<Mark>, Confusion) {
+    let next = std::sync::atomic::AtomicUsize::new(0);
+    let done = std::sync::Mutex::new(Vec::new());
+    std::thread::scope(|scope| {
+        for _ in 0..2 {
+            scope.spawn(|| {
+                loop {
+                    let k = next.fetch_add(1, std::sync::atomic::Ordering::SeqCst);
+                    let Some((seed, bench, faults)) = cases.get(k) else {
+                        break;
+                    };
+                    let answer = answer(&analysed(bench, faults));
+                    done.lock().unwrap().push((*seed, faults.clone(), answer));
+                }
+            });
+        }
+    });
+    let mut done = done.into_inner().unwrap();
+    done.sort_by_key(|d| d.0);
+    let mut confusion = Confusion::default();
+    let marks = done.iter().map(|(seed, faults, answer)| {
+        let truth: Vec<&str> = faults.0.iter().map(Fault::id).collect();
+        let mark = mark(answer, &truth);
+        if !mark.first || !mark.all || mark.extra > 0 {
+            println!(
+                "seed {seed}: {:?} was answered by {:?}",
+                faults.0, answer.steps
+            );
+        }
+        confusion.add(&truth.join("+"), answer);
+        mark
+    });
+    let marks = marks.collect();
+    println!("{}", confusion.table());
+    (marks, confusion)
+}
+
+fn share(marks: &[Mark], of: impl Fn(&Mark) -> bool) -> f64 {
+    marks.iter().filter(|m| of(m)).count() as f64 / marks.len().max(1) as f64
+}
+
+#[test]
+fn single_effects_are_named() {
+    let cases = (1000..1000 + seeds(66)).filter_map(|seed| {
+        let mut bench = Bench::draw(seed);
+        let mut dice = Dice::new(seed.wrapping_mul(77) + 5);
+        let kind = (seed % 11) as usize;
+        bench.rate_known |= kind == 7;
+        bench.noise_after &= kind != 3;
+        let top = 3.0 * (2.0 * bench.rows as f64).sqrt();
+        let z = dice.spread(10.0, top.max(20.0));
+        let fault = Fault::draw(&bench, kind, z, &mut dice)?;
+        Some((seed, bench, Faults::of(vec![fault])))
+    });
+    let (marks, _) = run(cases.collect());
+    assert!(marks.len() > 40, "{}", marks.len());
+    let first = share(&marks, |m| m.first);
+    let extra = share(&marks, |m| m.extra > 0);
+    println!(
+        "{} singles: first {first:.3}, with more {extra:.3}",
+        marks.len()
+    );
+    assert!(first >= 0.95 && extra <= 0.06, "{first} {extra}");
+}
+
+#[test]
+fn clean_captures_name_nothing() {
+    let cases = (5000..5000 + seeds(60)).map(|seed| {
+        let mut bench = Bench::draw(seed);
+        let mut dice = Dice::new(seed);
+        if seed % 4 == 0 {
+            bench.wander = dice.spread(1e-5, 1e-3);
+        }
+        (seed, bench, Faults::none())
+    });
+    let (marks, _) = run(cases.collect());
+    let wrong = marks.iter().filter(|m| m.extra > 0).count();
+    println!("{} clean: {wrong} named something", marks.len());
+    // One in a hundred is the promise: more than four times that in a few is a failure.
+    assert!(wrong <= 1 + marks.len() / 50, "{wrong} of {}", marks.len());
+}
+
+#[test]
+fn pairs_are_named_in_full() {
+    let cases = (9000..9000 + seeds(40)).filter_map(|seed| {
+        let bench = Bench::draw(seed);
+        let mut dice = Dice::new(seed.wrapping_mul(31) + 3);
+        let (a, b) = (dice.below(11), dice.below(11));
+        let top = (1.5 * (2.0 * bench.rows as f64).sqrt()).max(40.0);
+        let sizes = [dice.spread(20.0, top), dice.spread(20.0, top)];
+        let first = Fault::draw(&bench, a, sizes[0], &mut dice)?;
+        let second = Fault::draw(&bench, b, sizes[1], &mut dice)?;
+        (first.id() != second.id()).then(|| (seed, bench, Faults::of(vec![first, second])))
+    });
+    let (marks, _) = run(cases.collect());
+    let first = share(&marks, |m| m.first);
+    let all = share(&marks, |m| m.all);
+    println!("{} pairs: first {first:.3}, both {all:.3}", marks.len());
+    assert!(first >= 0.9 && all >= 0.7, "{first} {all}");
+}
