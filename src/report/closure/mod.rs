@@ -56,7 +56,7 @@ pub fn html(closed: &Closed, name: &str) -> Result<String> {
     let page = Page {
         name: name.to_owned(),
         headline: tables::headline(c),
-        finding: tables::finding(c),
+        finding: tables::finding(&view),
         flag: match c.verdict {
             Verdict::Complete => ["good", "complete"],
             Verdict::Explained => ["good", "explained"],

@@ -1,8 +1,10 @@
 //! A closure in words and tables.
 
+use super::view::View;
 use crate::closure::close::Closed;
 use crate::closure::effects::Sheet;
 use crate::closure::verdict::{Closure, Errors, Fate, Step, Verdict};
+use crate::record::stats;
 use crate::report::text::{fixed, grouped, minus, significant, trimmed};
 
 /// A step as the page shows it.
@@ -46,6 +48,9 @@ pub struct Told {
     /// Why.
     pub remark: String,
 }
+
+/// Noise floors from which on a held-out error is more than white noise.
+const SLOW: f64 = 2.0;
 
 /// A figure of error with three digits.
 pub fn value(of: f64) -> String {
@@ -109,12 +114,22 @@ pub fn headline(c: &Closure) -> String {
 }
 
 /// What follows from it.
-pub fn finding(c: &Closure) -> String {
+pub fn finding(view: &View) -> String {
+    let c = &view.closed.closure;
     let mut out = format!(
         "The noise floor is {} {} rms.",
         value(c.noise_floor_rms),
         c.unit
     );
+    if !c.residual_structure.left && c.after.heldout_rms > SLOW * c.noise_floor_rms {
+        let rows = view.after.iter().zip(&view.closed.split.heldout);
+        let held: Vec<f64> = rows.filter(|(_, h)| **h).map(|(r, _)| *r).collect();
+        out += if stats::robust_std(&held) > 0.75 * SLOW * c.noise_floor_rms {
+            " What the held-out error has beyond it is slow noise (1/f or a walk), which no model of the channels removes."
+        } else {
+            " What the held-out error has beyond it is due to a few readings that stand out."
+        };
+    }
     if let Some(channel) = &c.residual_structure.strongest_channel {
         out += &format!(" What is left shows most in {channel}.");
     }

@@ -16,7 +16,7 @@ pub const DRAWN: usize = 600;
 const STANDS_OUT: f64 = 8.0;
 
 /// Share of the readings that may stand out; more are no accidents.
-const ACCIDENTS: f64 = 0.02;
+const ACCIDENTS: f64 = 0.06;
 
 /// A closure with what is drawn of it.
 pub struct View<'a> {
@@ -28,16 +28,20 @@ pub struct View<'a> {
     pub after: Vec<f64>,
     /// Of each step.
     pub contributions: Vec<Contribution>,
+    /// Rows that set the axes: those that do not stand out from [`View::after`].
+    usual: Vec<bool>,
 }
 
 impl<'a> View<'a> {
     /// Computes residuals and contributions.
     pub fn new(closed: &'a Closed) -> Self {
         let c = &closed.channels;
+        let after = closed.after.residual(c);
         View {
             closed,
             before: closed.before.residual(c),
-            after: closed.after.residual(c),
+            usual: usual(&after),
+            after,
             contributions: contribution::all(c, &closed.after),
         }
     }
@@ -125,11 +129,12 @@ impl<'a> View<'a> {
         }
     }
 
-    /// The axis of a residual: readings that stand out alone do not set it.
+    /// The axis of a residual, one value a row: readings that stand out alone do not set it.
     pub fn residual_axis(&self, quantity: &str, series: &[&[f64]]) -> Axis {
-        let usual = series.iter().flat_map(|values| usual(values));
+        let rows = series.iter().flat_map(|s| s.iter().zip(&self.usual));
+        let shown = rows.filter(|(_, usual)| **usual).map(|(v, _)| *v);
         Axis {
-            interval: Interval::of(usual.chain([0.0])).padded(0.07),
+            interval: Interval::of(shown.chain([0.0])).padded(0.07),
             quantity: quantity.to_owned(),
             unit: self.closed.closure.unit.to_owned(),
         }
@@ -149,23 +154,17 @@ impl<'a> View<'a> {
     }
 }
 
-/// The values that an axis has to show.
-fn usual(values: &[f64]) -> Vec<f64> {
+/// Which values an axis has to show: all, but for a few that stand out.
+fn usual(values: &[f64]) -> Vec<bool> {
     let finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
-    let (centre, limit) = (
-        stats::median(&finite),
-        STANDS_OUT * stats::robust_std(&finite),
-    );
-    let kept: Vec<f64> = finite
-        .iter()
-        .copied()
-        .filter(|v| (v - centre).abs() <= limit)
-        .collect();
-    let left = (finite.len() - kept.len()) as f64;
-    if limit > 0.0 && left <= ACCIDENTS * finite.len() as f64 {
+    let centre = stats::median(&finite);
+    let limit = STANDS_OUT * stats::robust_std(&finite);
+    let kept: Vec<bool> = values.iter().map(|v| (v - centre).abs() <= limit).collect();
+    let left = finite.len() - kept.iter().filter(|k| **k).count();
+    if limit > 0.0 && left as f64 <= ACCIDENTS * finite.len() as f64 {
         kept
     } else {
-        finite
+        vec![true; values.len()]
     }
 }
 
@@ -233,12 +232,13 @@ mod tests {
     fn single_readings_do_not_set_an_axis_but_structure_does() {
         let mut values: Vec<f64> = (0..500).map(|i| f64::from(i % 10)).collect();
         values[7] = 1e4;
-        assert!(usual(&values).iter().all(|v| *v < 10.0));
-        // A twentieth of the record is no accident.
-        for v in &mut values[100..125] {
+        let shown = usual(&values);
+        assert!(shown.iter().enumerate().all(|(i, s)| *s == (i != 7)));
+        // A tenth of the record is no accident.
+        for v in &mut values[100..150] {
             *v = 1e4;
         }
-        assert_eq!(usual(&values).len(), 500);
-        assert_eq!(usual(&[2.0; 9]).len(), 9);
+        assert_eq!(usual(&values), [true; 500]);
+        assert_eq!(usual(&[2.0; 9]), [true; 9]);
     }
 }
