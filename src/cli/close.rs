@@ -5,7 +5,9 @@ use crate::closure::capture;
 use crate::closure::close::{self, Closed};
 use crate::closure::search::Effort;
 use crate::closure::verdict::{Closure, Verdict};
+use crate::correction::Planned;
 use crate::correction::firmware::{self, Origin};
+use crate::design::Design;
 use crate::emit::views::Language;
 use crate::error::Result;
 use std::io::IsTerminal;
@@ -57,7 +59,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let command = called("record", path);
         let (record, warnings) = crate::record::read_any(path, &design.record)?;
         let closed = close::close(&record, warnings, &design, &command, Effort::default())?;
-        write(&closed, path, out)?;
+        write(&closed, path, &design, out)?;
         closed.closure
     } else {
         return Ok(());
@@ -75,7 +77,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 }
 
 /// The report, and the correction's sources where there is one.
-fn write(closed: &Closed, path: &Path, out: &Path) -> Result<()> {
+fn write(closed: &Closed, path: &Path, design: &Design, out: &Path) -> Result<()> {
     let name = path.file_name().unwrap_or(path.as_os_str());
     let page = crate::report::closure::html(closed, &name.to_string_lossy())?;
     let mut bundles = Vec::new();
@@ -93,6 +95,14 @@ fn write(closed: &Closed, path: &Path, out: &Path) -> Result<()> {
         }
     }
     super::make_folder(out)?;
+    if let Some(correction) = &closed.correction {
+        let planned = Planned {
+            plan: correction.plan.clone(),
+            noise_dps: correction.formats.noise_dps,
+        };
+        let text = crate::job::fitted_design::with_correction(design, &planned);
+        crate::output::write_whole(&out.join("design.toml"), text.as_bytes())?;
+    }
     for (files, folder) in &bundles {
         crate::emit::files::write(files, &out.join(folder))?;
     }

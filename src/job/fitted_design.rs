@@ -1,5 +1,6 @@
 //! The design with the fitted compensation as a design file of its own: what reproduces the firmware.
 
+use crate::correction::Planned;
 use crate::design::{Compensation, CompensationInput, Design, Outside};
 use crate::numeric::format::Quantizer;
 use std::fmt::Write as _;
@@ -7,7 +8,7 @@ use std::fmt::Write as _;
 /// The text of the user's design (or of the default) with its `[compensation]` replaced by the one
 /// that was fitted.
 pub fn text(design: &Design) -> String {
-    let mut text = without_compensation(&design.source.text);
+    let mut text = without(&design.source.text, "compensation");
     if let Some(c) = &design.compensation {
         text = text.trim_end().to_owned();
         text += "\n\n# Fitted; the calibrated range is clamp_raw.\n";
@@ -16,15 +17,25 @@ pub fn text(design: &Design) -> String {
     text
 }
 
-/// Cuts the table `[compensation]`, and its subtables, out of a design's text.
-fn without_compensation(text: &str) -> String {
+/// The text of the user's design (or of the default) with a correction: the augmented model as a design file.
+pub fn with_correction(design: &Design, planned: &Planned) -> String {
+    let text = without(&design.source.text, "correction");
+    format!(
+        "{}\n\n# What a closure found, as firmware carries it.\n{}",
+        text.trim_end(),
+        planned.to_toml()
+    )
+}
+
+/// Cuts a table, and its subtables, out of a design's text.
+fn without(text: &str, table: &str) -> String {
     let mut kept = String::new();
     let mut inside = false;
     for line in text.lines() {
         let start = line.trim_start();
-        if start.starts_with('[') && !start.starts_with("[[") {
+        if start.starts_with('[') {
             let name = start.trim_start_matches('[').trim_start();
-            let rest = name.strip_prefix("compensation");
+            let rest = name.strip_prefix(table);
             let ends = |r: &str| r.trim_start().starts_with([']', '.']);
             inside = rest.is_some_and(ends);
         }
