@@ -106,12 +106,7 @@ impl Words {
                         .collect()
                 })
                 .collect();
-            let basis = Basis::new(
-                &shapes
-                    .iter()
-                    .map(|s: &Vec<f64>| s.clone())
-                    .collect::<Vec<_>>(),
-            );
+            let basis = Basis::new(&shapes);
             let mut rest = target.clone();
             let z = basis.project_off(&mut rest);
             if dot(&rest, &rest) > SURFACE * SURFACE * dot(&target, &target) {

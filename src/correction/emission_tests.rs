@@ -6,6 +6,7 @@ use super::*;
 use crate::emit::files;
 use crate::emit::views::Language;
 use crate::verify::bundle::verify;
+use crate::verify::target::Target;
 
 const ORIGIN: Origin = Origin {
     prefix: "tested",
@@ -39,7 +40,7 @@ fn a_bundle_verifies_from_its_files_and_damage_to_a_constant_shows() {
         assert_eq!(emitted, emit(&correction, &ORIGIN, language).unwrap());
         let folder = tempfile::tempdir().unwrap();
         files::write(&emitted, folder.path()).unwrap();
-        let good = verify(folder.path(), "test").unwrap();
+        let good = verify(folder.path(), Target::Host, "test").unwrap();
         assert!(good.holds && good.selftest == Some(true), "{good:?}");
         assert!(
             good.functions
@@ -62,7 +63,7 @@ fn a_bundle_verifies_from_its_files_and_damage_to_a_constant_shows() {
         for (k, share) in ks.flat_map(|k| [(k, 256), (k, i64::MAX)]) {
             let (what, damaged) = damage(&file.text, language, k, share);
             std::fs::write(folder.path().join(source), damaged).unwrap();
-            let bad = verify(folder.path(), "test").unwrap();
+            let bad = verify(folder.path(), Target::Host, "test").unwrap();
             if bad.vectors.mismatches == 0 {
                 unseen.push((what, share));
             }

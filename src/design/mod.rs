@@ -12,6 +12,7 @@ mod effect_catalogue;
 pub mod effects;
 mod keys;
 pub mod limits;
+mod log_axis;
 pub mod reader;
 pub mod schema;
 pub(crate) mod suggest;

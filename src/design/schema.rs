@@ -2,6 +2,7 @@
 //! `docs/manual.md`; their meaning is stated there and only summarised here.
 
 use super::effects::Effects;
+pub use super::log_axis::LogAxis;
 use crate::correction::Planned;
 use crate::numeric::format::{Format, Overflow, Quantizer, Rounding, pow2};
 use std::collections::BTreeMap;
@@ -457,34 +458,6 @@ pub struct RecordMapping {
     /// `average_s`: s of samples that are averaged into a row; default: 1 s for an autopilot's
     /// log, the rows as they are for CSV.
     pub average_s: Option<f64>,
-}
-
-/// An axis of a gyro with three.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum LogAxis {
-    /// The first.
-    X,
-    /// The second.
-    Y,
-    /// The third.
-    #[default]
-    Z,
-}
-
-impl LogAxis {
-    /// 0, 1 or 2.
-    pub fn index(self) -> usize {
-        match self {
-            LogAxis::X => 0,
-            LogAxis::Y => 1,
-            LogAxis::Z => 2,
-        }
-    }
-
-    /// `x`, `y` or `z`.
-    pub fn name(self) -> &'static str {
-        ["x", "y", "z"][self.index()]
-    }
 }
 
 /// `[fit]`: how the compensation is fitted.

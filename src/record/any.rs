@@ -16,7 +16,7 @@ const BUFFER_BYTES: usize = 1 << 18;
 /// Of a log, `mapping` chooses axis, gyro and rows.
 ///
 /// # Errors
-/// As [`thermal::read`], [`ulog::read`] and [`dataflash::read`]; a file that is named as a log and
+/// As [`thermal::read`], `ulog::read` and `dataflash::read`; a file that is named as a log and
 /// is none.
 pub fn read_any(path: &Path, mapping: &RecordMapping) -> Result<(ThermalRecord, Vec<Warning>)> {
     let failed = |e: std::io::Error| io_error(path, "read the record", &e);

@@ -1,7 +1,7 @@
 //! Where a bundle's code is built for and run: this machine, or a processor under emulation.
 //!
 //! The cross targets are compiled by a compiler for bare metal, with the processor's own instructions and without a
-//! C library; [`RUNTIME`] has the few functions that the test driver needs. qemu's user mode executes them: the
+//! C library; `RUNTIME` has the few functions that the test driver needs. qemu's user mode executes them: the
 //! instructions are the processor's, its clock and memory are not, and cycles are not counted.
 
 use super::toolchain::{self, C_FLAGS, Harness};

@@ -40,7 +40,7 @@ pub enum Shape {
     Cubic,
     Mixed,
     Bow,
-    SShape,
+    Sigmoid,
     Steps(u32),
 }
 
@@ -50,7 +50,7 @@ impl Shape {
             Shape::Cubic => u.powi(3),
             Shape::Mixed => 0.6 * u * u - 0.8 * u.powi(3),
             Shape::Bow => (0.5 * PI * u).cos(),
-            Shape::SShape => (PI * u).sin(),
+            Shape::Sigmoid => (PI * u).sin(),
             Shape::Steps(n) => {
                 let place = (0.5 + 0.5 * u) * f64::from(n);
                 let k = place.floor() as i64;
@@ -103,7 +103,7 @@ impl Fault {
                     Shape::Cubic,
                     Shape::Mixed,
                     Shape::Bow,
-                    Shape::SShape,
+                    Shape::Sigmoid,
                     Shape::Steps(16),
                 ];
                 Fault::Inl(1.0, shapes[d.below(5)])
@@ -140,13 +140,13 @@ impl Fault {
                 let bits = 4 + d.below(9) as u32;
                 let fault = Fault::Truncation(bits);
                 let seen = bench.visible(&Faults::of(vec![fault.clone()]));
-                let lost = bench.ftw % (1 << (32 - bits)) != 0;
+                let lost = !bench.ftw.is_multiple_of(1 << (32 - bits));
                 return (lost && seen > z).then_some(fault);
             }
             10 => {
                 let bits = 4 + d.below(8) as u32;
                 let k = (1i64 << bits) * if d.odds(0.5) { 1 } else { -1 } + 1;
-                if bench.ftw % (1 << (32 - bits)) == 0 {
+                if bench.ftw.is_multiple_of(1 << (32 - bits)) {
                     return None;
                 }
                 Fault::SpurLine(1.0, k)

@@ -165,12 +165,16 @@ impl Candidate for TemperatureRate {
         if e.point.form >= SLOPES.len() {
             return None;
         }
-        // Firmware has no readings to come: a backward difference, half as long, is half as late.
-        Some(vec![Term::Slope {
-            gain_dps_s: e.beta.first()? * c.span_s(),
-            input: f.thermometer()?,
-            rows: SLOPES[e.point.form] as u32,
-        }])
+        // Firmware has no readings to come. Twice the difference over k readings less that over 2 k is late
+        // in second order only.
+        let gain = e.beta.first()? * c.span_s();
+        let (input, rows) = (f.thermometer()?, SLOPES[e.point.form] as u32);
+        let slope = |gain_dps_s: f64, rows: u32| Term::Slope {
+            gain_dps_s,
+            input,
+            rows,
+        };
+        Some(vec![slope(2.0 * gain, rows), slope(-gain, 2 * rows)])
     }
 
     fn report(&self, c: &Channels, e: &Estimate) -> Reported {

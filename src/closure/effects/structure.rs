@@ -130,8 +130,8 @@ impl Candidate for ModeCrossing {
         let (centre, width) = (point.theta[0], point.theta[1].exp());
         let at = |u: f64| (u - centre) / width;
         vec![
-            map(&c.smooth_u, |u| 1.0 / (1.0 + at(u).powi(2))),
-            map(&c.smooth_u, |u| 2.0 * at(u) / (1.0 + at(u).powi(2))),
+            map(&c.u, |u| 1.0 / (1.0 + at(u).powi(2))),
+            map(&c.u, |u| 2.0 * at(u) / (1.0 + at(u).powi(2))),
         ]
     }
 

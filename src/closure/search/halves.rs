@@ -76,7 +76,7 @@ impl Search<'_> {
     }
 }
 
-/// Which rows are in the first half: half of [`SEGMENTS`] stretches, drawn by the pair's number.
+/// Which rows are in the first half: half of sixteen stretches, drawn by the pair's number.
 fn half(rows: usize, pair: usize) -> Vec<bool> {
     const SEGMENTS: usize = 16;
     let stream = Stream::new(77, pair as u64);
