@@ -1,16 +1,16 @@
 //! The rounds of the fit: noise, lines and nonlinear parts around the model, then the set of effects.
 
-use super::around::{add_lines, add_slow_mains, around, spectrum_of, spread};
 use super::candidates::{Effect, Known, Variant, base, base_ridge, variants};
 use super::clipping::{self, Limits};
-use super::columns::{ALL, Model, Variance};
-use super::gram::{Combo, Detail, Gram, solve};
-use super::input::Capture;
+use super::columns::{ALL, COS, Model, ONE, Rows, SIN, TRUNCATED, Variance, chunks, harmonic};
+use super::gram::{Combo, Detail, Gram, Solved, solve};
+use super::input::{Capture, Part};
 use super::missing::{self, Missing};
-use super::quantiser::{drop_tiny, find_steps, is_sharp, settle};
 use super::search::Search;
+use super::spectrum::{self, Spectrum};
 use super::tone::{Phases, Tone};
-use super::{feedthrough, jitter, truncation, wander};
+use super::wander::{self, Series};
+use super::{feedthrough, jitter, mains, nonlinearity, truncation};
 
 /// Least variance of a channel's noise, codes squared: nearly that of an ideal quantiser's error, whose
 /// pattern is not white without noise.
@@ -77,6 +77,197 @@ pub fn declared(capture: &Capture, known: &Known, tone: Tone) -> Model {
             jitter: 0.0,
         },
         span_codes: 1.02 * f64::from(largest.unwrap_or(1).max(1)),
+    }
+}
+
+/// Residuals at coefficients, 0 where limited; of all rows, or of the training rows alone.
+pub fn residuals(
+    capture: &Capture,
+    model: &Model,
+    coefficients: &[Vec<f64>; 2],
+    all: bool,
+) -> [Vec<f64>; 2] {
+    let n = capture.rows();
+    let mut out = [vec![0.0; n], vec![0.0; n]];
+    let mut rows = Rows::new();
+    let wanted = |p: Part| all || p != Part::HeldOut;
+    for segment in capture.segments.iter().filter(|s| wanted(s.part)) {
+        for chunk in chunks(segment.rows.clone()) {
+            let start = chunk.start;
+            let count = chunk.len();
+            rows.fill(capture, model, chunk);
+            for (channel, out) in out.iter_mut().enumerate() {
+                for (i, out) in out.iter_mut().skip(start).take(count).enumerate() {
+                    if rows.weight[channel][i] > 0.0 {
+                        let value = rows.value(channel, i, &coefficients[channel]);
+                        *out = rows.target[channel][i] - value;
+                    }
+                }
+            }
+        }
+    }
+    out
+}
+
+/// Coefficients by channel and column out of combos.
+pub fn spread(combos: &[&Combo], solved: &Solved) -> [Vec<f64>; 2] {
+    let mut out = [vec![0.0; ALL], vec![0.0; ALL]];
+    for (combo, value) in combos.iter().zip(&solved.coefficients) {
+        for (channel, column, factor) in &combo.parts {
+            if let Some(v) = out[*channel].get_mut(*column) {
+                *v += factor * value;
+            }
+        }
+    }
+    out
+}
+
+/// A generous description of all that goes with the phase, and of the lines known so far; tables of both
+/// channels come last, [`TABLES`] columns.
+fn generous(base: &[Combo], model: &Model) -> Vec<Combo> {
+    let mut out = base.to_vec();
+    for channel in 0..2 {
+        let mut one = |k: usize| out.push(Combo::one("", channel, k));
+        [ONE, SIN, COS].into_iter().for_each(&mut one);
+        for k in 2..=super::columns::HARMONICS {
+            let (sin, cos) = harmonic(k);
+            one(sin);
+            one(cos);
+        }
+        for i in 0..model.lines.len() {
+            let (sin, cos) = super::columns::line(i);
+            one(sin);
+            one(cos);
+        }
+        if model.truncation.is_some() {
+            one(TRUNCATED);
+            one(TRUNCATED + 1);
+        }
+    }
+    for channel in 0..2 {
+        out.extend(nonlinearity::table(model, 4, &[channel]));
+    }
+    out
+}
+
+/// Columns of the tables in a generous description.
+const TABLES: usize = 66;
+
+/// What is known of the noise and of the tones, around a model.
+struct Around {
+    residuals: [Vec<f64>; 2],
+    training: [Vec<f64>; 2],
+    free: [[f64; 2]; 2],
+    noise: [f64; 2],
+}
+
+fn around(capture: &Capture, model: &mut Model, base: &[Combo], neutral: bool) -> Around {
+    let gram = Gram::of(capture, model);
+    let combos = generous(base, model);
+    let combos: Vec<&Combo> = combos.iter().collect();
+    let mut ridge = base_ridge(base);
+    ridge.resize(combos.len(), 0.0);
+    let solved = solve(gram.all(), &combos, &ridge, Detail::All);
+    let coefficients = spread(&combos, &solved);
+    // Tables contain the tone: what it is comes from the fit without them.
+    let few = combos.len().saturating_sub(TABLES);
+    let (fewer, less) = (combos.get(..few), ridge.get(..few));
+    let fewer = fewer.unwrap_or_default();
+    let without = solve(gram.all(), fewer, less.unwrap_or_default(), Detail::All);
+    let plain = spread(fewer, &without);
+    let mut free = model.declared;
+    for (free, coefficients) in free.iter_mut().zip(&plain) {
+        for (value, column) in free.iter_mut().zip([SIN, COS]) {
+            *value += coefficients.get(column).copied().unwrap_or(0.0);
+        }
+    }
+    let residuals = residuals(capture, model, &coefficients, true);
+    if neutral {
+        // Without the tables, unless they are needed: where the codes are is then known better.
+        let needed = solved.gain - without.gain > 2.0 * TABLES as f64;
+        model.neutral = if needed { coefficients } else { plain };
+    }
+    let mut training = residuals.clone();
+    for segment in capture.segments.iter().filter(|s| s.part == Part::HeldOut) {
+        for channel in &mut training {
+            if let Some(rows) = channel.get_mut(segment.rows.clone()) {
+                rows.fill(0.0);
+            }
+        }
+    }
+    let spectrum = spectrum_of(capture, &training);
+    let noise = [0, 1].map(|c: usize| spectrum.variance(c).max(LEAST_VARIANCE));
+    Around {
+        residuals,
+        training,
+        free,
+        noise,
+    }
+}
+
+fn spectrum_of(capture: &Capture, training: &[Vec<f64>; 2]) -> Spectrum {
+    let [drive, sense] = training;
+    Spectrum::of([drive, sense], capture.training_rows())
+}
+
+/// Looks for new lines; true if any was added. Besides the strongest, those are taken that are no sidelobe
+/// of a stronger one.
+fn add_lines(capture: &Capture, model: &mut Model, around: &Around) -> bool {
+    let rows = capture.rows() as f64;
+    let spectrum = spectrum_of(capture, &around.training);
+    let [drive, sense] = &around.training;
+    let before = model.lines.len();
+    let mut stronger: Vec<spectrum::Line> = Vec::new();
+    for line in spectrum.lines(&model.tone, 12, 3.0, [LEAST_VARIANCE; 2]) {
+        if model.lines.len() >= super::columns::LINES {
+            break;
+        }
+        // A line that is known is not found again: its rest is the frequency's error.
+        let known = model
+            .lines
+            .iter()
+            .any(|t| (t - line.turns).abs() * rows < 1.0);
+        let sidelobe = stronger.iter().any(|s| {
+            let apart = (s.turns - line.turns) * rows;
+            apart.abs() < 8.0 || line.surprise * apart * apart < 4.0 * s.surprise
+        });
+        if !known && !sidelobe {
+            let turns = spectrum::refine([drive, sense], around.noise, line.turns);
+            model.lines.push(turns);
+            stronger.push(line);
+        }
+    }
+    model.lines.len() > before
+}
+
+/// Adds the mains' own frequencies where they are too slow for the spectrum.
+fn add_slow_mains(
+    capture: &Capture,
+    known: &Known,
+    model: &mut Model,
+    series: &[Option<Series>; 2],
+) {
+    let Some(fs) = known.fs_hz else { return };
+    let rows = capture.rows();
+    let mut best: Option<(f64, f64)> = None;
+    for hz in mains::MAINS_HZ {
+        let turns = hz / fs;
+        let periods = turns * rows as f64;
+        let is_new = model
+            .lines
+            .iter()
+            .all(|t| (t - turns).abs() * rows as f64 > 0.7);
+        if (0.1..4.0).contains(&periods) && is_new {
+            let gain = wander::slow_line_gain(series, rows, turns);
+            if gain > 15.0 && best.is_none_or(|b| gain > b.0) {
+                best = Some((gain, turns));
+            }
+        }
+    }
+    if let Some((_, turns)) = best
+        && model.lines.len() < super::columns::LINES
+    {
+        model.lines.push(turns);
     }
 }
 
@@ -155,9 +346,7 @@ pub fn rounds(capture: &Capture, known: &Known, start: &Model) -> Fitted {
         let coupled = feedthrough::is_coupled(capture, &model, [drive, sense]);
         let variants = variants(known, &model, seen.free, capture.rows(), coupled);
         let mut search = Search::new(gram.all(), &base, &nuisance, &variants);
-        let (mut set, _) = search.best();
-        drop_tiny(capture, &model, &search, &mut set);
-        let objective = search.objective(&set);
+        let (set, objective) = search.best();
         let (combos, solved) = search.solution(&set);
         let coefficients = spread(&combos, &solved);
         let sharp = is_sharp(&coefficients, &model);
@@ -204,6 +393,63 @@ pub fn rounds(capture: &Capture, known: &Known, start: &Model) -> Fitted {
         base,
         model,
     })
+}
+
+/// Whether the quantiser's error shows undithered in a channel: the place of the steps then matters.
+fn is_sharp(coefficients: &[Vec<f64>; 2], model: &Model) -> bool {
+    coefficients
+        .iter()
+        .zip(model.variance.base)
+        .any(|(c, v)| v < 16.0 && c.get(super::columns::SAW).copied().unwrap_or(0.0).abs() > 0.3)
+}
+
+/// Finds where the codes are before anything is chosen, where the quantiser's error shows undithered: of
+/// descriptions of growing freedom, each with the steps at its own signal, the one that gains most.
+fn find_steps(capture: &Capture, model: &mut Model, base: &[Combo]) {
+    if !is_sharp(&model.neutral, model) && !is_sharp(&model.coefficients, model) {
+        return;
+    }
+    let all = generous(base, model);
+    let ridge = base_ridge(base);
+    let mut best: Option<(f64, [Vec<f64>; 2])> = None;
+    for count in [base.len(), all.len().saturating_sub(TABLES), all.len()] {
+        let combos: Vec<&Combo> = all.iter().take(count).collect();
+        let mut ridge = ridge.clone();
+        ridge.resize(combos.len(), 0.0);
+        let mut trial = model.clone();
+        trial.neutral.clone_from(&model.coefficients);
+        let mut gain = 0.0;
+        for _ in 0..4 {
+            let gram = Gram::of(capture, &trial);
+            let solved = solve(gram.all(), &combos, &ridge, Detail::All);
+            trial.neutral = spread(&combos, &solved);
+            gain = solved.gain - 2.0 * solved.rank as f64;
+        }
+        if best.as_ref().is_none_or(|b| gain > b.0) {
+            best = Some((gain, trial.neutral));
+        }
+    }
+    if let Some((_, neutral)) = best {
+        model.neutral = neutral;
+    }
+}
+
+/// Fits a set again until the quantiser's steps are where its own signal puts them.
+fn settle(
+    capture: &Capture,
+    model: &mut Model,
+    base: &[Combo],
+    nuisance: &[(Combo, f64)],
+    variants: &[Variant],
+    set: &[usize],
+) {
+    for _ in 0..2 {
+        let gram = Gram::of(capture, model);
+        let search = Search::new(gram.all(), base, nuisance, variants);
+        let (combos, solved) = search.solution(set);
+        model.coefficients = spread(&combos, &solved);
+        model.neutral.clone_from(&model.coefficients);
+    }
 }
 
 /// Whether a round changed nothing of the choice and little of the tones.

@@ -25,8 +25,7 @@ pub fn variants(known: &Known, model: &Model) -> Vec<Variant> {
             let both = Combo::new("relative", 1.0, &parts);
             out.push(Variant::new(Effect::Gain, vec![both], 0.0));
             let drive = Combo::new("drive_relative", 1.0, &drive);
-            // Two gains are two causes nearly.
-            out.push(Variant::new(Effect::Gain, vec![drive, alone], 8.0));
+            out.push(Variant::new(Effect::Gain, vec![drive, alone], 0.0));
         }
     }
     out

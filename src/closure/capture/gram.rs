@@ -196,28 +196,6 @@ fn product(sums: &[Vec<f64>; 2], a: &Combo, b: &Combo) -> f64 {
     out
 }
 
-/// Weighted sum of squares, by channel, of a sum of combos.
-pub fn energy(sums: &[Vec<f64>; 2], combos: &[&Combo], values: &[f64]) -> [f64; 2] {
-    let mut columns = [vec![0.0; ALL], vec![0.0; ALL]];
-    for (combo, value) in combos.iter().zip(values) {
-        for (channel, column, factor) in &combo.parts {
-            columns[*channel][*column] += factor * value;
-        }
-    }
-    [0, 1].map(|c: usize| {
-        let used: Vec<(usize, f64)> = columns[c].iter().copied().enumerate().collect();
-        let used: Vec<_> = used.into_iter().filter(|(_, v)| *v != 0.0).collect();
-        let mut sum = 0.0;
-        for (a, va) in &used {
-            sum += used
-                .iter()
-                .map(|(b, vb)| va * vb * sums[c][a * SIDE + b])
-                .sum::<f64>();
-        }
-        sum.max(0.0)
-    })
-}
-
 /// Weighted least squares of the target on combos; `ridge` is one over the prior variance of each
 /// (0: free). Combos that lie in the span of those before them are left out.
 pub fn solve(sums: &[Vec<f64>; 2], combos: &[&Combo], ridge: &[f64], detail: Detail) -> Solved {

@@ -52,22 +52,11 @@ pub fn search_cost(known: &Known, turns: f64, rows: usize) -> f64 {
 /// The first line, the first two and so on, in both channels or one.
 pub fn variants(known: &Known, model: &Model, rows: usize) -> Vec<Variant> {
     let own: Vec<usize> = (0..model.lines.len())
-        .filter(|i| !spur::is_spur(known, model, *i, rows) && !is_on_grid(model, *i, rows))
+        .filter(|i| !spur::is_spur(known, model, *i, rows))
         .collect();
     groups(model, &own, Effect::Mains, &|turns| {
         search_cost(known, turns, rows)
     })
-}
-
-/// Whether line i is a harmonic of a coherent tone, of whatever order: all that goes
-/// with it lies on the grid of its period.
-fn is_on_grid(model: &Model, i: usize, rows: usize) -> bool {
-    let Some(turns) = model.lines.get(i) else {
-        return false;
-    };
-    let period = model.tone.period_rows();
-    let place = turns * period;
-    period * 8.0 < rows as f64 && (place - place.round()).abs() * (rows as f64) < 0.5 * period
 }
 
 /// Leading groups of lines as variants of an effect; `cost` is that of the search for a line's frequency.

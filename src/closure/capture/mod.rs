@@ -10,11 +10,9 @@
 //! [`harmonics`], [`mains`], [`spur`] with [`truncation`]); [`gram`] their sums and least squares;
 //! [`search`] chooses. Outside of the linear part are [`clipping`], [`missing`] (the histogram), [`jitter`] (the
 //! variance). [`spectrum`] gives noise and lines, [`wander`] the slow noise that must not pass for an
-//! effect. [`around`] is what a fit with every freedom leaves, [`quantiser`] the error of rounding where no noise
-//! whitens it. [`fit`] runs all in rounds; [`report`] judges on held-out rows, with [`errors`], [`rivals`],
+//! effect. [`fit`] runs them in rounds; [`report`] judges on held-out rows, with [`errors`], [`rivals`],
 //! [`structure`] and [`firmware`].
 
-pub mod around;
 pub mod candidates;
 pub mod clipping;
 pub mod columns;
@@ -33,7 +31,6 @@ pub mod missing;
 pub mod nonlinearity;
 pub mod normal;
 pub mod offset;
-pub mod quantiser;
 pub mod report;
 pub mod rivals;
 pub mod search;
@@ -166,7 +163,7 @@ fn baseline(capture: &Capture, known: &Known, tone: Tone) -> Model {
             &candidates::base_ridge(&base),
             Detail::All,
         );
-        model.coefficients = around::spread(&combos, &solved);
+        model.coefficients = fit::spread(&combos, &solved);
         model.neutral = model.coefficients.clone();
     }
     model

@@ -7,7 +7,7 @@ use super::gram::Combo;
 
 /// Gain that a free constant or a free slope costs beyond a column: a bend that needs them is the
 /// less natural one, as they are an offset and a gain error.
-const LINE_TERMS: f64 = 3.0;
+const LINE_TERMS: f64 = 5.0;
 
 /// Least distance of knots, codes: closer ones would follow the quantiser's own pattern.
 const LEAST_APART_CODES: f64 = 4.0;
@@ -71,25 +71,20 @@ pub fn variants(known: &Known, model: &Model) -> Vec<Variant> {
             &[2, 4],
             &[2, 3, 4, 5],
         ] {
-            let is_even = orders.iter().any(|k| k % 2 == 0);
-            let is_odd = orders.iter().any(|k| k % 2 == 1);
-            // With a slope of its own if odd, a constant if even (as an end-point line leaves).
-            for (slope, level) in [(false, false), (true, false), (false, true), (true, true)] {
-                if slope && !is_odd || level && !is_even {
-                    continue;
-                }
-                let mut combos = Vec::new();
-                let mut further = further;
-                if slope {
-                    combos.push(power(known, model, 1, channels));
-                    further += LINE_TERMS;
-                }
-                if level {
-                    combos.push(constant(channels));
-                    further += LINE_TERMS;
-                }
-                combos.extend(orders.iter().map(|k| power(known, model, *k, channels)));
-                out.push(Variant::new(Effect::Nonlinearity, combos, further));
+            let of = |lines: usize| {
+                let line = (0..lines).map(|k| match k {
+                    0 => power(known, model, 1, channels),
+                    _ => constant(channels),
+                });
+                let bend = orders.iter().map(|k| power(known, model, *k, channels));
+                let combos = line.chain(bend).collect();
+                let further = further + LINE_TERMS * lines as f64;
+                Variant::new(Effect::Nonlinearity, combos, further)
+            };
+            out.push(of(0));
+            out.push(of(1));
+            if orders.len() > 1 || orders == [2] {
+                out.push(of(2));
             }
         }
         for stride in [8, 4, 1] {

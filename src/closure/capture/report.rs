@@ -1,14 +1,13 @@
 //! From the fit to `closure.json`: steps in order, judged on held-out rows; evidence; what is left.
 
-use super::around::spread;
 use super::candidates::{Effect, Known};
 use super::columns::{ALL, Model};
 use super::errors::{Judged, judge};
-use super::fit::Fitted;
+use super::fit::{Fitted, spread};
 use super::gram::{Combo, Solved};
-use super::input::Capture;
+use super::input::{Capture, Part};
 use super::search::Search;
-use super::{firmware, jitter, rivals, structure};
+use super::{firmware, jitter, mains, rivals, structure};
 use crate::closure::likelihood::tail::chi_square_surprise;
 use crate::closure::verdict::{Errors, Evidence, FirmwareErrors, Step, Structure};
 use crate::record::Warning;
@@ -109,6 +108,7 @@ pub fn findings(capture: &Capture, known: &Known, plain: &Model, fitted: &Fitted
         step.heldout_rms = judged.errors.heldout_rms;
         steps.push(step);
     }
+    let has_jitter = order.iter().any(|o| o.0 == Turn::Jitter);
     let mut last = fitted.model.clone();
     last.coefficients = without_nuisance(fitted, &combos, &solved);
     let after = if order.is_empty() {
@@ -131,6 +131,7 @@ pub fn findings(capture: &Capture, known: &Known, plain: &Model, fitted: &Fitted
         &mut warnings,
     );
     let evidence = rivals::evidence(capture, known, fitted, &mut search, &steps, &taken);
+    let _ = has_jitter;
     Findings {
         before: before.errors,
         steps,
@@ -427,4 +428,15 @@ fn firmware_errors(
         spread(combos, &own)
     };
     firmware::corrected(capture, last, &last.coefficients, &effects)
+}
+
+/// Rows that are held out.
+pub fn heldout_rows(capture: &Capture) -> usize {
+    let held = capture.segments.iter().filter(|s| s.part == Part::HeldOut);
+    held.map(|s| s.rows.len()).sum()
+}
+
+/// Whether a line is that of a power line.
+pub fn is_power_line(known: &Known, turns: f64, rows: usize) -> bool {
+    mains::is_mains(known, turns, 0.5 / rows as f64)
 }

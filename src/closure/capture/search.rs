@@ -62,22 +62,6 @@ impl<'a> Search<'a> {
         (combos, solved)
     }
 
-    /// Of each member of a set what it moves each channel by: sum of squares over variances.
-    pub fn energies(&self, set: &[usize]) -> Vec<[f64; 2]> {
-        let (combos, solved) = self.solution(set);
-        let mut at = self.base.len() + self.nuisance.len();
-        let variants = set.iter().filter_map(|k| self.variants.get(*k));
-        variants
-            .map(|v| {
-                let own = at..at + v.combos.len();
-                at = own.end;
-                let combos = combos.get(own.clone()).unwrap_or_default();
-                let values = solved.coefficients.get(own).unwrap_or_default();
-                super::gram::energy(self.sums, combos, values)
-            })
-            .collect()
-    }
-
     /// The gain of a set beyond the base.
     pub fn gain(&mut self, set: &[usize]) -> f64 {
         let mut key = set.to_vec();

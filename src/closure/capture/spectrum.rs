@@ -24,8 +24,6 @@ pub struct Line {
     pub surprise: f64,
     /// Channel in which it is stronger.
     pub channel: usize,
-    /// Amplitude there, in the residual's unit.
-    pub amplitude: f64,
 }
 
 impl Spectrum {
@@ -149,7 +147,6 @@ impl Spectrum {
                     turns: k as f64 / self.bins as f64,
                     surprise: here.0,
                     channel: here.1,
-                    amplitude: 2.0 * (self.power[here.1].get(k).unwrap_or(&0.0) / self.rows).sqrt(),
                 });
             }
         }

@@ -1,7 +1,7 @@
 //! What is left after the last step: lines, and a mean that goes with the phase or with the code.
 
-use super::around::residuals;
 use super::columns::{CHUNK, Model, Rows, chunks};
+use super::fit::residuals;
 use super::input::Capture;
 use super::spectrum::Spectrum;
 use crate::closure::likelihood::tail::chi_square_surprise;
@@ -18,8 +18,8 @@ const SURPRISE: f64 = 9.2;
 pub fn left(capture: &Capture, model: &Model, coefficients: &[Vec<f64>; 2]) -> Structure {
     let residuals = residuals(capture, model, coefficients, true);
     let mut worst = (SURPRISE, None);
-    for (channel, residual) in residuals.iter().enumerate() {
-        for (surprise, what) in binned(capture, model, channel, residual) {
+    for channel in 0..2 {
+        for (surprise, what) in binned(capture, model, channel, &residuals[channel]) {
             if surprise > worst.0 {
                 let name = ["drive_code", "sense_code"]
                     .get(channel)

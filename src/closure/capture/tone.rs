@@ -46,14 +46,6 @@ impl Tone {
         fold(self.turns)
     }
 
-    /// Rows after which the phases repeat: 2^32 over the largest power of two in the word; infinite where the
-    /// word is not known.
-    pub fn period_rows(&self) -> f64 {
-        let bits = |word: u32| 32 - word.trailing_zeros().min(32) as i32;
-        self.word
-            .map_or(f64::INFINITY, |word| f64::powi(2.0, bits(word)))
-    }
-
     /// Angle a sample with its sign, rad: negative above half the sample rate.
     pub fn angle(&self) -> f64 {
         let turns = self.turns.rem_euclid(1.0);

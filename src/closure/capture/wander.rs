@@ -90,13 +90,13 @@ pub fn strength(modes: &[f64], white: f64) -> (f64, f64) {
 }
 
 /// Variance of the mean coefficient from a wander. A 1/f noise that began a hundred records ago has 4 h in
-/// mode 0; it gets twice that, and a wander that is seen six times, as few modes tell its strength.
+/// mode 0; a wander that is seen gets four times that, as few modes tell its strength.
 pub fn of_mean(series: &Series, column: usize) -> f64 {
     let (Some(values), Some(white)) = (series.values.get(column), series.white.get(column)) else {
         return 0.0;
     };
     let (slow, gain) = strength(&modes(values), *white);
-    let factor = if gain > 3.0 { 25.0 } else { 8.0 };
+    let factor = if gain > 3.0 { 16.0 } else { 4.0 };
     factor * slow / values.len() as f64
 }
 
