@@ -18,8 +18,8 @@ const SURPRISE: f64 = 9.2;
 pub fn left(capture: &Capture, model: &Model, coefficients: &[Vec<f64>; 2]) -> Structure {
     let residuals = residuals(capture, model, coefficients, true);
     let mut worst = (SURPRISE, None);
-    for channel in 0..2 {
-        for (surprise, what) in binned(capture, model, channel, &residuals[channel]) {
+    for (channel, residual) in residuals.iter().enumerate() {
+        for (surprise, what) in binned(capture, model, channel, residual) {
             if surprise > worst.0 {
                 let name = ["drive_code", "sense_code"]
                     .get(channel)
