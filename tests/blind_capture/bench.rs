@@ -163,11 +163,16 @@ impl Bench {
         let angle = TAU * self.ftw as f64 / 4_294_967_296.0;
         let full = self.full_scale();
         let mut codes = [Vec::with_capacity(self.rows), Vec::with_capacity(self.rows)];
-        for row in 0..self.rows {
+        let pairs: Vec<[f64; 2]> = signals[0]
+            .iter()
+            .zip(&signals[1])
+            .map(|(a, b)| [*a, *b])
+            .collect();
+        for (row, pair) in pairs.iter().enumerate().take(self.rows) {
             let common = d.gauss();
             let mut noise = [d.gauss() * self.noise[0], d.gauss() * self.noise[1]];
             for channel in 0..2 {
-                let mut x = signals[channel][row];
+                let mut x = pair[channel];
                 let jitter = faults.jitter();
                 if jitter > 0.0 {
                     let late = jitter
