@@ -2,8 +2,9 @@
  *
  * Host-side driver, not firmware. `selftest` runs the start-up check; `table NAME` writes a table;
  * `call NAME` reads int64 inputs and writes the outputs; `range NAME LOW COUNT` counts one input
- * up; `stream` calls a function with a state for int64 inputs from the state at zeros; `chain` reads int32 pairs (drive, sense) and writes rows. Words are native int64; every record
- * ends with the number of the fault, 0 = none.
+ * up; `stream` calls a function with a state for int64 inputs from the state at zeros; `chain` reads
+ * int32 pairs (drive, sense) and writes rows. Words are native int64; every record ends with the
+ * number of the fault, 0 = none.
  */
 #include <inttypes.h>
 #include <stdio.h>
