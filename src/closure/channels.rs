@@ -83,7 +83,7 @@ impl Channels {
         let u: Vec<f64> = reading.iter().map(|r| (r - centre) / half).collect();
         let on = columns
             .get("time_since_power_on_s")
-            .and_then(|c| filled(time_s, c));
+            .and_then(|c| since_power_on(time_s, c));
         let mut out = Channels {
             time_s: time_s.to_vec(),
             on_known: on.is_some(),
@@ -278,6 +278,31 @@ pub fn filled(time_s: &[f64], values: &[f64]) -> Option<Vec<f64>> {
             })
             .collect(),
     )
+}
+
+/// Times since power-on with their holes filled: a hole before which there was no power-on, or after
+/// it, goes on with the clock. `None` without any value.
+fn since_power_on(time_s: &[f64], values: &[f64]) -> Option<Vec<f64>> {
+    let mut out = values.to_vec();
+    let mut next = None;
+    for i in (0..out.len()).rev() {
+        if out[i].is_finite() {
+            next = Some(i);
+        } else if let Some(b) = next {
+            // Negative: it was before the power-on that the later value counts from.
+            let back = values[b] - (time_s[b] - time_s[i]);
+            out[i] = if back >= 0.0 { back } else { f64::NAN };
+        }
+    }
+    let mut before = None;
+    for i in 0..out.len() {
+        if out[i].is_finite() {
+            before = Some(i);
+        } else if let Some(a) = before {
+            out[i] = out[a] + (time_s[i] - time_s[a]);
+        }
+    }
+    filled(time_s, &out)
 }
 
 /// Half widths, in rows, that [`smoothed`] and [`slope`] choose from.

@@ -60,18 +60,36 @@ fn thermometer(record: &ThermalRecord, mapping: &RecordMapping) -> Result<Option
     }
 }
 
+/// Temperatures that a gyro may have, degC.
+const TEMPERATURES_DEGC: (f64, f64) = (-100.0, 250.0);
+
 /// Temperature of the declared gyro at a reading of its phase (rad) or frequency (Hz), degC: the
-/// resonance's law linearised at the reference temperature (eq. 1 to 8 of the seed paper).
-fn degc_of(gyro: &Gyro, thermometer: &str, reading: f64) -> f64 {
-    let reference = gyro.reference_temperature_k - 273.15;
-    if thermometer == "freq_hz" {
-        let slope = -0.5 * gyro.stiffness_tempco_per_k.abs() * gyro.drive_frequency_hz;
-        return reference + (reading - gyro.drive_frequency_hz) / slope;
+/// resonance's law linearised at the reference temperature (eq. 1 to 8 of the seed paper), where it
+/// stands at `nominal` (-pi/2 rad, or the drive frequency).
+fn degc_of(gyro: &Gyro, thermometer: &str, nominal: f64, reading: f64) -> f64 {
+    let per_k = gyro.stiffness_tempco_per_k.abs();
+    let slope = if thermometer == "freq_hz" {
+        -0.5 * per_k * nominal
+    } else {
+        -gyro.drive_q * per_k + gyro.electronics.phase_slope_rad_per_k
+    };
+    gyro.reference_temperature_k - 273.15 + (reading - nominal) / slope
+}
+
+/// What the thermometer shows at the reference temperature: as the design says, or, if the record is of
+/// another gyro, the middle of its readings. The second: whether temperatures are known.
+fn nominal(gyro: &Gyro, thermometer: &str, readings: &[f64]) -> (f64, bool) {
+    let declared = match thermometer {
+        "freq_hz" => gyro.drive_frequency_hz,
+        _ => -std::f64::consts::FRAC_PI_2,
+    };
+    let (low, high) = stats::extremes(readings).unwrap_or((declared, declared));
+    let middle = 0.5 * (low + high);
+    let (coldest, hottest) = TEMPERATURES_DEGC;
+    if (coldest..=hottest).contains(&degc_of(gyro, thermometer, declared, middle)) {
+        return (declared, true);
     }
-    let quarter = std::f64::consts::FRAC_PI_2;
-    let slope =
-        -gyro.drive_q * gyro.stiffness_tempco_per_k.abs() + gyro.electronics.phase_slope_rad_per_k;
-    reference + (reading + quarter) / slope
+    (middle, false)
 }
 
 /// Closes a record.
@@ -103,7 +121,21 @@ pub fn close(
             .help("record longer, or average less")
             .into()
     };
-    let degc = |reading: f64| degc_of(&design.gyro, &name, reading);
+    let readings = columns.get(&name).map_or(&[][..], Vec::as_slice);
+    let (nominal, known) = nominal(&design.gyro, &name, readings);
+    let told_in_degc = ["die_degc", "chamber_degc"].map(|t| columns.contains_key(t));
+    if !known && !told_in_degc.contains(&true) && ["phase_rad", "freq_hz"].contains(&name.as_str())
+    {
+        let degc = design.gyro.reference_temperature_k - 273.15;
+        warnings.push(Warning::general(
+            "temperature_unknown",
+            format!(
+                "{name} around {nominal} is not that of the design's gyro: temperatures are counted from there \
+                 as if it were {degc:.2} degC; name the gyro's drive frequency and law in the design"
+            ),
+        ));
+    }
+    let degc = |reading: f64| degc_of(&design.gyro, &name, nominal, reading);
     let channels = Channels::new(&record.time_s, &columns, &name, degc)
         .map_err(|missing| refuse(format!("column {missing} holds no measured value")))?;
     let split = blocks::split(&channels.time_s, &channels.u).map_err(|e| refuse(e.to_string()))?;
@@ -243,7 +275,7 @@ impl Told<'_> {
             return none;
         };
         let noise = self.after.fit.noise.white_rms_dps;
-        match firmware::judged(&plan, record, &self.search.heldout, noise) {
+        match firmware::judged(&plan, record, c, &self.search.heldout, noise) {
             Ok((correction, errors)) => (Some(correction), errors),
             Err(e) => {
                 warnings.push(Warning::general("no_firmware", e.to_string()));

@@ -5,7 +5,7 @@
 
 use super::formats::Formats;
 use super::plan::{MOST_INPUTS, MOST_OF_A_KIND, Plan};
-use super::rate_terms::OnRate;
+use super::rate_terms::{OnRate, passes};
 use super::states::Followed;
 use super::terms::{OnBias, Slots, exact};
 use crate::error::Result;
@@ -51,6 +51,7 @@ const INPUTS: [&str; MOST_INPUTS] = [
 pub struct Step {
     on_bias: Vec<OnBias>,
     on_rate: Vec<OnRate>,
+    passes: usize,
     formats: Formats,
     align: Cast,
     output: Cast,
@@ -96,6 +97,7 @@ impl Step {
         let on_bias = terms.filter_map(|t| OnBias::new(plan, formats, t, &mut slots));
         let mut step = Step {
             on_bias: on_bias.collect(),
+            passes: passes(plan, formats),
             on_rate: plan
                 .terms
                 .iter()
@@ -191,8 +193,13 @@ impl Step {
         for term in &self.on_bias {
             r = ar.sub(r, self.on_bias(ar, state, term, fresh, inputs));
         }
-        for term in &self.on_rate {
-            r = term.corrected(ar, r, inputs);
+        let measured = r;
+        for _ in 0..self.passes {
+            let mut next = measured;
+            for term in &self.on_rate {
+                next = ar.sub(next, term.error(ar, r, inputs));
+            }
+            r = next;
         }
         ar.cast(r, &self.output, &[r])
     }

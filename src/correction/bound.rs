@@ -12,7 +12,7 @@
 //! | curve | slope d + h (knots) + h (between them) |
 //! | slope | 2 g + 2 abs(gain) d + h |
 //! | decay | g + abs(gain) (s / a + q / a + 2^-31) + h |
-//! | on the rate, error k r | R (error of k) + h, R the largest rate; errors before it grow by 1 + 3 K, K the largest k |
+//! | on the rate, error k r | in each pass R (error of k) + h, R the largest rate, and 3 K times what the pass before it was off by, K the largest k |
 
 use super::formats::{Formats, PRODUCT_BITS, largest_bias_dps, slope_dps, steepest};
 use super::plan::{Plan, Term};
@@ -32,9 +32,14 @@ pub(super) fn bound_dps(plan: &Plan, formats: &Formats) -> f64 {
         bound += on_bias(plan, formats, term);
     }
     let largest = pow2(formats.rate_exponent()) + largest_bias_dps(plan);
-    for term in plan.terms.iter().filter(|t| t.is_on_rate()) {
-        let (share, error) = on_rate(formats, term, largest);
-        bound = bound * (1.0 + 3.0 * share) + largest * error + formats.sum_lsb_dps() / 2.0;
+    let measured = bound;
+    for _ in 0..formats.passes(plan) {
+        let mut next = measured;
+        for term in plan.terms.iter().filter(|t| t.is_on_rate()) {
+            let (share, error) = on_rate(formats, term, largest);
+            next += bound * 3.0 * share + largest * error + formats.sum_lsb_dps() / 2.0;
+        }
+        bound = next;
     }
     (bound + rate_lsb / 2.0) * SECOND_ORDER
 }

@@ -21,9 +21,10 @@ pub const HIGHEST_POWER: u32 = 9;
 /// A correction of averaged readings, in real numbers.
 ///
 /// With the scaled inputs x (each held within -1 ..= 1) and the reading r, deg/s, first
-/// r1 = r - (sum of the terms on the bias), then the terms on the rate ([`Term::ScaleBy`],
-/// [`Term::Cubic`], [`Term::Even`]) one after the other in the plan's order, each on what the one
-/// before it left. Wherever they stand in [`Plan::terms`], terms on the rate come after those on the bias.
+/// m = r - (sum of the terms on the bias), then the true rate from m, which has the errors of the terms on
+/// the rate ([`Term::ScaleBy`], [`Term::Cubic`], [`Term::Even`]) on it: r = m - sum of errors(r), by as
+/// many substitutions from r = m as it takes ([`super::Formats::passes`]). Wherever they stand in [`Plan::terms`], terms
+/// on the rate come after those on the bias.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
     /// Nominal time between readings, s.
@@ -115,7 +116,7 @@ pub enum Term {
         /// Never off again, not even by a restart, once it was on; off before the first time.
         once: bool,
     },
-    /// r -> r - r (s0 + s1 x).
+    /// Error r (s0 + s1 x).
     ScaleBy {
         /// x; `None`: s1 is not used.
         input: Option<usize>,
@@ -124,14 +125,14 @@ pub enum Term {
         /// 1 per unit of x.
         s1: f64,
     },
-    /// r -> r - ppm 1e-6 r (r / rate_max)^2.
+    /// Error ppm 1e-6 r (r / rate_max)^2.
     Cubic {
         /// Parts per million of the rate at `rate_max_dps`.
         ppm: f64,
         /// deg/s.
         rate_max_dps: f64,
     },
-    /// r -> r - ppm 1e-6 r^2 / rate_max, or with `absolute` r - ppm 1e-6 abs(r).
+    /// Error ppm 1e-6 r^2 / rate_max, or with `absolute` ppm 1e-6 abs(r).
     Even {
         /// Parts per million of the rate at `rate_max_dps`.
         ppm: f64,
@@ -157,6 +158,18 @@ impl Term {
             Term::Cubic { .. } => "cubic",
             Term::Even { .. } => "even",
         }
+    }
+
+    /// True for a term whose value depends on earlier readings, or on the time since power-on.
+    pub fn remembers(&self) -> bool {
+        matches!(
+            self,
+            Term::Lag { .. }
+                | Term::LagOfCurve { .. }
+                | Term::Slope { .. }
+                | Term::Decay { .. }
+                | Term::Step { .. }
+        )
     }
 
     /// True for a term on the rate, which comes after those on the bias.

@@ -1,4 +1,7 @@
-//! The terms on the rate itself: r -> r - cast(r k), k the relative error.
+//! The terms on the rate itself: their errors are functions of the true rate, and what comes in is the
+//! true rate with the errors on it. So the rate is the fixed point of r = m - sum of cast(r k), k a term's
+//! relative error and m what the terms on the bias leave, reached in a fixed number of passes
+//! ([`passes`]) from r = m.
 //!
 //! | term | k |
 //! |---|---|
@@ -10,7 +13,7 @@
 //! with u = r / 2^e, the rate read in the full scale of its word.
 
 use super::formats::{Formats, PRODUCT_BITS};
-use super::plan::Term;
+use super::plan::{Plan, Term};
 use super::terms::exact;
 use crate::numeric::arithmetic::Arithmetic;
 use crate::numeric::cast::Cast;
@@ -66,6 +69,57 @@ pub(super) fn constant(formats: &Formats, term: &Term) -> Option<f64> {
     })
 }
 
+/// Most passes.
+const MOST_PASSES: usize = 8;
+
+/// What the passes may leave of the errors at full scale, of the noise.
+const LEFT_SHARE: f64 = 1.0 / 16.0;
+
+/// Contraction from which on passes are no longer worth it.
+const SLOW: f64 = 0.5;
+
+/// The error of a term at a rate of `rate_dps`, and its slope there, at most: deg/s and 1.
+fn at_most(term: &Term, rate_dps: f64) -> (f64, f64) {
+    let (share, power) = match term {
+        Term::ScaleBy { input, s0, s1 } => (s0.abs() + input.map_or(0.0, |_| s1.abs()), 1.0),
+        Term::Even {
+            ppm,
+            absolute: true,
+            ..
+        } => (ppm.abs() * 1e-6, 1.0),
+        Term::Even {
+            ppm, rate_max_dps, ..
+        } => (ppm.abs() * 1e-6 * rate_dps / rate_max_dps, 2.0),
+        Term::Cubic { ppm, rate_max_dps } => {
+            (ppm.abs() * 1e-6 * (rate_dps / rate_max_dps).powi(2), 3.0)
+        }
+        _ => (0.0, 0.0),
+    };
+    (rate_dps * share, power * share)
+}
+
+/// How often the errors are taken off: each pass leaves at most the errors' slope times what the one
+/// before it left, and what is left at full scale in the end is far below the noise. One pass where the
+/// slope is so large that more would not help.
+pub(super) fn passes(plan: &Plan, formats: &Formats) -> usize {
+    let full_scale = plan.full_scale_dps;
+    let sum = |(e, q), term| {
+        let (error, slope) = at_most(term, full_scale);
+        (e + error, q + slope)
+    };
+    let (error, slope) = plan.terms.iter().fold((0.0, 0.0), sum);
+    if slope >= SLOW {
+        return 1;
+    }
+    let mut left = error * slope;
+    let mut passes = 1;
+    while left > LEFT_SHARE * formats.noise_dps && passes < MOST_PASSES {
+        left *= slope;
+        passes += 1;
+    }
+    passes
+}
+
 impl OnRate {
     /// Compiles a term; `None` for one on the bias.
     pub fn new(formats: &Formats, term: &Term) -> Option<Self> {
@@ -112,9 +166,9 @@ impl OnRate {
         casts
     }
 
-    /// r less its error.
+    /// The error at a rate, in the sum's unit.
     #[inline(always)]
-    pub fn corrected<A: Arithmetic>(&self, ar: &A, r: A::Word, inputs: &[A::Word]) -> A::Word {
+    pub fn error<A: Arithmetic>(&self, ar: &A, r: A::Word, inputs: &[A::Word]) -> A::Word {
         let constant = ar.constant(self.constant, self.bits);
         let u = ar.read_as(r, -self.exponent);
         let mut on = r;
@@ -142,7 +196,6 @@ impl OnRate {
                 ar.cast(ar.mul(constant, u2), cast, &[u2])
             }
         };
-        let product = ar.mul(on, k);
-        ar.sub(r, ar.cast(product, &self.last, &[on, k]))
+        ar.cast(ar.mul(on, k), &self.last, &[on, k])
     }
 }

@@ -142,15 +142,37 @@ pub fn record(plan: &Plan, rows: usize, seed: u64) -> Vec<Reading> {
     readings
 }
 
+/// The error of a term on the rate r.
+fn error_on_rate(term: &Term, r: f64, x: &[f64]) -> f64 {
+    match term {
+        Term::ScaleBy { input, s0, s1 } => r * (s0 + input.map_or(0.0, |k| s1 * x[k])),
+        Term::Cubic { ppm, rate_max_dps } => ppm * 1e-6 * r * (r / rate_max_dps).powi(2),
+        Term::Even {
+            ppm,
+            rate_max_dps,
+            absolute,
+        } => {
+            ppm * 1e-6
+                * if *absolute {
+                    r.abs()
+                } else {
+                    r * r / rate_max_dps
+                }
+        }
+        _ => 0.0,
+    }
+}
+
 fn knot(values: &[f64], x: f64) -> f64 {
     let u = (x + 1.0) / 2.0 * (values.len() - 1) as f64;
     let k = (u.floor() as usize).min(values.len() - 2);
     values[k] + (values[k + 1] - values[k]) * (u - k as f64)
 }
 
-/// The plan in real numbers, straight from its definition, without relays. Lags are sums over all
+/// The plan in real numbers, straight from its definition, without relays, the errors on the rate taken off
+/// in so many passes. Lags are sums over all
 /// steps since power-on: y_n = sum of the responses to the straight pieces of the input.
-pub fn evaluate(plan: &Plan, readings: &[Reading]) -> Vec<f64> {
+pub fn evaluate(plan: &Plan, passes: usize, readings: &[Reading]) -> Vec<f64> {
     let mut past: Vec<Vec<f64>> = Vec::new();
     let mut result = Vec::new();
     for (reading, steps) in readings.iter().zip(schedule(plan.period_s, readings)) {
@@ -199,24 +221,10 @@ pub fn evaluate(plan: &Plan, readings: &[Reading]) -> Vec<f64> {
                 _ => 0.0,
             };
         }
-        for term in &plan.terms {
-            r -= match term {
-                Term::ScaleBy { input, s0, s1 } => r * (s0 + input.map_or(0.0, |k| s1 * x[k])),
-                Term::Cubic { ppm, rate_max_dps } => ppm * 1e-6 * r * (r / rate_max_dps).powi(2),
-                Term::Even {
-                    ppm,
-                    rate_max_dps,
-                    absolute,
-                } => {
-                    ppm * 1e-6
-                        * if *absolute {
-                            r.abs()
-                        } else {
-                            r * r / rate_max_dps
-                        }
-                }
-                _ => 0.0,
-            };
+        let measured = r;
+        for _ in 0..passes {
+            let errors = plan.terms.iter().map(|t| error_on_rate(t, r, &x));
+            r = measured - errors.sum::<f64>();
         }
         result.push(r);
     }

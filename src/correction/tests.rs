@@ -163,7 +163,7 @@ fn fixed_and_float_stay_within_the_bound_of_the_plan() {
         let plan = plan(seed, inputs, false);
         let correction = Correction::auto(&plan).unwrap();
         let readings = record(&plan, 600, seed);
-        let due = evaluate(&plan, &readings);
+        let due = evaluate(&plan, correction.formats.passes(&plan), &readings);
         let bound = correction.bound_dps();
         for (n, ((fixed, float), due)) in correction
             .run(&readings)
@@ -219,7 +219,7 @@ fn firmware_adds_nothing_visible_to_the_noise() {
         },
     ]);
     let mut readings = readings_of(4000, 0.0, |t| 0.95 * (t / 900.0).sin());
-    let bias = evaluate(&plan, &readings);
+    let bias = evaluate(&plan, 1, &readings);
     let mut lcg = Lcg(7);
     let noise: Vec<f64> = bias.iter().map(|_| 1e-3 * normal(&mut lcg)).collect();
     for ((reading, bias), noise) in readings.iter_mut().zip(&bias).zip(&noise) {
@@ -229,6 +229,42 @@ fn firmware_adds_nothing_visible_to_the_noise() {
     let fixed = rms(correction.run(&readings).into_iter());
     let ratio = fixed / rms(noise.into_iter());
     assert!(ratio < 1.005, "{ratio}");
+}
+
+#[test]
+fn errors_on_the_rate_are_functions_of_the_true_rate() {
+    // Nine percent of the rate, more to one side: what one pass leaves is far above the noise.
+    let law = |term| {
+        let mut plan = one(vec![term]);
+        plan.full_scale_dps = 30.0;
+        plan
+    };
+    let even = |absolute| Term::Even {
+        ppm: 9e4,
+        rate_max_dps: 25.0,
+        absolute,
+    };
+    let cubic = Term::Cubic {
+        ppm: -6e4,
+        rate_max_dps: 25.0,
+    };
+    let plans = [law(even(false)), law(even(true)), law(cubic)];
+    let errors: [fn(f64) -> f64; 3] = [
+        |r| 0.09 * r * r / 25.0,
+        |r| 0.09 * r.abs(),
+        |r| -0.06 * r * (r / 25.0).powi(2),
+    ];
+    for (plan, error) in plans.iter().zip(errors) {
+        let formats = Formats::choose(plan, 0.01).unwrap();
+        assert!(formats.passes(plan) > 1);
+        let correction = Correction::new(plan, &formats).unwrap();
+        for k in -20..=20 {
+            let true_dps = 1.25 * f64::from(k);
+            let readings = readings_of(2, true_dps + error(true_dps), |_| 0.0);
+            let got = correction.run(&readings)[1];
+            assert!((got - true_dps).abs() < 2.5e-3, "{plan:?} {true_dps} {got}");
+        }
+    }
 }
 
 #[test]
@@ -253,7 +289,7 @@ fn a_wrong_constant_leaves_the_bound() {
             Term::Product { gain_dps, .. } => *gain_dps += 1e-3,
             _ => unreachable!(),
         }
-        let due = evaluate(&bad, &readings(&bad));
+        let due = evaluate(&bad, 1, &readings(&bad));
         let got = correction.run(&readings(&good));
         let farthest = got.iter().zip(&due).map(|(a, b)| (a - b).abs());
         let farthest = farthest.fold(0.0, f64::max);

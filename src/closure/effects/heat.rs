@@ -6,7 +6,7 @@ use super::{
 };
 use crate::closure::channels::{Channels, lag, slope};
 use crate::closure::firmware::{Words, knots};
-use crate::correction::Term;
+use crate::correction::{MOST_SLOPE_ROWS, Term};
 
 /// All of this file.
 pub fn all() -> Vec<Box<dyn Candidate>> {
@@ -65,8 +65,7 @@ impl Candidate for ThermalLag {
     }
 
     fn columns(&self, c: &Channels, bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
-        // Shorter ones are a rate of change.
-        let tau_s = point.theta[0].exp().max(c.period_s());
+        let tau_s = tau_s(c, point);
         let now = if point.form == 0 {
             map(&c.smooth_u, |u| bias.at(u))
         } else {
@@ -85,7 +84,7 @@ impl Candidate for ThermalLag {
     }
 
     fn correction(&self, c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
-        let (gain_dps, tau_s) = (*e.beta.first()?, e.point.theta[0].exp().max(c.period_s()));
+        let (gain_dps, tau_s) = (*e.beta.first()?, tau_s(c, &e.point));
         let input = f.thermometer()?;
         if e.point.form == 1 {
             return Some(vec![Term::Lag {
@@ -115,6 +114,12 @@ impl Candidate for ThermalLag {
         };
         [per_k, from_log("tau_s", e, 0)].into_iter().collect()
     }
+}
+
+/// The time constant of a lag: shorter ones are a rate of change, longer ones a drift in time.
+fn tau_s(c: &Channels, point: &Point) -> f64 {
+    let longest = (0.5 * c.span_s()).max(c.period_s());
+    point.theta[0].exp().clamp(c.period_s(), longest)
 }
 
 /// Bias proportional to dT/dt.
@@ -165,16 +170,32 @@ impl Candidate for TemperatureRate {
         if e.point.form >= SLOPES.len() {
             return None;
         }
-        // Firmware has no readings to come. Twice the difference over k readings less that over 2 k is late
-        // in second order only.
+        // Firmware has no readings to come, only differences to past ones: those that come nearest to the
+        // model's slope. Twice the difference over k readings less that over 2 k is late in second order
+        // only, and noisier.
         let gain = e.beta.first()? * c.span_s();
-        let (input, rows) = (f.thermometer()?, SLOPES[e.point.form] as u32);
-        let slope = |gain_dps_s: f64, rows: u32| Term::Slope {
-            gain_dps_s,
+        let input = f.thermometer()?;
+        let wanted = slope(&c.time_s, &c.u, SLOPES[e.point.form]);
+        let mut best: Option<(f64, Vec<(f64, u32)>)> = None;
+        let finer = (c.period_s() / f.period_s).round().max(1.0) as u32;
+        for rows in PAST.map(|rows| rows * finer) {
+            for parts in [vec![(1.0, rows)], vec![(2.0, rows), (-1.0, 2 * rows)]] {
+                if parts.iter().any(|(_, rows)| *rows > MOST_SLOPE_ROWS) {
+                    continue;
+                }
+                let past = past_slope(c, f.period_s, &parts);
+                let off: f64 = past.iter().zip(&wanted).map(|(a, b)| (a - b).powi(2)).sum();
+                if best.as_ref().is_none_or(|b| off < b.0) {
+                    best = Some((off, parts));
+                }
+            }
+        }
+        let terms = best?.1.into_iter().map(|(share, rows)| Term::Slope {
+            gain_dps_s: share * gain,
             input,
             rows,
-        };
-        Some(vec![slope(2.0 * gain, rows), slope(-gain, 2 * rows)])
+        });
+        Some(terms.collect())
     }
 
     fn report(&self, c: &Channels, e: &Estimate) -> Reported {
@@ -183,6 +204,36 @@ impl Candidate for TemperatureRate {
             .into_iter()
             .collect()
     }
+}
+
+/// Rows that a difference of the firmware looks back.
+const PAST: [u32; 9] = [1, 2, 3, 4, 5, 7, 9, 12, 16];
+
+/// The slope of u, per s, as firmware computes it: differences to the past in nominal periods, each with
+/// its share.
+fn past_slope(c: &Channels, period_s: f64, parts: &[(f64, u32)]) -> Vec<f64> {
+    let mut out = vec![0.0; c.len()];
+    for (share_of, rows) in parts {
+        let span_s = f64::from(*rows) * period_s;
+        let mut next = 0;
+        for (now, slope) in out.iter_mut().enumerate() {
+            let at_s = c.time_s[now] - span_s;
+            while next < now && c.time_s[next] < at_s {
+                next += 1;
+            }
+            // On the line between two rows, as the firmware reads it between them.
+            let before = next.saturating_sub(1);
+            let width_s = c.time_s[next] - c.time_s[before];
+            let share = if width_s > 0.0 {
+                ((at_s - c.time_s[before]) / width_s).clamp(0.0, 1.0)
+            } else {
+                0.0
+            };
+            let then = c.u[before] + share * (c.u[next] - c.u[before]);
+            *slope += share_of * (c.u[now] - then) / span_s;
+        }
+    }
+    out
 }
 
 /// Rows to each side of a slope.

@@ -151,6 +151,13 @@ pub trait Candidate: Send + Sync {
         Vec::new()
     }
 
+    /// For thresholds, whose likelihood is a staircase: for each of them, the points near the given one along it,
+    /// in order, one between any two readings; and points of other forms from which the same is worth a
+    /// try.
+    fn stairs(&self, _c: &Channels, _point: &Point) -> (Vec<Vec<Point>>, Vec<Point>) {
+        (Vec::new(), Vec::new())
+    }
+
     /// The columns of a shape, one value a row.
     fn columns(&self, c: &Channels, bias: &Bias, point: &Point) -> Vec<Vec<f64>>;
 
@@ -169,6 +176,12 @@ pub trait Candidate: Send + Sync {
     /// a part that the effect does not need.
     fn surcharge(&self, _c: &Channels, _point: &Point) -> f64 {
         0.0
+    }
+
+    /// True for a shape at one temperature, which chance finds somewhere: it has to be found in most halves
+    /// of the record.
+    fn is_local(&self) -> bool {
+        false
     }
 
     /// True if it acts on the sum of all others (a clip), so that it adds nothing to that sum.

@@ -139,6 +139,10 @@ impl Candidate for ModeCrossing {
         vec![point.theta[1].exp(), 0.5]
     }
 
+    fn is_local(&self) -> bool {
+        true
+    }
+
     fn fine(&self, _c: &Channels, _point: &Point) -> Vec<Point> {
         let mut out = Vec::new();
         for k in 0..10 {
@@ -219,6 +223,21 @@ const STRESS_JUMP: Sheet = Sheet {
 /// Gaps of the hysteresis that are tried, in u.
 const GAPS: [f64; 8] = [0.0, 0.04, 0.08, 0.14, 0.21, 0.3, 0.41, 0.54];
 
+/// How far from a threshold others are tried, in u, and how many at most.
+const NEAR: f64 = 0.1;
+const MOST_STAIRS: usize = 80;
+
+/// Thresholds near `centre`, in order, one between any two readings (every n-th where these are many).
+fn thresholds(u: &[f64], centre: f64) -> Vec<f64> {
+    let near = |v: &&f64| (**v - centre).abs() < NEAR;
+    let mut sorted: Vec<f64> = u.iter().filter(near).copied().collect();
+    sorted.sort_by(f64::total_cmp);
+    sorted.dedup();
+    let between: Vec<f64> = sorted.windows(2).map(|w| 0.5 * (w[0] + w[1])).collect();
+    let every = between.len().div_ceil(MOST_STAIRS).max(1);
+    between.into_iter().step_by(every).collect()
+}
+
 /// 0 below, 1 above `centre`, by half the gap later in each direction; `once`: it never comes back.
 pub fn step(u: &[f64], centre: f64, gap: f64, once: bool) -> Vec<f64> {
     let mut above = u.first().is_some_and(|u| *u > centre);
@@ -276,6 +295,10 @@ impl Candidate for StressJump {
         }]
     }
 
+    fn is_local(&self) -> bool {
+        true
+    }
+
     fn fine(&self, _c: &Channels, _point: &Point) -> Vec<Point> {
         // Where the temperature wanders, a step that is a little off switches at other times.
         let mut out = Vec::new();
@@ -294,6 +317,25 @@ impl Candidate for StressJump {
             out.push(0.05);
         }
         out
+    }
+
+    fn stairs(&self, c: &Channels, point: &Point) -> (Vec<Vec<Point>>, Vec<Point>) {
+        let centre = point.theta[0];
+        let gap = point.theta.get(1).map_or(0.0, |g| g.abs());
+        if point.form != 1 {
+            let along = thresholds(&c.smooth_u, centre);
+            let along = along.into_iter().map(|t| Point::at(point.form, &[t]));
+            return (vec![along.collect()], Vec::new());
+        }
+        let (up, down) = (centre + 0.5 * gap, centre - 0.5 * gap);
+        let of = |up: f64, down: f64| Point::at(1, &[0.5 * (up + down), up - down]);
+        let ups = thresholds(&c.smooth_u, up).into_iter();
+        let downs = thresholds(&c.smooth_u, down).into_iter();
+        let axes = vec![
+            ups.filter(|t| *t >= down).map(|t| of(t, down)).collect(),
+            downs.filter(|t| *t <= up).map(|t| of(up, t)).collect(),
+        ];
+        (axes, [up, centre, down].map(|t| Point::at(0, &[t])).into())
     }
 
     fn correction(&self, c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {

@@ -7,6 +7,7 @@ use crate::closure::effects::{Bias, Candidate, Missing, Point};
 use crate::closure::likelihood::candidates::{Grid, Group};
 use crate::closure::likelihood::reml::Fit;
 use crate::closure::likelihood::score::{self, Scores};
+use std::cmp::Ordering;
 use std::sync::Arc;
 
 /// What a coefficient or parameter costs in log-likelihood when explanations are compared.
@@ -119,6 +120,7 @@ impl Search<'_> {
         let fit = &model.fit;
         let best = scores.groups.iter().map(|g| g.gain).fold(0.0, f64::max);
         let mut starts = Vec::new();
+        let mut wholes = Vec::new();
         for (k, (candidate, points)) in running.iter().enumerate() {
             let (point, shape, p_value, gain) = match scores.groups.get(k) {
                 Some(g) => {
@@ -128,13 +130,30 @@ impl Search<'_> {
                 None => (points.first(), fit.at.shape, tone_p, best),
             };
             let Some(point) = point else { continue };
-            let point = if gain > 0.5 * best - 10.0 {
-                let bench = Bench::new(fit, shape);
-                refine::refined(&bench, candidate.as_ref(), c, &model.bias, point, 0.5)
-            } else {
-                point.clone()
+            let near = gain > 0.5 * best - 10.0;
+            let bench = (near || candidate.is_whole()).then(|| Bench::new(fit, shape));
+            let gain = |p: &Point| {
+                let bench = bench.as_ref()?;
+                Some(refine::gain(bench, candidate.as_ref(), c, &model.bias, p))
             };
+            // Where physics gives the coefficient, the best shape is not that of a free one.
+            let start = if candidate.is_whole() {
+                let best = points
+                    .iter()
+                    .max_by(|a, b| gain(a).partial_cmp(&gain(b)).unwrap_or(Ordering::Equal));
+                best.unwrap_or(point)
+            } else {
+                point
+            };
+            let point = match &bench {
+                Some(bench) if near => {
+                    refine::refined(bench, candidate.as_ref(), c, &model.bias, start, 0.5)
+                }
+                _ => start.clone(),
+            };
+            let whole = candidate.is_whole().then(|| gain(&point)).flatten();
             starts.push((candidate.clone(), point, p_value));
+            wholes.push(whole);
         }
         let columns: Vec<Vec<Vec<f64>>> = starts
             .iter()
@@ -144,9 +163,11 @@ impl Search<'_> {
         starts
             .into_iter()
             .zip(gains)
-            .filter(|(_, g)| g.columns > 0)
+            .zip(wholes)
+            .filter(|((_, g), _)| g.columns > 0)
             .map(
-                |((candidate, point, p_value), Profiled { gain, columns, .. })| {
+                |(((candidate, point, p_value), Profiled { gain, columns, .. }), whole)| {
+                    let gain = whole.unwrap_or(gain);
                     let paid = PRICE * (columns + point.theta.len()) as f64;
                     let surcharge = candidate.surcharge(c, &point);
                     Judged {

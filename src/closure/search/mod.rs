@@ -7,12 +7,14 @@
 //! step is tried again with the others in, against all other names ([`sweep`]), and must lower the error of
 //! held-out rows ([`heldout`]). Where a shape without a name wins, it is kept as what is left.
 
+pub mod constancy;
 pub mod estimate;
 pub mod forward;
 pub mod halves;
 pub mod heldout;
 pub mod judge;
 pub mod refine;
+pub mod stairs;
 pub mod structure;
 pub mod sweep;
 pub mod tones;

@@ -2,7 +2,7 @@
 
 use super::judge::{Judged, PRICE};
 use super::refine::{self, Bench};
-use super::{Found, MOST_RIVALS, Model, Search, Term, structure};
+use super::{Found, MOST_RIVALS, Model, Search, Term, stairs, structure};
 use crate::closure::effects::Point;
 use crate::closure::likelihood::Unusable;
 use crate::closure::likelihood::linear::add_scaled;
@@ -26,6 +26,13 @@ const WEAK: f64 = 1e-4;
 /// A sinusoid beside which another one of this share of its gain is needed is none: a drifting tone, or
 /// something else that repeats.
 const OVERTONE: f64 = 0.1;
+
+/// Probability and share of its gain from which on an effect's gain is not one.
+const UNSTEADY: f64 = 1e-3;
+const UNSTEADY_SHARE: f64 = 0.05;
+
+/// Least selection frequency of a local shape (Meinshausen & Buhlmann 2010 take 0.6 to 0.9).
+const STABLE: f64 = 0.7;
 
 impl Search<'_> {
     /// The non-linear parameters of every term again, with the other terms' columns in: with spikes at
@@ -120,7 +127,7 @@ impl Search<'_> {
             }
         }
         let top = refine::refined(&bench, candidate, c, &model.bias, &start, 0.5);
-        middle(&top, &fine, gain)
+        stairs::settled(candidate, c, &top, &fine, gain)
     }
 
     /// Every term against all other candidates, the other terms being in: it is replaced by a better
@@ -139,7 +146,8 @@ impl Search<'_> {
                 let mut others = model.terms.clone();
                 let own = others.remove(k);
                 let own_spikes = self.spikes(&model.fit);
-                match self.again(&others, &own, own_spikes)? {
+                let ag = self.again(&others, &own, own_spikes)?;
+                match ag {
                     Some(term) => {
                         changed |= term.id() != own.id();
                         others.insert(k, term);
@@ -179,6 +187,10 @@ impl Search<'_> {
         let best_name = round.judged.iter().find(|j| j.candidate.named());
         let explains_spikes = self.spikes(&without.fit) > own_spikes + 1;
         let Some(same) = same else {
+            if explains_spikes {
+                // All that it explains is out: there is nothing to judge it by but those rows.
+                return Ok(Some(own.clone()));
+            }
             return Ok(best_name.filter(|j| needed(j)).map(kept));
         };
         if let Some(name) = best_name
@@ -191,14 +203,25 @@ impl Search<'_> {
         }
         if needed(same) || explains_spikes {
             let mut term = kept(same);
-            if explains_spikes {
-                // Judged with those rows out: the shape found with them in is the better one.
+            // Judged with the rows out that only it explains, it may have lost its shape.
+            if term.point != own.point
+                && self.value_of(others, own)? > self.value_of(others, &term)?
+            {
                 term.point = own.point.clone();
+            }
+            if explains_spikes {
                 term.rivals = own.rivals.clone();
             }
             return Ok(Some(term));
         }
         Ok(None)
+    }
+
+    /// Log-likelihood with one term more.
+    fn value_of(&self, others: &[Term], term: &Term) -> Result<f64, Unusable> {
+        let mut terms = others.to_vec();
+        terms.push(term.clone());
+        Ok(self.model(&terms)?.value)
     }
 
     /// Drops terms that do not lower the held-out error, and tones that are none.
@@ -224,6 +247,7 @@ impl Search<'_> {
         }
         model = self.without_likenesses(model)?;
         model = self.without_accidents(model, found)?;
+        model = self.without_chance(model, found)?;
         let mut k = 0;
         while k < model.terms.len() {
             let term = model.terms[k].clone();
@@ -291,6 +315,35 @@ impl Search<'_> {
         self.model(&terms)
     }
 
+    /// Without names that do not hold: with one gain over the whole record, or, for a shape that chance finds
+    /// at some temperature, in most halves of it.
+    fn without_chance(&self, model: Model, found: &mut Found) -> Result<Model, Unusable> {
+        let mut terms = Vec::new();
+        for (k, term) in model.terms.iter().enumerate() {
+            let lasting = self
+                .constancy(&model, term)
+                .is_none_or(|c| c.p_value > UNSTEADY || c.share < UNSTEADY_SHARE);
+            let stable = !term.candidate.is_local() || self.stability(&model, k)? >= STABLE;
+            if term.candidate.named() && !(lasting && stable) {
+                found.left = found.left.take().or_else(|| self.channel(term));
+            } else {
+                terms.push(term.clone());
+            }
+        }
+        if terms.len() == model.terms.len() {
+            return Ok(model);
+        }
+        self.model(&terms)
+    }
+
+    /// The selection frequency of a term against all other names beside the other terms.
+    fn stability(&self, model: &Model, term: usize) -> Result<f64, Unusable> {
+        let mut others = model.terms.clone();
+        others.remove(term);
+        let round = self.judge(&self.model(&others)?, 0);
+        Ok(self.selection_frequency(model, term, &round))
+    }
+
     /// How often a term's column switches between 0 and 1.
     fn switches(&self, term: &Term, model: &Model) -> usize {
         let columns = term
@@ -298,29 +351,5 @@ impl Search<'_> {
             .columns(self.channels, &model.bias, &term.point);
         let count = |c: &Vec<f64>| c.windows(2).filter(|w| w[0] != w[1]).count();
         columns.iter().map(count).max().unwrap_or(0)
-    }
-}
-
-/// The middle of the plateau around a top: a threshold between two readings may lie anywhere between
-/// them, and the middle errs least on rows that were not fitted.
-fn middle(top: &Point, fine: &[(Point, f64)], gain: impl Fn(&Point) -> f64) -> Point {
-    const FLAT: f64 = 0.2;
-    let reached = gain(top);
-    let level: Vec<&Point> = fine
-        .iter()
-        .filter(|(p, there)| p.form == top.form && *there > reached - FLAT)
-        .map(|(p, _)| p)
-        .collect();
-    if level.is_empty() {
-        return top.clone();
-    }
-    let mut out = top.clone();
-    for (k, theta) in out.theta.iter_mut().enumerate() {
-        *theta = level.iter().map(|p| p.theta[k]).sum::<f64>() / level.len() as f64;
-    }
-    if gain(&out) > reached - FLAT {
-        out
-    } else {
-        top.clone()
     }
 }

@@ -1,4 +1,6 @@
-//! From found effects to the correction that firmware runs.
+//! From found effects to the correction that firmware runs; [`clock`]: its steps beside the record's rows.
+
+mod clock;
 
 use super::channels::{Channels, scaled};
 use super::effects::{Bias, Estimate};
@@ -29,17 +31,22 @@ pub fn knots(count: usize) -> impl Iterator<Item = f64> {
 pub struct Words {
     /// The declared bias in u.
     pub bias: Bias,
+    /// Of the firmware, s.
+    pub period_s: f64,
+    /// White noise of a reading, deg/s.
+    noise_dps: f64,
     inputs: Vec<Input>,
     thermometer: Option<usize>,
 }
 
-/// Largest error of a polynomial that stands for an effect of two channels, as a share of the effect's
-/// rms.
-const SURFACE: f64 = 0.02;
+/// Largest rms error of a polynomial that stands for an effect of two channels, of the noise.
+const SURFACE: f64 = 0.1;
 
 impl Words {
-    fn new(c: &Channels, bias: &Bias) -> Self {
+    fn new(c: &Channels, bias: &Bias, noise_dps: f64) -> Self {
         let mut out = Words {
+            noise_dps,
+            period_s: clock::period_s(&c.on_s, c.period_s()),
             bias: bias.clone(),
             inputs: Vec::new(),
             thermometer: None,
@@ -109,7 +116,7 @@ impl Words {
             let basis = Basis::new(&shapes);
             let mut rest = target.clone();
             let z = basis.project_off(&mut rest);
-            if dot(&rest, &rest) > SURFACE * SURFACE * dot(&target, &target) {
+            if dot(&rest, &rest) > (SURFACE * self.noise_dps).powi(2) * c.len() as f64 {
                 continue;
             }
             let terms = powers
@@ -138,7 +145,7 @@ pub fn plan(
     estimates: &[Estimate],
     full_scale_dps: f64,
 ) -> Option<Plan> {
-    let mut words = Words::new(c, &model.bias);
+    let mut words = Words::new(c, &model.bias, model.fit.noise.white_rms_dps);
     let order = model.bias.coefficients_dps.len();
     let thermometer = words.thermometer();
     if order > 1 && thermometer.is_none() {
@@ -164,12 +171,38 @@ pub fn plan(
         // A thermometer that did not move is no input.
         words.inputs.clear();
     }
+    let remembers = terms.iter().any(Term::remembers);
     Some(Plan {
-        period_s: c.period_s(),
+        period_s: if remembers {
+            words.period_s
+        } else {
+            c.period_s()
+        },
         inputs: words.inputs,
         full_scale_dps,
         terms,
     })
+}
+
+/// The record with the gaps of the plan's inputs filled as the model sees them: what the logger missed, the
+/// firmware in the gyro has read.
+fn logged(record: &ThermalRecord, c: &Channels, plan: &Plan) -> ThermalRecord {
+    let mut out = record.clone();
+    for input in &plan.inputs {
+        let filled = if input.column == c.thermometer {
+            Some(c.u.iter().map(|u| c.centre + c.half * u).collect())
+        } else {
+            c.column(&input.column).map(<[f64]>::to_vec)
+        };
+        if let Some(filled) = filled {
+            out.columns.insert(input.column.clone(), filled);
+        }
+    }
+    if out.columns.contains_key("time_since_power_on_s") {
+        let on_s = c.on_s.clone();
+        out.columns.insert("time_since_power_on_s".to_owned(), on_s);
+    }
+    out
 }
 
 /// The correction of a plan, its words chosen for the record's noise, and its held-out errors, bit for bit.
@@ -179,14 +212,22 @@ pub fn plan(
 pub fn judged(
     plan: &Plan,
     record: &ThermalRecord,
+    c: &Channels,
     heldout: &[bool],
     noise_dps: f64,
 ) -> Result<(Correction, FirmwareErrors)> {
     plan.check()?;
     let formats = Formats::choose(plan, noise_dps)?;
     let correction = Correction::new(plan, &formats)?;
-    let readings = readings(plan, record)?;
-    let corrected = correction.run(&readings);
+    let readings = readings(plan, &logged(record, c, plan))?;
+    let (all, places) = if plan.terms.iter().any(Term::remembers) {
+        clock::with_between(plan.period_s, &readings)
+    } else {
+        let places = (0..readings.len()).collect();
+        (readings, places)
+    };
+    let corrected = correction.run(&all);
+    let corrected: Vec<f64> = places.iter().map(|place| corrected[*place]).collect();
     let applied = record.column("rate_dps");
     let rows = corrected.iter().enumerate().zip(heldout);
     let errors: Vec<f64> = rows
