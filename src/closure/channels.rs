@@ -201,6 +201,18 @@ impl Channels {
         self.moving(name).map(|c| scaled(c).0)
     }
 
+    /// True if the temperature only rises, or only falls: nearly all of its way leads from the first reading to
+    /// the last.
+    pub fn goes_one_way(&self) -> bool {
+        const STRETCHES: usize = 40;
+        const SHARE: f64 = 0.9;
+        let every = (self.len() / STRETCHES).max(1);
+        let coarse: Vec<f64> = self.smooth_u.iter().step_by(every).copied().collect();
+        let way: f64 = coarse.windows(2).map(|w| (w[1] - w[0]).abs()).sum();
+        let ends = coarse.first().zip(coarse.last());
+        way > 0.0 && ends.is_some_and(|(a, b)| (b - a).abs() > SHARE * way)
+    }
+
     /// Duration, s.
     pub fn span_s(&self) -> f64 {
         match (self.time_s.first(), self.time_s.last()) {

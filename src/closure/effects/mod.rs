@@ -189,6 +189,11 @@ pub trait Candidate: Send + Sync {
         false
     }
 
+    /// The shape with its levels moved, deg/s, for a clip; `None` if that is not of the same form.
+    fn moved(&self, _point: &Point, _by_dps: f64) -> Option<Point> {
+        None
+    }
+
     /// True if the columns depend on the declared bias.
     fn acts_on_bias(&self) -> bool {
         false

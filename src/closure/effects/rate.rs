@@ -449,6 +449,11 @@ impl Candidate for Saturation {
         true
     }
 
+    fn moved(&self, point: &Point, by_dps: f64) -> Option<Point> {
+        let levels: Vec<f64> = point.theta.iter().map(|l| l + by_dps).collect();
+        (point.form > 0).then(|| Point::at(point.form, &levels))
+    }
+
     fn report(&self, _c: &Channels, e: &Estimate) -> Reported {
         let (low, high) = limits(&e.point);
         let std = |k: usize| e.theta_std.get(k).copied().unwrap_or(0.0);

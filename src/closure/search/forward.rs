@@ -1,6 +1,6 @@
 //! Forward steps.
 
-use super::judge::{EQUAL, Judged, Round};
+use super::judge::{Judged, Round};
 use super::{Found, LEVEL, MOST_RIVALS, Model, Search, Term};
 use crate::closure::likelihood::{Unusable, reml};
 
@@ -170,7 +170,7 @@ impl Search<'_> {
                 return Ok(None);
             }
         }
-        others.retain(|(id, value)| *id != best.candidate.id() && *value > reached - EQUAL);
+        others.retain(|(id, value)| *id != best.candidate.id() && *value > reached - all.equal);
         let rivals = others.into_iter().map(|(id, _)| id).collect();
         Ok(Some(Term::of(best, rivals)))
     }

@@ -1,7 +1,8 @@
 //! One round: all candidates beside those that are taken, each at its best shape.
 
 use super::refine::{self, Bench, Profiled};
-use super::{LEVEL, Model, Search, tones};
+use super::{LEVEL, MOST_RIVALS, Model, Search, tones};
+use crate::closure::channels::Channels;
 use crate::closure::effects::tone::Pickup;
 use crate::closure::effects::{Bias, Candidate, Missing, Point};
 use crate::closure::likelihood::candidates::{Grid, Group};
@@ -15,6 +16,19 @@ pub const PRICE: f64 = 2.0;
 
 /// Net gain within which two explanations are equally good.
 pub const EQUAL: f64 = 4.0;
+
+/// The same where the temperature goes one way: what depends on temperature is then a function of time and
+/// the other way round, so that a catalogue's idealised forms differ by less than the truth from each.
+const EQUAL_ONE_WAY: f64 = 12.0;
+
+/// How good two explanations of a record are equal.
+pub fn equal(c: &Channels) -> f64 {
+    if c.goes_one_way() {
+        EQUAL_ONE_WAY
+    } else {
+        EQUAL
+    }
+}
 
 /// A candidate of one round, judged.
 #[derive(Clone)]
@@ -45,18 +59,25 @@ type Running = Vec<(Arc<dyn Candidate>, Vec<Point>)>;
 pub struct Round {
     /// The best net gain first.
     pub judged: Vec<Judged>,
+    /// Net gain within which two of them are equally good.
+    pub equal: f64,
     /// What could not be judged.
     pub missing: Vec<(Arc<dyn Candidate>, Missing)>,
 }
 
 impl Round {
-    /// Names that do as well as the given one, best first.
+    /// Names that do as well as the given one, best first; of those that do so only because the
+    /// temperature goes one way, no more than a step may have.
     pub fn rivals(&self, chosen: &Judged) -> Vec<String> {
         let id = chosen.candidate.id();
-        self.judged
-            .iter()
-            .filter(|j| j.candidate.named() && j.candidate.id() != id)
-            .filter(|j| j.net > chosen.net - EQUAL)
+        let others = || {
+            let named = self.judged.iter().filter(|j| j.candidate.named());
+            named.filter(|j| j.candidate.id() != id)
+        };
+        let within = |margin: f64| others().filter(move |j| j.net > chosen.net - margin);
+        let strict = within(EQUAL).count();
+        within(self.equal.max(EQUAL))
+            .take(strict.max(MOST_RIVALS))
             .map(|j| j.candidate.id())
             .collect()
     }
@@ -104,7 +125,11 @@ impl Search<'_> {
         let tone_p = tone.map_or(1.0, |t| (2.0 * t.p_value).min(1.0));
         let mut judged = self.refined(model, &running, &scores, tone_p);
         judged.sort_by(|a, b| b.net.total_cmp(&a.net));
-        Round { judged, missing }
+        Round {
+            judged,
+            equal: equal(c),
+            missing,
+        }
     }
 
     /// The best shape of every group that is near the leader, its non-linear parameters

@@ -102,6 +102,8 @@ pub struct Model {
     pub beta: Vec<f64>,
     /// Regressors over all rows: declared ones, then the terms'.
     pub columns: Vec<Vec<f64>>,
+    /// How far the clipped rows lie from the levels of the clip, deg/s.
+    pub off_dps: f64,
     /// Log-likelihood of all training rows, spikes included: for models of the same rows.
     pub value: f64,
 }
@@ -243,11 +245,13 @@ impl<'a> Search<'a> {
                 _ => add_scaled(&mut y, -1.0, column),
             }
         }
-        if clipped.contains(&1.0) {
+        let clips = clipped.contains(&1.0);
+        if clips {
             // The noise needs a constant over all rows, clipped ones too.
             free.push(clipped);
         }
         let fit = reml::fit(&c.time_s, &y, &free, &self.used, options)?;
+        let off_dps = fit.beta.last().copied().filter(|_| clips).unwrap_or(0.0);
         let mut given = fit.beta.iter();
         let mut beta: Vec<f64> = kinds
             .iter()
@@ -281,6 +285,7 @@ impl<'a> Search<'a> {
             bias,
             beta,
             columns,
+            off_dps,
         })
     }
 

@@ -52,7 +52,28 @@ impl Search<'_> {
                 break;
             }
         }
-        self.model(&model.terms)
+        self.levelled(self.model(&model.terms)?)
+    }
+
+    /// A clip's levels where its rows lie: what these have in common is a constant beside the model, which
+    /// no likelihood tells from other levels.
+    fn levelled(&self, model: Model) -> Result<Model, Unusable> {
+        let mut terms = model.terms.clone();
+        for term in terms.iter_mut().filter(|t| t.candidate.is_last()) {
+            if let Some(point) = term.candidate.moved(&term.point, model.off_dps) {
+                term.point = point;
+            }
+        }
+        if terms
+            .iter()
+            .zip(&model.terms)
+            .all(|(a, b)| a.point == b.point)
+        {
+            return Ok(model);
+        }
+        let levelled = self.model(&terms)?;
+        let nearer = levelled.off_dps.abs() < 0.5 * model.off_dps.abs();
+        Ok(if nearer { levelled } else { model })
     }
 
     fn polished_once(&self, mut model: Model) -> Result<Model, Unusable> {
