@@ -1,7 +1,7 @@
 //! A thermal record closed: from its rows to `closure.json` (`docs/manual.md`, "Closing the loop").
 
 use super::channels::Channels;
-use super::effects::{Candidate, Missing};
+use super::effects::{Candidate, Missing, user};
 use super::firmware;
 use super::likelihood::blocks::{self, Split};
 use super::search::judge::Round;
@@ -108,7 +108,13 @@ pub fn close(
         .map_err(|missing| refuse(format!("column {missing} holds no measured value")))?;
     let split = blocks::split(&channels.time_s, &channels.u).map_err(|e| refuse(e.to_string()))?;
     let (closure, before, after, correction) = {
-        let search = Search::new(&channels, &split, effort, Vec::new());
+        let mut extra: Vec<Arc<dyn Candidate>> = Vec::new();
+        for own in user::all(&design.effects, &channels) {
+            let remark = own.remarks();
+            warnings.extend(remark.map(|(code, said)| Warning::general(code, said)));
+            extra.push(Arc::new(own));
+        }
+        let search = Search::new(&channels, &split, effort, extra);
         let unusable = |e: super::likelihood::Unusable| refuse(e.to_string());
         let found = search.run().map_err(unusable)?;
         let before = search.model(&[]).map_err(unusable)?;
@@ -240,6 +246,9 @@ impl Told<'_> {
         let estimates = self.search.estimates(self.after);
         let none = (None, FirmwareErrors::default());
         let Some(plan) = firmware::plan(c, self.after, &estimates, widest) else {
+            let terms = self.after.terms.iter();
+            let obstacles = terms.filter_map(|t| t.candidate.obstacle(c));
+            warnings.extend(obstacles.map(|why| Warning::general("not_compensable", why)));
             return none;
         };
         let noise = self.after.fit.noise.white_rms_dps;
