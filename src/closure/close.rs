@@ -74,6 +74,83 @@ fn degc_of(gyro: &Gyro, thermometer: &str, reading: f64) -> f64 {
     reference + (reading + quarter) / slope
 }
 
+/// A record that cannot be fitted.
+fn refused(record: &ThermalRecord, why: String) -> crate::error::Error {
+    InputError::new(why)
+        .in_file(&record.source)
+        .help("record longer, or average less")
+        .into()
+}
+
+/// A record as candidates see it.
+///
+/// # Errors
+/// No thermometer of the name that the design gives; a column that is needed and holds no value.
+pub fn channels_of(
+    record: &ThermalRecord,
+    design: &Design,
+    warnings: &mut Vec<Warning>,
+) -> Result<Channels> {
+    let name = thermometer(record, &design.record)?;
+    let mut columns = record.columns.clone();
+    let name = name.unwrap_or_else(|| {
+        warnings.push(Warning::general(
+            "no_thermometer",
+            "the record has no thermometer: the declared bias is a constant, and effects of temperature \
+             cannot be seen",
+        ));
+        columns.insert(NONE.to_owned(), vec![0.0; record.len()]);
+        NONE.to_owned()
+    });
+    let degc = |reading: f64| degc_of(&design.gyro, &name, reading);
+    Channels::new(&record.time_s, &columns, &name, degc)
+        .map_err(|missing| refused(record, format!("column {missing} holds no measured value")))
+}
+
+/// The effects that the design's user suspects, for a record.
+fn own_candidates(
+    design: &Design,
+    channels: &Channels,
+    warnings: &mut Vec<Warning>,
+) -> Vec<Arc<dyn Candidate>> {
+    let mut out: Vec<Arc<dyn Candidate>> = Vec::new();
+    for own in user::all(&design.effects, channels) {
+        let remark = own.remarks();
+        warnings.extend(remark.map(|(code, said)| Warning::general(code, said)));
+        out.push(Arc::new(own));
+    }
+    out
+}
+
+/// A step's name, and what does as well.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Named {
+    /// Its id.
+    pub effect: String,
+    /// Ids.
+    pub rivals: Vec<String>,
+}
+
+/// The names alone that [`close`] gives a record, in the order of the steps.
+///
+/// # Errors
+/// As there.
+pub fn names(record: &ThermalRecord, design: &Design, effort: Effort) -> Result<Vec<Named>> {
+    let mut warnings = Vec::new();
+    let channels = channels_of(record, design, &mut warnings)?;
+    let unusable = |e: super::likelihood::Unusable| refused(record, e.to_string());
+    let split = blocks::split(&channels.time_s, &channels.u).map_err(unusable)?;
+    let own = own_candidates(design, &channels, &mut warnings);
+    let found = Search::new(&channels, &split, effort, own)
+        .run()
+        .map_err(unusable)?;
+    let named = |term: super::search::Term| Named {
+        effect: term.id(),
+        rivals: term.rivals,
+    };
+    Ok(found.terms.into_iter().map(named).collect())
+}
+
 /// Closes a record.
 ///
 /// # Errors
@@ -86,35 +163,12 @@ pub fn close(
     effort: Effort,
 ) -> Result<Closed> {
     let start = std::time::Instant::now();
-    let name = thermometer(record, &design.record)?;
-    let mut columns = record.columns.clone();
-    let name = name.unwrap_or_else(|| {
-        warnings.push(Warning::general(
-            "no_thermometer",
-            "the record has no thermometer: the declared bias is a constant, and effects of temperature \
-             cannot be seen",
-        ));
-        columns.insert(NONE.to_owned(), vec![0.0; record.len()]);
-        NONE.to_owned()
-    });
-    let refuse = |why: String| -> crate::error::Error {
-        InputError::new(why)
-            .in_file(&record.source)
-            .help("record longer, or average less")
-            .into()
-    };
-    let degc = |reading: f64| degc_of(&design.gyro, &name, reading);
-    let channels = Channels::new(&record.time_s, &columns, &name, degc)
-        .map_err(|missing| refuse(format!("column {missing} holds no measured value")))?;
+    let channels = channels_of(record, design, &mut warnings)?;
+    let refuse = |why: String| refused(record, why);
     let split = blocks::split(&channels.time_s, &channels.u).map_err(|e| refuse(e.to_string()))?;
     let (closure, before, after, correction) = {
-        let mut extra: Vec<Arc<dyn Candidate>> = Vec::new();
-        for own in user::all(&design.effects, &channels) {
-            let remark = own.remarks();
-            warnings.extend(remark.map(|(code, said)| Warning::general(code, said)));
-            extra.push(Arc::new(own));
-        }
-        let search = Search::new(&channels, &split, effort, extra);
+        let own = own_candidates(design, &channels, &mut warnings);
+        let search = Search::new(&channels, &split, effort, own);
         let unusable = |e: super::likelihood::Unusable| refuse(e.to_string());
         let found = search.run().map_err(unusable)?;
         let before = search.model(&[]).map_err(unusable)?;

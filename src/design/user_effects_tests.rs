@@ -108,7 +108,7 @@ fn what_is_wrong_is_refused_in_its_place() {
                 "g = {}, a = { range = [3, 2] }, b = {}, c = {}",
             ),
             4,
-            39,
+            38,
             "goes from 3 to 2",
             "least value first",
         ),
