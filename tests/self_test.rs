@@ -97,19 +97,18 @@ fn names_for_noise_do_not_pass() {
     let o = run_with(
         &design,
         None,
-        &request(&["none"], 1, 10),
+        &request(&["g_sensitivity"], 1, 10),
         &|_, _| {},
         &guesses,
     )
     .unwrap();
-    assert!(o.effects.is_empty());
     assert!(
         (2..20).contains(&o.false_alarms.alarms),
         "{:?}",
         o.false_alarms
     );
     assert!(
-        !o.holds && o.failures[0].contains("without an effect"),
+        !o.holds && o.failures.iter().any(|f| f.contains("without an effect")),
         "{:?}",
         o.failures
     );
@@ -118,11 +117,11 @@ fn names_for_noise_do_not_pass() {
 
 const OWN: &str = r#"
 [[effects]]
-id = "rings_with_supply"
-expression = "a*sin(supply_v/w)"
+id = "rings_with_board"
+expression = "a*sin(die_degc/w)"
 [effects.parameters]
 a = { unit = "deg/s" }
-w = { unit = "V", range = [0.02, 0.2] }
+w = { unit = "K", range = [4, 10] }
 
 [[effects]]
 id = "needs_pressure"
@@ -132,9 +131,9 @@ parameters = { a = {} }
 
 #[test]
 fn an_effect_of_the_users_is_planted_too() {
-    let only = ["rings_with_supply", "needs_pressure"];
+    let only = ["rings_with_board", "needs_pressure"];
     let o = run(&design(OWN), None, &request(&only, 2, 0), &|_, _| {}).unwrap();
-    assert_eq!(at(&o, "rings_with_supply", 10.0), (2, 2));
+    assert_eq!(at(&o, "rings_with_board", 10.0), (2, 2));
     assert_eq!(at(&o, "needs_pressure", 10.0), (0, 0));
     let needs = o
         .effects
@@ -231,5 +230,6 @@ fn options_of_a_self_test_need_one() {
     assert_eq!(run(&["--record", "r.csv", "--seed", "3"]), Some(2));
     assert_eq!(run(&["--self-test", "--capture", "c.csv"]), Some(2));
     assert_eq!(run(&["--self-test", "--records", "0"]), Some(2));
+    assert_eq!(run(&["--self-test", "--effect", "gravity"]), Some(2));
     assert_eq!(run(&["--self-test", "--record", "absent.csv"]), Some(2));
 }

@@ -130,6 +130,9 @@ fn print(o: &Outcome) {
         say!("taken off before: {}", o.own_steps.join(", "));
     }
     let a = &o.false_alarms;
+    if a.records == 0 {
+        return;
+    }
     let kinds: Vec<String> = a
         .by_noise
         .iter()

@@ -115,7 +115,7 @@ fn what_is_wrong_is_refused_in_its_place() {
         (
             expression("g*agc", "g = { range = [1] }"),
             4,
-            29,
+            30,
             "has 1 values",
             "[low, high]",
         ),
@@ -129,7 +129,7 @@ fn what_is_wrong_is_refused_in_its_place() {
         (
             expression("g*agc", "g = { range = [1, 2], start = 3 }"),
             4,
-            45,
+            46,
             "is 3, outside the range",
             "",
         ),
@@ -184,7 +184,7 @@ fn what_is_wrong_is_refused_in_its_place() {
         ),
         (
             format!("{WOBBLE}\n[[effects]]\n{WOBBLE}"),
-            11,
+            10,
             6,
             "as that of an effect above",
             "id of its own",

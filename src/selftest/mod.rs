@@ -18,7 +18,7 @@ pub mod trial;
 use crate::closure::close;
 use crate::closure::search::Effort;
 use crate::design::{Design, RecordMapping, UserEffect};
-use crate::error::Result;
+use crate::error::{InputError, Result};
 use crate::record::{ThermalRecord, Warning};
 use outcome::{NoiseOf, Outcome, SCHEMA};
 use planted::{CATALOGUE, COUPLING, Kind};
@@ -87,7 +87,7 @@ struct Case {
 /// Tests the search as it is.
 ///
 /// # Errors
-/// A record that cannot be closed.
+/// A record that cannot be closed; an effect in [`Request::only`] that cannot be planted.
 pub fn run(
     design: &Design,
     record: Option<(&ThermalRecord, &[Warning])>,
@@ -137,6 +137,12 @@ pub fn run_with(
             (scenes, cases, clean)
         }
     };
+    let known: Vec<String> = cases.iter().map(|c| c.kind.id()).collect();
+    if let Some(id) = request.only.iter().find(|id| !known.contains(id)) {
+        return Err(InputError::new(format!("no effect {id} can be planted"))
+            .help(format!("these can: {}", known.join(", ")))
+            .into());
+    }
     cases.retain(|c| request.only.is_empty() || request.only.contains(&c.kind.id()));
     let trials = trials(&scenes, &cases, &clean, request);
     let marks = marked(&trials, request, progress, answer)?;

@@ -137,10 +137,19 @@ impl Kind {
         }
     }
 
-    /// What its size is, with the unit.
-    pub fn knob(&self) -> String {
+    /// What its size is in a scene, with the unit.
+    pub fn knob(&self, scene: &Scene) -> String {
+        // A record's: gas is in its drive gain, and its thermometer may be no phase.
+        let is_record = scene.gas.is_empty();
         match self {
-            Kind::Catalogue(planted) => planted.knob.to_owned(),
+            Kind::Catalogue(planted) => match planted.id {
+                "damping_bias" if is_record => "dps, 1/Q being doubled",
+                "bias_third_order" if is_record && scene.thermometer != "phase_rad" => {
+                    "dps at u = 1"
+                }
+                _ => planted.knob,
+            }
+            .to_owned(),
             Kind::Covariate(_) => "dps over half the column's range".to_owned(),
             Kind::User(effect) => {
                 let mut amplitudes = effect.amplitudes();

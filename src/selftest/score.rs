@@ -53,7 +53,9 @@ pub(super) fn scores(
                     .get(case.scene)
                     .map_or(String::new(), |s| s.name.to_owned()),
                 remark,
-                own_unit: case.kind.knob(),
+                own_unit: scenes
+                    .get(case.scene)
+                    .map_or(String::new(), |s| case.kind.knob(s)),
                 minimum_detectable: limit.and_then(|l| Minimum::of(l, &own)),
                 wrong_names: counted(marks),
                 by_size,
