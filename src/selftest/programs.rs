@@ -187,7 +187,7 @@ pub fn scene(design: &Design, program: Program, rows: usize) -> Scene {
         instants: Vec::with_capacity(rows),
         agc: Vec::with_capacity(rows),
         gas: Vec::with_capacity(rows),
-        drive: (!tracking).then(|| (device.drive.clone(), device.excitation_hz)),
+        drive: (!tracking).then_some((device.drive, device.excitation_hz)),
         declared_dps: Vec::with_capacity(rows),
         columns: BTreeMap::new(),
         thermometer: thermometer.to_owned(),
