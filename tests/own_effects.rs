@@ -148,7 +148,7 @@ fn a_record_without_them_names_nothing_and_says_what_was_not_judged() {
         assert_eq!(fate("bearing_wobble"), Fate::Rejected);
         assert_eq!(fate("has_no_column"), Fate::NoChannel);
         assert_eq!(fate("has_no_value"), Fate::NotExcited);
-        let codes: Vec<&str> = c.closure.warnings.iter().map(|w| w.code.as_ref()).collect();
+        let codes: Vec<&str> = c.closure.warnings.iter().map(|w| w.code).collect();
         assert!(codes.contains(&"effect_without_channel") && codes.contains(&"effect_not_judged"));
     }
 }
