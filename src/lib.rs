@@ -3,7 +3,7 @@
 //! In reading order: [`numeric`] (formats and arithmetics), [`circuit`] (the detection circuit,
 //! written once), [`design`] (what a user writes), [`plant`] (the simulated gyro), [`cosim`] (both in closed loop),
 //! [`record`] (what was measured), [`closure`] (what a record says), [`job`] (the main job), [`emit`] and [`verify`]
-//! (C and Rust, and that they are the model), [`report`].
+//! (C and Rust, and that they are the model), [`report`]; [`selftest`] says what [`closure`] finds and what not.
 
 pub mod approx;
 pub mod circuit;
@@ -21,6 +21,7 @@ pub mod output;
 pub mod plant;
 pub mod record;
 pub mod report;
+pub mod selftest;
 pub mod simulation;
 pub mod spectrum;
 pub mod trace_file;

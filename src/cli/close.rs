@@ -17,21 +17,31 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// A measured thermal record: CSV, PX4 ULog or ArduPilot DataFlash.
-    #[arg(long, required_unless_present = "capture")]
-    record: Option<PathBuf>,
+    #[arg(long, required_unless_present_any = ["capture", "self_test"])]
+    pub(super) record: Option<PathBuf>,
     /// Captured ADC codes instead: CSV, or NPY with its keys in a TOML file beside it.
     #[arg(long, conflicts_with = "record")]
     capture: Option<PathBuf>,
+    /// Plants effects of several sizes and says which of them are found; with --record, in the
+    /// experiment and the noise of that record.
+    #[arg(long, conflicts_with = "capture")]
+    self_test: bool,
     /// Design file; the embedded default if left out.
     #[arg(long)]
-    design: Option<PathBuf>,
-    /// Folder for the results; made if it does not exist.
-    #[arg(long, default_value = "gyrogen-close")]
-    out: PathBuf,
+    pub(super) design: Option<PathBuf>,
+    /// Folder for the results; made if it does not exist. gyrogen-close if left out; a self-test writes
+    /// none then.
+    #[arg(long)]
+    pub(super) out: Option<PathBuf>,
     /// How the result is printed.
     #[arg(long, value_enum, default_value = "text")]
-    format: OutputFormat,
+    pub(super) format: OutputFormat,
+    #[command(flatten)]
+    pub(super) test: super::self_test::Options,
 }
+
+/// Where results go.
+const FOLDER: &str = "gyrogen-close";
 
 /// Runs the command.
 ///
@@ -39,6 +49,9 @@ pub struct Arguments {
 /// An unusable design or record (exit 2).
 pub fn run(arguments: &Arguments) -> Result<()> {
     let design = super::design(arguments.design.as_deref())?;
+    if arguments.self_test {
+        return super::self_test::run(arguments, &design);
+    }
     let loud = std::io::stderr().is_terminal();
     let called = |what: &str, path: &Path| {
         let mut command = format!("gyrogen close --{what} {}", path.display());
@@ -50,7 +63,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         }
         command
     };
-    let out = &arguments.out;
+    let out = arguments.out.as_deref().unwrap_or(Path::new(FOLDER));
     let closure = if let Some(path) = &arguments.capture {
         let (closure, _) = capture::close(path, &design, &called("capture", path))?;
         super::make_folder(out)?;

@@ -19,6 +19,7 @@ mod equiv;
 mod init;
 mod replay;
 mod run;
+mod self_test;
 mod simulate;
 mod verify;
 

@@ -1,8 +1,10 @@
 //! A thermal record closed: from its rows to `closure.json` (`docs/manual.md`, "Closing the loop").
 
 use super::channels::Channels;
-use super::effects::{Candidate, Missing};
+use super::effects::{Candidate, Missing, user};
 use super::firmware;
+pub use super::intake::channels_of;
+use super::intake::refused;
 use super::likelihood::blocks::{self, Split};
 use super::search::judge::Round;
 use super::search::{Effort, Found, LEVEL, Model, Search};
@@ -10,9 +12,8 @@ use super::verdict::{
     Closure, Errors, Evidence, Fate, FirmwareErrors, SCHEMA, Step, Structure, Verdict,
 };
 use crate::correction::Correction;
-use crate::design::{Design, Gyro, RecordMapping};
-use crate::error::{InputError, Result};
-use crate::record::columns::THERMOMETERS;
+use crate::design::Design;
+use crate::error::Result;
 use crate::record::{ThermalRecord, Warning, stats};
 use std::sync::Arc;
 
@@ -32,64 +33,48 @@ pub struct Closed {
     pub correction: Option<Correction>,
 }
 
-/// The bias model's thermometer in a record, if it has one.
+/// The effects that the design's user suspects, for a record.
+fn own_candidates(
+    design: &Design,
+    channels: &Channels,
+    warnings: &mut Vec<Warning>,
+) -> Vec<Arc<dyn Candidate>> {
+    let mut out: Vec<Arc<dyn Candidate>> = Vec::new();
+    for own in user::all(&design.effects, channels) {
+        let remark = own.remarks();
+        warnings.extend(remark.map(|(code, said)| Warning::general(code, said)));
+        out.push(Arc::new(own));
+    }
+    out
+}
+
+/// A step's name, and what does as well.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Named {
+    /// Its id.
+    pub effect: String,
+    /// Ids.
+    pub rivals: Vec<String>,
+}
+
+/// The names alone that [`close`] gives a record, in the order of the steps.
 ///
 /// # Errors
-/// The design names one that is not there.
-fn thermometer(record: &ThermalRecord, mapping: &RecordMapping) -> Result<Option<String>> {
-    match &mapping.thermometer {
-        Some(name) if record.column(name).is_none() => Err(InputError::new(format!(
-            "the record has no column {name}, which the design names as thermometer"
-        ))
-        .in_file(&record.source)
-        .help(format!(
-            "the record has: {}",
-            record
-                .columns
-                .keys()
-                .cloned()
-                .collect::<Vec<_>>()
-                .join(", ")
-        ))
-        .into()),
-        Some(name) => Ok(Some(name.clone())),
-        None => Ok(THERMOMETERS
-            .into_iter()
-            .find(|t| record.measured(t) > 0)
-            .map(str::to_owned)),
-    }
-}
-
-/// Temperatures that a gyro may have, degC.
-const TEMPERATURES_DEGC: (f64, f64) = (-100.0, 250.0);
-
-/// Temperature of the declared gyro at a reading of its phase (rad) or frequency (Hz), degC: the
-/// resonance's law linearised at the reference temperature (eq. 1 to 8 of the seed paper), where it
-/// stands at `nominal` (-pi/2 rad, or the drive frequency).
-fn degc_of(gyro: &Gyro, thermometer: &str, nominal: f64, reading: f64) -> f64 {
-    let per_k = gyro.stiffness_tempco_per_k.abs();
-    let slope = if thermometer == "freq_hz" {
-        -0.5 * per_k * nominal
-    } else {
-        -gyro.drive_q * per_k + gyro.electronics.phase_slope_rad_per_k
+/// As there.
+pub fn names(record: &ThermalRecord, design: &Design, effort: Effort) -> Result<Vec<Named>> {
+    let mut warnings = Vec::new();
+    let channels = channels_of(record, design, &mut warnings)?;
+    let unusable = |e: super::likelihood::Unusable| refused(record, e.to_string());
+    let split = blocks::split(&channels.time_s, &channels.u).map_err(unusable)?;
+    let own = own_candidates(design, &channels, &mut warnings);
+    let found = Search::new(&channels, &split, effort, own)
+        .run()
+        .map_err(unusable)?;
+    let named = |term: super::search::Term| Named {
+        effect: term.id(),
+        rivals: term.rivals,
     };
-    gyro.reference_temperature_k - 273.15 + (reading - nominal) / slope
-}
-
-/// What the thermometer shows at the reference temperature: as the design says, or, if the record is of
-/// another gyro, the middle of its readings. The second: whether temperatures are known.
-fn nominal(gyro: &Gyro, thermometer: &str, readings: &[f64]) -> (f64, bool) {
-    let declared = match thermometer {
-        "freq_hz" => gyro.drive_frequency_hz,
-        _ => -std::f64::consts::FRAC_PI_2,
-    };
-    let (low, high) = stats::extremes(readings).unwrap_or((declared, declared));
-    let middle = 0.5 * (low + high);
-    let (coldest, hottest) = TEMPERATURES_DEGC;
-    if (coldest..=hottest).contains(&degc_of(gyro, thermometer, declared, middle)) {
-        return (declared, true);
-    }
-    (middle, false)
+    Ok(found.terms.into_iter().map(named).collect())
 }
 
 /// Closes a record.
@@ -104,43 +89,12 @@ pub fn close(
     effort: Effort,
 ) -> Result<Closed> {
     let start = std::time::Instant::now();
-    let name = thermometer(record, &design.record)?;
-    let mut columns = record.columns.clone();
-    let name = name.unwrap_or_else(|| {
-        warnings.push(Warning::general(
-            "no_thermometer",
-            "the record has no thermometer: the declared bias is a constant, and effects of temperature \
-             cannot be seen",
-        ));
-        columns.insert(NONE.to_owned(), vec![0.0; record.len()]);
-        NONE.to_owned()
-    });
-    let refuse = |why: String| -> crate::error::Error {
-        InputError::new(why)
-            .in_file(&record.source)
-            .help("record longer, or average less")
-            .into()
-    };
-    let readings = columns.get(&name).map_or(&[][..], Vec::as_slice);
-    let (nominal, known) = nominal(&design.gyro, &name, readings);
-    let told_in_degc = ["die_degc", "chamber_degc"].map(|t| columns.contains_key(t));
-    if !known && !told_in_degc.contains(&true) && ["phase_rad", "freq_hz"].contains(&name.as_str())
-    {
-        let degc = design.gyro.reference_temperature_k - 273.15;
-        warnings.push(Warning::general(
-            "temperature_unknown",
-            format!(
-                "{name} around {nominal} is not that of the design's gyro: temperatures are counted from there \
-                 as if it were {degc:.2} degC; name the gyro's drive frequency and law in the design"
-            ),
-        ));
-    }
-    let degc = |reading: f64| degc_of(&design.gyro, &name, nominal, reading);
-    let channels = Channels::new(&record.time_s, &columns, &name, degc)
-        .map_err(|missing| refuse(format!("column {missing} holds no measured value")))?;
+    let channels = channels_of(record, design, &mut warnings)?;
+    let refuse = |why: String| refused(record, why);
     let split = blocks::split(&channels.time_s, &channels.u).map_err(|e| refuse(e.to_string()))?;
     let (closure, before, after, correction) = {
-        let search = Search::new(&channels, &split, effort, Vec::new());
+        let own = own_candidates(design, &channels, &mut warnings);
+        let search = Search::new(&channels, &split, effort, own);
         let unusable = |e: super::likelihood::Unusable| refuse(e.to_string());
         let found = search.run().map_err(unusable)?;
         let before = search.model(&[]).map_err(unusable)?;
@@ -171,9 +125,6 @@ pub fn close(
     closed.closure.seconds = start.elapsed().as_secs_f64();
     Ok(closed)
 }
-
-/// Stands for the thermometer where there is none.
-const NONE: &str = "no_thermometer";
 
 /// A search put into words.
 struct Told<'a> {
@@ -272,6 +223,9 @@ impl Told<'_> {
         let estimates = self.search.estimates(self.after);
         let none = (None, FirmwareErrors::default());
         let Some(plan) = firmware::plan(c, self.after, &estimates, widest) else {
+            let terms = self.after.terms.iter();
+            let obstacles = terms.filter_map(|t| t.candidate.obstacle(c));
+            warnings.extend(obstacles.map(|why| Warning::general("not_compensable", why)));
             return none;
         };
         let noise = self.after.fit.noise.white_rms_dps;

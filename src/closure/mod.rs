@@ -17,6 +17,7 @@ pub mod close;
 pub mod effects;
 pub mod firmware;
 pub mod folds;
+pub mod intake;
 pub mod likelihood;
 pub mod noise;
 pub mod order;

@@ -16,6 +16,7 @@ pub(super) const KEYS: &[(&str, &[(&str, &str)])] = &[
             ("thermal_run", "["),
             ("record", "["),
             ("fit", "["),
+            ("effects", "["),
         ],
     ),
     (
@@ -237,6 +238,18 @@ pub(super) const KEYS: &[(&str, &[(&str, &str)])] = &[
     ("fit", &[("order", "2"), ("heldout_blocks", "10")]),
 ];
 
+/// Of each `[[effects]]`.
+const USER_EFFECT: &[(&str, &str)] = &[
+    ("id", "\"bearing_wobble\""),
+    ("expression", "\"gain*sin(2*pi*time_s/period)\""),
+    (
+        "parameters",
+        "{ gain = { unit = \"deg/s\" }, period = { unit = \"s\", range = [5.0, 200.0] } }",
+    ),
+    ("physics", "\"the table's bearing is not round\""),
+    ("compensable", "false"),
+];
+
 const LOOP_GAIN: &[(&str, &str)] = &[("raw", "9"), ("shift", "6")];
 
 /// The thermometers that a polynomial or a bias model can be in, besides the circuit's phase.
@@ -253,6 +266,7 @@ fn keys_of(table: &str) -> Vec<(&'static str, &'static str)> {
             let parameters = kind.parameters.iter();
             parameters.map(|p| (p.key, p.example)).collect()
         }),
+        None if table.starts_with("effects[") => USER_EFFECT.to_vec(),
         None => {
             let known = KEYS.iter().find(|(t, _)| *t == table);
             known.map_or(Vec::new(), |t| t.1.to_vec())

@@ -1,7 +1,7 @@
 //! From a design file to a checked [`Design`], with the place of every mistake.
 
 use super::table::{Doc, Table};
-use super::{circuit_tables, correction_table, device_tables, limits, template};
+use super::{circuit_tables, correction_table, device_tables, limits, template, user_effects};
 use crate::design::schema::*;
 use crate::error::{Error, InputError, Result, io_error};
 use sha2::{Digest, Sha256};
@@ -88,6 +88,10 @@ fn build(text: &str, file: Option<&Path>, base: Option<&Design>) -> Result<Desig
         )?,
         record: device_tables::record(&section("record")?, base.map(|b| &b.record))?,
         fit: device_tables::fit(&section("fit")?, base.map(|b| &b.fit))?,
+        effects: match root.get("effects") {
+            Some(value) => user_effects::effects(&doc, &value)?,
+            None => Vec::new(),
+        },
         source: Source {
             path: file.map(Path::to_path_buf),
             text: text.to_owned(),

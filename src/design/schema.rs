@@ -3,6 +3,7 @@
 
 use super::effects::Effects;
 pub use super::log_axis::LogAxis;
+use super::user_effects::UserEffect;
 use crate::correction::Planned;
 use crate::numeric::format::{Format, Overflow, Quantizer, Rounding, pow2};
 use std::collections::BTreeMap;
@@ -29,6 +30,8 @@ pub struct Design {
     pub record: RecordMapping,
     /// How the compensation is fitted.
     pub fit: FitOptions,
+    /// What the user suspects: candidates of `gyrogen close`.
+    pub effects: Vec<UserEffect>,
     /// Where the design came from.
     pub source: Source,
 }

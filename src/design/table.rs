@@ -292,6 +292,19 @@ impl<'a> Value<'a> {
         }
     }
 
+    /// Its bytes in the text.
+    pub fn span(&self) -> std::ops::Range<usize> {
+        self.value.span()
+    }
+
+    /// `true` or `false`.
+    pub fn flag(&self) -> Result<bool> {
+        let flag = self.value.get_ref().as_bool();
+        flag.ok_or_else(|| {
+            self.wrong_type("true or false", "write `true` or `false`, without quotes")
+        })
+    }
+
     /// True if the value is a string.
     pub fn is_text(&self) -> bool {
         self.value.get_ref().is_str()

@@ -193,6 +193,12 @@ impl Frame {
         self
     }
 
+    /// The horizontal axis logarithmic: its interval, and the abscissae of what is drawn, are powers of ten.
+    pub fn logarithmic_across(mut self, x: &Axis) -> Self {
+        (self.x_ticks, self.x_label) = (decades(self.x), x.labelled(0));
+        self
+    }
+
     fn px(&self, x: f64) -> f64 {
         self.left + self.width * (x - self.x.low) / (self.x.high - self.x.low)
     }

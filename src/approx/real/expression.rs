@@ -94,6 +94,11 @@ impl Function {
 pub(super) enum Kind {
     /// The variable.
     X,
+    /// A name whose value comes with every evaluation ([`super::formula`]): its place among them.
+    Named {
+        text: String,
+        place: usize,
+    },
     /// A number or a named parameter: as it is written, its value in double precision and exactly.
     Constant {
         text: String,
@@ -183,7 +188,7 @@ impl Expression {
         };
         let of = |i: usize| self.nodes.get(i).and_then(|n| n.constant);
         let known = match &node.kind {
-            Kind::X => None,
+            Kind::X | Kind::Named { .. } => None,
             Kind::Constant { exact, .. } => Some(*exact),
             Kind::Negate(a) => of(*a).map(|a| -a),
             Kind::Apply(function, a) => of(*a)
@@ -212,10 +217,16 @@ impl Expression {
 
     /// The value in double precision; not a number where it is undefined.
     pub fn value(&self, x: f64) -> f64 {
-        let mut values: Vec<f64> = Vec::with_capacity(self.nodes.len());
+        self.value_with(x, &[], &mut Vec::with_capacity(self.nodes.len()))
+    }
+
+    /// The same with the values of the names, in their places; `values` is scratch.
+    pub(super) fn value_with(&self, x: f64, named: &[f64], values: &mut Vec<f64>) -> f64 {
+        values.clear();
         for node in &self.nodes {
             let value = match &node.kind {
                 Kind::X => x,
+                Kind::Named { place, .. } => named.get(*place).copied().unwrap_or(f64::NAN),
                 Kind::Constant { double, .. } => *double,
                 Kind::Negate(a) => -values[*a],
                 Kind::Add(a, b) => values[*a] + values[*b],
@@ -237,6 +248,8 @@ impl Expression {
             let jet = match (&node.kind, node.constant) {
                 (_, Some(constant)) => Ok(Jet::constant(constant, length)),
                 (Kind::X, _) => Ok(Jet::variable(x, length)),
+                // Nothing is known of it; only formulas have names, and they are never enclosed.
+                (Kind::Named { .. }, _) => Ok(Jet::constant(Interval::WHOLE, length)),
                 (Kind::Constant { exact, .. }, _) => Ok(Jet::constant(*exact, length)),
                 (Kind::Negate(a), _) => Ok(jets[*a].neg()),
                 (Kind::Apply(function, a), _) => function.of(&jets[*a]),
@@ -297,6 +310,7 @@ impl Expression {
         };
         let (text, binds) = match &node.kind {
             Kind::X => ("x".to_owned(), 9),
+            Kind::Named { text, .. } => (text.clone(), 9),
             Kind::Constant { text, .. } if text.starts_with('-') => (text.clone(), 3),
             Kind::Constant { text, .. } => (text.clone(), 9),
             Kind::Negate(a) => (format!("-{}", self.written(*a, 3)), 3),

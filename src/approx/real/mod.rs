@@ -2,7 +2,7 @@
 //!
 //! In reading order: [`wide`] (numbers of 106 bits, rounded either way), [`interval`] and `elementary`
 //! (rigorous intervals), [`jet`] (Taylor coefficients over intervals), [`expression`] and [`parser`]
-//! (what a user writes), [`domain`], [`segment`] and [`enclosure`] (a function as Taylor polynomials
+//! (what a user writes; [`formula`]: with names of its own), [`domain`], [`segment`] and [`enclosure`] (a function as Taylor polynomials
 //! with radii), [`supremum`] (how far a polynomial is from it, at most) and [`derivatives`].
 
 mod constants;
@@ -11,6 +11,7 @@ pub mod domain;
 mod elementary;
 pub mod enclosure;
 pub mod expression;
+pub mod formula;
 pub mod interval;
 pub mod jet;
 pub mod parser;
@@ -22,6 +23,7 @@ pub mod wide;
 pub use domain::{Domain, Dyadic, Undefined};
 pub use enclosure::Enclosure;
 pub use expression::Expression;
+pub use formula::Formula;
 pub use interval::Interval;
 pub use supremum::Supremum;
 pub use wide::Wide;

@@ -48,6 +48,9 @@ enum Token<'a> {
 struct Parser<'a> {
     text: &'a str,
     parameters: &'a BTreeMap<String, f64>,
+    /// The names that stand for themselves, in the order in which they are met; `None`: there are none,
+    /// and the variable is `x`.
+    names: Option<Vec<String>>,
     /// Byte offset of the token that is looked at, and of what follows it.
     start: usize,
     next: usize,
@@ -58,6 +61,23 @@ struct Parser<'a> {
 
 /// Reads `text`; names that are neither functions nor `x` nor `pi` have the values of `parameters`.
 pub(super) fn parse(text: &str, parameters: &BTreeMap<String, f64>) -> Result<Expression> {
+    Ok(read(text, parameters, None)?.list)
+}
+
+/// Reads `text`; every name that is neither a function nor `pi` stands for itself. Returns these, by
+/// their places.
+pub(super) fn parse_named(text: &str) -> Result<(Expression, Vec<String>)> {
+    let none = BTreeMap::new();
+    let parser = read(text, &none, Some(Vec::new()))?;
+    Ok((parser.list, parser.names.unwrap_or_default()))
+}
+
+/// Reads all of `text`.
+fn read<'a>(
+    text: &'a str,
+    parameters: &'a BTreeMap<String, f64>,
+    names: Option<Vec<String>>,
+) -> Result<Parser<'a>> {
     if text.len() > LONGEST {
         return Err(InputError::new(format!(
             "an expression of {} characters; at most {LONGEST} are read",
@@ -71,6 +91,7 @@ pub(super) fn parse(text: &str, parameters: &BTreeMap<String, f64>) -> Result<Ex
     let mut parser = Parser {
         text,
         parameters,
+        names,
         start: 0,
         next: 0,
         token: Token::End,
@@ -80,14 +101,12 @@ pub(super) fn parse(text: &str, parameters: &BTreeMap<String, f64>) -> Result<Ex
     parser.advance()?;
     parser.sum(0)?;
     match parser.token {
-        Token::End => Ok(parser.list),
+        Token::End => Ok(parser),
         Token::Sign(')') => Err(parser.wrong("there is no `(` before this `)`", None)),
         Token::Sign('*') => {
             let help = "a power is written with `^`".to_owned();
-            Err(parser.wrong(
-                "expected a number, `x` or a function after `*`, met `*`",
-                Some(help),
-            ))
+            let message = format!("expected {} after `*`, met `*`", parser.operands());
+            Err(parser.wrong(&message, Some(help)))
         }
         Token::Number(_) | Token::Name(_) | Token::Sign('(') => Err(parser.wrong(
             &format!("expected an operator or the end, met {}", parser.met()),
@@ -137,6 +156,14 @@ impl<'a> Parser<'a> {
         match help {
             Some(help) => error.help(help).into(),
             None => error.into(),
+        }
+    }
+
+    /// What an operand can be.
+    fn operands(&self) -> &'static str {
+        match self.names {
+            None => "a number, `x` or a function",
+            Some(_) => "a number, a name or a function",
         }
     }
 
@@ -237,12 +264,12 @@ impl<'a> Parser<'a> {
             }
             Token::Sign('*') if self.text.get(..start).is_some_and(|t| t.ends_with('*')) => {
                 Err(self.wrong(
-                    "expected a number, `x` or a function, met `*`",
+                    &format!("expected {}, met `*`", self.operands()),
                     Some("a power is written with `^`".to_owned()),
                 ))
             }
             _ => Err(self.wrong(
-                &format!("expected a number, `x` or a function, met {}", self.met()),
+                &format!("expected {}, met {}", self.operands(), self.met()),
                 None,
             )),
         }
@@ -281,8 +308,9 @@ impl<'a> Parser<'a> {
             return Ok(self.list.push(Kind::Apply(*function, inner), column));
         }
         let kind = match (name, self.parameters.get(name)) {
-            ("x", _) => Kind::X,
             ("pi", _) => pi(),
+            _ if self.names.is_some() => self.own_name(name, start)?,
+            ("x", _) => Kind::X,
             (_, Some(value)) => Kind::Constant {
                 text: name.to_owned(),
                 double: *value,
@@ -293,11 +321,34 @@ impl<'a> Parser<'a> {
         Ok(self.list.push(kind, column))
     }
 
+    /// A name that stands for itself, unless a function was meant.
+    fn own_name(&mut self, name: &str, start: usize) -> Result<Kind> {
+        let alias = ALIASES.iter().any(|(other, _)| *other == name);
+        let Some(names) = self.names.as_mut() else {
+            return Err(self.unknown(name, start));
+        };
+        if self.token == Token::Sign('(') || alias {
+            return Err(self.unknown(name, start));
+        }
+        let known = names.iter().position(|n| n == name);
+        let place = known.unwrap_or_else(|| {
+            names.push(name.to_owned());
+            names.len() - 1
+        });
+        let text = name.to_owned();
+        Ok(Kind::Named { text, place })
+    }
+
     fn unknown(&self, name: &str, start: usize) -> crate::error::Error {
         let functions = Function::NAMES.iter().map(|(n, _)| *n);
         let parameters = self.parameters.keys().map(String::as_str);
-        let known: Vec<&str> = ["x", "pi"]
-            .into_iter()
+        let variables: &[&str] = match self.names {
+            None => &["x", "pi"],
+            Some(_) => &["pi"],
+        };
+        let known: Vec<&str> = variables
+            .iter()
+            .copied()
             .chain(functions)
             .chain(parameters)
             .collect();
@@ -310,7 +361,11 @@ impl<'a> Parser<'a> {
             Some(meant) => format!("did you mean `{meant}`?"),
             None => format!("known names are {}", known.join(", ")),
         };
-        self.wrong_at(start, &format!("unknown name `{name}`"), Some(help))
+        let what = match (&self.names, &self.token) {
+            (Some(_), Token::Sign('(')) => "function",
+            _ => "name",
+        };
+        self.wrong_at(start, &format!("unknown {what} `{name}`"), Some(help))
     }
 
     fn number(&self, text: &str) -> Result<Kind> {

@@ -15,6 +15,7 @@ pub mod outside;
 pub mod rate;
 pub mod structure;
 pub mod tone;
+pub mod user;
 
 use super::channels::Channels;
 use super::firmware::Words;
@@ -131,6 +132,21 @@ pub trait Candidate: Send + Sync {
         self.sheet().id.to_owned()
     }
 
+    /// What happens, in a sentence.
+    fn physics(&self) -> String {
+        self.sheet().physics.to_owned()
+    }
+
+    /// The contribution to the output.
+    fn equation(&self) -> String {
+        self.sheet().equation.to_owned()
+    }
+
+    /// The unit of a reported parameter, where its name does not say it.
+    fn unit(&self, _parameter: &str) -> Option<String> {
+        None
+    }
+
     /// False for a shape that has no name: it takes part in every comparison, and where it wins,
     /// what is left has a channel but no cause.
     fn named(&self) -> bool {
@@ -201,6 +217,11 @@ pub trait Candidate: Send + Sync {
 
     /// What firmware subtracts; `None` if it cannot, or does not see what it needs.
     fn correction(&self, _c: &Channels, _e: &Estimate, _f: &mut Words) -> Option<Vec<Term>> {
+        None
+    }
+
+    /// Why firmware cannot subtract it, where there is more to say than [`Sheet::compensable`].
+    fn obstacle(&self, _c: &Channels) -> Option<String> {
         None
     }
 

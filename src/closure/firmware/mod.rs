@@ -21,6 +21,11 @@ const SEEN: [&str; 6] = [
     "supply_v",
 ];
 
+/// Whether firmware sees a column by itself.
+pub fn sees(name: &str) -> bool {
+    SEEN.contains(&name)
+}
+
 /// `count` equidistant numbers over -1 ..= 1.
 pub fn knots(count: usize) -> impl Iterator<Item = f64> {
     let last = count.saturating_sub(1).max(1) as f64;
@@ -37,6 +42,8 @@ pub struct Words {
     noise_dps: f64,
     inputs: Vec<Input>,
     thermometer: Option<usize>,
+    /// Columns that the design says firmware sees.
+    allowed: Vec<String>,
 }
 
 /// Largest rms error of a polynomial that stands for an effect of two channels, of the noise.
@@ -50,6 +57,7 @@ impl Words {
             bias: bias.clone(),
             inputs: Vec::new(),
             thermometer: None,
+            allowed: Vec::new(),
         };
         if SEEN.contains(&c.thermometer.as_str()) {
             out.thermometer = Some(0);
@@ -67,9 +75,14 @@ impl Words {
         self.thermometer
     }
 
+    /// The design says that firmware sees this column.
+    pub fn allow(&mut self, name: &str) {
+        self.allowed.push(name.to_owned());
+    }
+
     /// An input for a column that firmware sees, and the column as it reads it.
     fn input(&mut self, c: &Channels, name: &str) -> Option<(usize, Vec<f64>)> {
-        if !SEEN.contains(&name) {
+        if !sees(name) && !self.allowed.iter().any(|a| a == name) {
             return None;
         }
         let (x, middle, half) = scaled(c.column(name)?);

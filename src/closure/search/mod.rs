@@ -159,11 +159,9 @@ impl<'a> Search<'a> {
     ) -> Self {
         let finite: Vec<bool> = channels.error_dps.iter().map(|e| e.is_finite()).collect();
         let both = |rows: &[bool]| rows.iter().zip(&finite).map(|(a, b)| *a && *b).collect();
-        let mut candidates: Vec<Arc<dyn Candidate>> = effects::catalogue(channels)
-            .into_iter()
-            .map(Arc::from)
-            .collect();
-        candidates.extend(extra);
+        // The user's own come first: among equals they are preferred.
+        let mut candidates = extra;
+        candidates.extend(effects::catalogue(channels).into_iter().map(Arc::from));
         candidates.extend(effects::outside::all(channels).into_iter().map(Arc::from));
         Search {
             channels,

@@ -208,14 +208,14 @@ fn step(view: &View, k: usize, contribution: &Contribution) -> Option<Figure> {
     draw_contribution(&mut frame, &abscissa, contribution, shown);
     svg.add(&frame);
     let title = format!("Step {}: {} against {}", k + 1, step.effect, abscissa.name);
-    let sheet = term.candidate.sheet();
+    let equation = term.candidate.equation();
     Some(Figure {
         svg: svg.finish(&title),
         title,
         caption: format!(
             "{}: {}. The deviation counts coefficients and shape, estimated together with the declared model and all other \
              steps: it is wide where those could take its place.{}",
-            step.effect, sheet.equation, abscissa.remark
+            step.effect, equation, abscissa.remark
         ),
     })
 }

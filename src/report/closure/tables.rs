@@ -13,9 +13,9 @@ pub struct TakenStep {
     /// Its id.
     pub effect: String,
     /// What happens, in a sentence.
-    pub physics: &'static str,
+    pub physics: String,
     /// The contribution to the output.
-    pub equation: &'static str,
+    pub equation: String,
     /// Columns that it needs.
     pub channels: String,
     /// Name, value with deviation, unit, plausible magnitudes.
@@ -261,14 +261,16 @@ pub fn steps(closed: &Closed) -> Vec<TakenStep> {
                 [
                     name.clone(),
                     with_deviation(*value, std),
-                    unit(name).to_owned(),
+                    term.candidate
+                        .unit(name)
+                        .unwrap_or_else(|| unit(name).to_owned()),
                     plausible(sheet, name),
                 ]
             };
             TakenStep {
                 effect: step.effect.clone(),
-                physics: sheet.physics,
-                equation: sheet.equation,
+                physics: term.candidate.physics(),
+                equation: term.candidate.equation(),
                 channels: step.channels.join(", "),
                 parameters: step.parameters.iter().map(parameter).collect(),
                 heldout_rms: value(step.heldout_rms),

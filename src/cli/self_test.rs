@@ -1,0 +1,194 @@
+//! `gyrogen close --self-test`: what the search finds, and what its silence means.
+
+use super::OutputFormat;
+use super::close::Arguments;
+use crate::design::Design;
+use crate::error::{Error, Result};
+use crate::report::text::significant;
+use crate::selftest::outcome::{EffectScore, Minimum, Outcome};
+use crate::selftest::{self, Request};
+use std::io::IsTerminal;
+use std::sync::Mutex;
+
+/// Of a self-test.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Self-test")]
+pub struct Options {
+    /// Records of each effect and size, 1 to 1000.
+    #[arg(long, value_name = "N", default_value_t = 4, requires = "self_test",
+          value_parser = clap::value_parser!(u16).range(1..=1000))]
+    records: u16,
+    /// Records of each of four noises without an effect, 0 to 10000.
+    #[arg(long, value_name = "N", default_value_t = 25, requires = "self_test",
+          value_parser = clap::value_parser!(u16).range(0..=10000))]
+    clean: u16,
+    /// Plant this effect only; may be given more than once.
+    #[arg(long, value_name = "ID", requires = "self_test")]
+    effect: Vec<String>,
+    /// Seed of all random numbers.
+    #[arg(long, default_value_t = 1, requires = "self_test")]
+    seed: u64,
+    /// Threads, 1 to 1024; all processors if left out. The result does not depend on them.
+    #[arg(long, requires = "self_test", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+}
+
+/// Runs the self-test.
+///
+/// # Errors
+/// An unusable record or an effect that is not planted (exit 2); too many false alarms or a large effect that
+/// is not found (exit 1).
+pub fn run(arguments: &Arguments, design: &Design) -> Result<()> {
+    let options = &arguments.test;
+    let read = match &arguments.record {
+        Some(path) => Some(crate::record::read_any(path, &design.record)?),
+        None => None,
+    };
+    let request = Request {
+        records: usize::from(options.records),
+        clean: usize::from(options.clean),
+        seed: options.seed,
+        threads: super::threads(options.threads),
+        only: options.effect.clone(),
+        command: command(arguments),
+        ..Request::default()
+    };
+    let bar: Mutex<Option<indicatif::ProgressBar>> = Mutex::new(None);
+    let loud = std::io::stderr().is_terminal();
+    let progress = |done: usize, total: usize| {
+        if let Ok(mut bar) = bar.lock()
+            && loud
+        {
+            let bar = bar.get_or_insert_with(|| indicatif::ProgressBar::new(total as u64));
+            bar.set_position(done as u64);
+        }
+    };
+    let record = read.as_ref().map(|(r, w)| (r, w.as_slice()));
+    let outcome = selftest::run(design, record, &request, &progress)?;
+    if let Ok(Some(bar)) = bar.into_inner() {
+        bar.finish_and_clear();
+    }
+    let json = super::json(&outcome);
+    if let Some(out) = &arguments.out {
+        let page = crate::report::selftest::html(&outcome)?;
+        super::make_folder(out)?;
+        crate::output::write_whole(&out.join("selftest.json"), json.as_bytes())?;
+        crate::output::write_whole(&out.join("selftest.html"), page.as_bytes())?;
+    }
+    match arguments.format {
+        OutputFormat::Json => say!("{}", json.trim_end()),
+        OutputFormat::Text => print(&outcome),
+    }
+    if let (Some(out), OutputFormat::Text) = (&arguments.out, arguments.format) {
+        say!("wrote {}", out.display());
+    }
+    if outcome.holds {
+        return Ok(());
+    }
+    Err(Error::Check(outcome.failures.join("; ")))
+}
+
+/// The command but for what does not change the result.
+fn command(arguments: &Arguments) -> String {
+    let options = &arguments.test;
+    let mut out = String::from("gyrogen close --self-test");
+    if let Some(record) = &arguments.record {
+        out += &format!(" --record {}", record.display());
+    }
+    if let Some(design) = &arguments.design {
+        out += &format!(" --design {}", design.display());
+    }
+    for effect in &options.effect {
+        out += &format!(" --effect {effect}");
+    }
+    out + &format!(
+        " --records {} --clean {} --seed {}",
+        options.records, options.clean, options.seed
+    )
+}
+
+fn print(o: &Outcome) {
+    let sizes = o.effects.first().map_or(&[][..], |e| &e.by_size);
+    let mut header: Vec<String> = vec!["effect".to_owned()];
+    header.extend(sizes.iter().map(|s| format!("{} x", s.times_noise)));
+    header.extend(["wrong names", "90 % found from", "which is"].map(str::to_owned));
+    let header: Vec<&str> = header.iter().map(String::as_str).collect();
+    let mut table = super::table(&header);
+    for e in &o.effects {
+        table.add_row(row(e));
+    }
+    say!("{table}");
+    say!(
+        "found: named, or listed as indistinguishable, of records with an effect that leaves so many times the noise \
+         of a row ({} deg/s) beyond the declared model",
+        significant(o.noise.white_rms_dps, 3)
+    );
+    for e in o.effects.iter().filter(|e| !e.wrong_names.is_empty()) {
+        say!("{}: wrongly {}", e.effect, listed(&e.wrong_names));
+    }
+    if !o.own_steps.is_empty() {
+        say!("taken off before: {}", o.own_steps.join(", "));
+    }
+    let a = &o.false_alarms;
+    if a.records == 0 {
+        return;
+    }
+    let kinds: Vec<String> = a
+        .by_noise
+        .iter()
+        .map(|c| format!("{} {} of {}", c.noise, c.alarms, c.records))
+        .collect();
+    say!(
+        "false alarms: {} of {} records without an effect ({}); with 95 % confidence below {:.1} %",
+        a.alarms,
+        a.records,
+        kinds.join(", "),
+        100.0 * a.upper_limit_95
+    );
+    if !a.names.is_empty() {
+        say!("their names: {}", listed(&a.names));
+    }
+}
+
+fn listed(names: &[(String, usize)]) -> String {
+    let each = names.iter().map(|(name, count)| match count {
+        1 => name.clone(),
+        count => format!("{name} ({count})"),
+    });
+    each.collect::<Vec<_>>().join(", ")
+}
+
+fn row(e: &EffectScore) -> Vec<String> {
+    let mut row = vec![e.effect.clone()];
+    row.extend(e.by_size.iter().map(|s| match s.records {
+        0 => "-".to_owned(),
+        records => format!("{}/{records}", s.detected),
+    }));
+    let wrong: usize = e.by_size.iter().map(|s| s.wrong).sum();
+    row.push(if wrong == 0 {
+        String::new()
+    } else {
+        wrong.to_string()
+    });
+    match &e.minimum_detectable {
+        Some(m) => row.extend([
+            format!("{}{:.1} x", relation(m), m.times_noise),
+            format!(
+                "{}{} {}",
+                relation(m),
+                significant(m.in_own_unit, 2),
+                e.own_unit
+            ),
+        ]),
+        None => row.extend(["-".to_owned(), e.remark.clone()]),
+    }
+    row
+}
+
+fn relation(m: &Minimum) -> &'static str {
+    match m.relation {
+        "below" => "< ",
+        "above" => "> ",
+        _ => "",
+    }
+}

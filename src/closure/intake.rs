@@ -1,0 +1,117 @@
+//! A record as candidates see it: which column is the thermometer, and what its readings are in degC.
+
+use super::channels::Channels;
+use crate::design::{Design, Gyro, RecordMapping};
+use crate::error::{InputError, Result};
+use crate::record::columns::THERMOMETERS;
+use crate::record::{ThermalRecord, Warning, stats};
+
+/// The bias model's thermometer in a record, if it has one.
+///
+/// # Errors
+/// The design names one that is not there.
+fn thermometer(record: &ThermalRecord, mapping: &RecordMapping) -> Result<Option<String>> {
+    match &mapping.thermometer {
+        Some(name) if record.column(name).is_none() => Err(InputError::new(format!(
+            "the record has no column {name}, which the design names as thermometer"
+        ))
+        .in_file(&record.source)
+        .help(format!(
+            "the record has: {}",
+            record
+                .columns
+                .keys()
+                .cloned()
+                .collect::<Vec<_>>()
+                .join(", ")
+        ))
+        .into()),
+        Some(name) => Ok(Some(name.clone())),
+        None => Ok(THERMOMETERS
+            .into_iter()
+            .find(|t| record.measured(t) > 0)
+            .map(str::to_owned)),
+    }
+}
+
+/// Temperatures that a gyro may have, degC.
+const TEMPERATURES_DEGC: (f64, f64) = (-100.0, 250.0);
+
+/// Temperature of the declared gyro at a reading of its phase (rad) or frequency (Hz), degC: the
+/// resonance's law linearised at the reference temperature (eq. 1 to 8 of the seed paper), where it
+/// stands at `nominal` (-pi/2 rad, or the drive frequency).
+fn degc_of(gyro: &Gyro, thermometer: &str, nominal: f64, reading: f64) -> f64 {
+    let per_k = gyro.stiffness_tempco_per_k.abs();
+    let slope = if thermometer == "freq_hz" {
+        -0.5 * per_k * nominal
+    } else {
+        -gyro.drive_q * per_k + gyro.electronics.phase_slope_rad_per_k
+    };
+    gyro.reference_temperature_k - 273.15 + (reading - nominal) / slope
+}
+
+/// What the thermometer shows at the reference temperature: as the design says, or, if the record is of
+/// another gyro, the middle of its readings. The second: whether temperatures are known.
+fn nominal(gyro: &Gyro, thermometer: &str, readings: &[f64]) -> (f64, bool) {
+    let declared = match thermometer {
+        "freq_hz" => gyro.drive_frequency_hz,
+        _ => -std::f64::consts::FRAC_PI_2,
+    };
+    let (low, high) = stats::extremes(readings).unwrap_or((declared, declared));
+    let middle = 0.5 * (low + high);
+    let (coldest, hottest) = TEMPERATURES_DEGC;
+    if (coldest..=hottest).contains(&degc_of(gyro, thermometer, declared, middle)) {
+        return (declared, true);
+    }
+    (middle, false)
+}
+
+/// A record that cannot be fitted.
+pub fn refused(record: &ThermalRecord, why: String) -> crate::error::Error {
+    InputError::new(why)
+        .in_file(&record.source)
+        .help("record longer, or average less")
+        .into()
+}
+
+/// A record as candidates see it.
+///
+/// # Errors
+/// No thermometer of the name that the design gives; a column that is needed and holds no value.
+pub fn channels_of(
+    record: &ThermalRecord,
+    design: &Design,
+    warnings: &mut Vec<Warning>,
+) -> Result<Channels> {
+    let name = thermometer(record, &design.record)?;
+    let mut columns = record.columns.clone();
+    let name = name.unwrap_or_else(|| {
+        warnings.push(Warning::general(
+            "no_thermometer",
+            "the record has no thermometer: the declared bias is a constant, and effects of temperature \
+             cannot be seen",
+        ));
+        columns.insert(NONE.to_owned(), vec![0.0; record.len()]);
+        NONE.to_owned()
+    });
+    let readings = columns.get(&name).map_or(&[][..], Vec::as_slice);
+    let (nominal, known) = nominal(&design.gyro, &name, readings);
+    let told_in_degc = ["die_degc", "chamber_degc"].map(|t| columns.contains_key(t));
+    if !known && !told_in_degc.contains(&true) && ["phase_rad", "freq_hz"].contains(&name.as_str())
+    {
+        let degc = design.gyro.reference_temperature_k - 273.15;
+        warnings.push(Warning::general(
+            "temperature_unknown",
+            format!(
+                "{name} around {nominal} is not that of the design's gyro: temperatures are counted from there \
+                 as if it were {degc:.2} degC; name the gyro's drive frequency and law in the design"
+            ),
+        ));
+    }
+    let degc = |reading: f64| degc_of(&design.gyro, &name, nominal, reading);
+    Channels::new(&record.time_s, &columns, &name, degc)
+        .map_err(|missing| refused(record, format!("column {missing} holds no measured value")))
+}
+
+/// Stands for the thermometer where there is none.
+const NONE: &str = "no_thermometer";
