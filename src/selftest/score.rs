@@ -7,11 +7,8 @@ use super::trial::{Colour, Mark};
 use super::{Case, Request, SIZES};
 use std::collections::BTreeMap;
 
-/// The size that has to be found.
+/// The size that has to be found, in half of the records at least.
 const LARGE: f64 = 10.0;
-
-/// Share of large effects that has to be found.
-const FOUND: f64 = 0.75;
 
 /// False alarms that are promised, and the probability below which more of them are no chance.
 const PROMISED: f64 = 0.01;
@@ -144,7 +141,7 @@ pub(super) fn failures(effects: &[EffectScore], alarms: &FalseAlarms) -> Vec<Str
             .iter()
             .filter(|s| s.times_noise >= LARGE && s.records > 0)
         {
-            if (s.detected as f64) < FOUND * s.records as f64 {
+            if 2 * s.detected < s.records {
                 out.push(format!(
                     "{} of {} times the noise is found in {} of {} records",
                     e.effect, s.times_noise, s.detected, s.records
