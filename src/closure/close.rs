@@ -14,7 +14,7 @@ use super::verdict::{
 use crate::correction::Correction;
 use crate::design::Design;
 use crate::error::Result;
-use crate::record::{ThermalRecord, Warning, stats};
+use crate::record::{ThermalRecord, Warning, condensed, stats};
 use std::sync::Arc;
 
 /// A closed record, with what a report shows.
@@ -63,6 +63,8 @@ pub struct Named {
 /// As there.
 pub fn names(record: &ThermalRecord, design: &Design, effort: Effort) -> Result<Vec<Named>> {
     let mut warnings = Vec::new();
+    let condensed = condensed(record);
+    let record = condensed.as_ref().map_or(record, |(short, _)| short);
     let channels = channels_of(record, design, &mut warnings)?;
     let unusable = |e: super::likelihood::Unusable| refused(record, e.to_string());
     let split = blocks::split(&channels.time_s, &channels.u).map_err(unusable)?;
@@ -89,6 +91,11 @@ pub fn close(
     effort: Effort,
 ) -> Result<Closed> {
     let start = std::time::Instant::now();
+    let condensed = condensed(record);
+    let record = condensed.as_ref().map_or(record, |(short, warning)| {
+        warnings.push(warning.clone());
+        short
+    });
     let channels = channels_of(record, design, &mut warnings)?;
     let refuse = |why: String| refused(record, why);
     let split = blocks::split(&channels.time_s, &channels.u).map_err(|e| refuse(e.to_string()))?;

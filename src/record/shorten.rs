@@ -1,4 +1,5 @@
-//! Rows of CSV, averaged to the length that the design gives (`average_s` in `[record]`).
+//! Rows of CSV, averaged: to the length that the design gives (`average_s` in `[record]`), or, for a search over many
+//! shapes, to a few thousand. What moves a gyro's bias is slow; rows beyond those show its white noise again and again.
 
 use super::thermal::ThermalRecord;
 use super::warning::Warning;
@@ -15,18 +16,11 @@ pub(super) fn rows(
         return;
     };
     let before = record.len();
-    let ends = ends(record, start, average_s);
+    let ends = ends(record, start, average_s, true);
     if ends.len() == before {
         return;
     }
-    record.time_s = means(&record.time_s, &ends);
-    for column in record.columns.values_mut() {
-        *column = means(column, &ends);
-    }
-    let starts = std::iter::once(0).chain(ends.iter().copied());
-    record.lines = starts
-        .filter_map(|start| record.lines.get(start).copied())
-        .collect();
+    average(record, &ends);
     warnings.push(Warning::general(
         "rows_averaged",
         format!(
@@ -36,9 +30,48 @@ pub(super) fn rows(
     ));
 }
 
-/// One past the last row of each stretch.
-fn ends(record: &ThermalRecord, start: f64, average_s: f64) -> Vec<usize> {
-    let applied = record.column("rate_dps");
+/// Rows from which on a record is long, and what it becomes, about.
+const LONG: usize = 8000;
+const ROWS: usize = 4000;
+
+/// A long record with means in place of rows, and what to tell; `None` for one that is not long. Where
+/// the applied rate never stands still, means are taken over short parts of its course.
+pub fn condensed(record: &ThermalRecord) -> Option<(ThermalRecord, Warning)> {
+    let (start, end) = record.time_s.first().zip(record.time_s.last())?;
+    if record.len() < LONG || end <= start {
+        return None;
+    }
+    let average_s = (end - start) / ROWS as f64;
+    let mut stretches = ends(record, *start, average_s, true);
+    if stretches.len() > 2 * ROWS {
+        stretches = ends(record, *start, average_s, false);
+    }
+    let mut out = record.clone();
+    average(&mut out, &stretches);
+    let message = format!(
+        "{} rows were averaged into {} of {average_s:.4} s: all errors are those of the means; `average_s` in [record] \
+         chooses another length",
+        record.len(),
+        out.len()
+    );
+    Some((out, Warning::general("rows_averaged", message)))
+}
+
+/// Means over stretches in place of rows.
+fn average(record: &mut ThermalRecord, ends: &[usize]) {
+    record.time_s = means(&record.time_s, ends);
+    for column in record.columns.values_mut() {
+        *column = means(column, ends);
+    }
+    let starts = std::iter::once(0).chain(ends.iter().copied());
+    record.lines = starts
+        .filter_map(|start| record.lines.get(start).copied())
+        .collect();
+}
+
+/// One past the last row of each stretch; `by_rate`: a stretch is of one applied rate.
+fn ends(record: &ThermalRecord, start: f64, average_s: f64, by_rate: bool) -> Vec<usize> {
+    let applied = record.column("rate_dps").filter(|_| by_rate);
     let power_on = record.column("time_since_power_on_s");
     let at = |column: Option<&[f64]>, row: usize| column.and_then(|c| c.get(row).copied());
     let number = |t: &f64| ((t - start) / average_s).floor();
@@ -79,6 +112,44 @@ mod tests {
     use super::super::thermal::parse;
     use crate::design::RecordMapping;
     use std::path::Path;
+
+    #[test]
+    fn a_long_record_becomes_a_few_thousand_means() {
+        let made = |rows: usize, rate: &dyn Fn(usize) -> f64| {
+            let mut text = String::from("time_s,rate_out_dps,rate_dps\n");
+            for k in 0..rows {
+                text.push_str(&format!(
+                    "{k},{},{}\n",
+                    rate(k) + 1.0 + 0.1 * (-1f64).powi(k as i32),
+                    rate(k)
+                ));
+            }
+            parse(
+                text.as_bytes(),
+                Path::new("r.csv"),
+                &RecordMapping::default(),
+            )
+            .unwrap()
+            .0
+        };
+        let stands = |k: usize| if k < 5003 { 10.0 } else { -20.0 };
+        assert!(super::condensed(&made(super::LONG - 1, &stands)).is_none());
+        let (short, warning) = super::condensed(&made(40_000, &stands)).unwrap();
+        assert_eq!(warning.code, "rows_averaged");
+        assert!((4000..4010).contains(&short.len()), "{}", short.len());
+        for (out, rate) in short.columns["rate_out_dps"]
+            .iter()
+            .zip(&short.columns["rate_dps"])
+        {
+            assert!(
+                [10.0, -20.0].contains(rate) && (out - rate - 1.0).abs() < 0.04,
+                "{out} {rate}"
+            );
+        }
+        // A rate that never stands still.
+        let (short, _) = super::condensed(&made(40_000, &|k| (k as f64 / 3000.0).sin())).unwrap();
+        assert!((4000..4010).contains(&short.len()), "{}", short.len());
+    }
 
     #[test]
     fn rows_become_means_and_rates_stay_apart() {
