@@ -5,6 +5,7 @@
 //! meant, `circuit_tables` and `device_tables` read the tables); [`effects`] are those of the simulated
 //! gyro, by name; [`limits`] refuses formats whose exact intermediates the engine cannot hold; [`template`] holds the embedded default and what `gyrogen init` writes.
 
+pub mod bound;
 mod circuit_tables;
 mod correction_table;
 mod device_tables;
@@ -19,5 +20,6 @@ pub(crate) mod suggest;
 mod table;
 pub mod template;
 
+pub use bound::BiasBound;
 pub use effects::Effects;
 pub use schema::*;

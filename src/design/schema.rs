@@ -3,6 +3,8 @@
 
 use super::effects::Effects;
 pub use super::log_axis::LogAxis;
+use super::bound::BiasBound;
+use crate::approx::form::stored::Stored;
 use crate::correction::Planned;
 use crate::numeric::format::{Format, Overflow, Quantizer, Rounding, pow2};
 use std::collections::BTreeMap;
@@ -19,6 +21,8 @@ pub struct Design {
     pub compensation: Option<Compensation>,
     /// A correction of averaged readings beside it; from `gyrogen close`.
     pub correction: Option<Planned>,
+    /// What the compensation's error is asked to be.
+    pub bound: Option<BiasBound>,
     /// True if the file gave its own `[compensation]` (and so chose the formats itself).
     pub compensation_is_own: bool,
     /// The gyro: the declared model and the plant's parameters.
@@ -220,6 +224,8 @@ pub struct Compensation {
     pub outside: Outside,
     /// The fit that the coefficients stand for, where there is one.
     pub fitted: Option<Fitted>,
+    /// `[compensation.evaluation]`: the form that stands for the polynomial; none = Horner's rule.
+    pub form: Option<Stored>,
 }
 
 /// `outside`: the polynomial beyond the calibrated range.

@@ -132,7 +132,8 @@ impl Theory<'_> {
         else {
             return;
         };
-        if c.input != CompensationInput::Phase {
+        // The theory is that of Horner's steps.
+        if c.input != CompensationInput::Phase || c.form.is_some() {
             return;
         }
         let mut flags = phase.flags.clone();
