@@ -14,7 +14,13 @@ pub(super) struct Line<'a> {
 
 /// The table; `errors` are the titles of the errors' columns.
 pub(super) fn table<'a>(errors: &[&str], lines: impl Iterator<Item = Line<'a>>) -> Table {
-    let titles = ["form", "ROM, bytes", "multiplies", "adds", "cycles (estimate)"];
+    let titles = [
+        "form",
+        "ROM, bytes",
+        "multiplies",
+        "adds",
+        "cycles (estimate)",
+    ];
     let mut all: Vec<&str> = titles.into_iter().chain(errors.iter().copied()).collect();
     all.push("");
     let mut table = super::table(&all);

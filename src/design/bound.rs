@@ -50,7 +50,9 @@ pub(super) fn bound(t: &Table) -> Result<Option<BiasBound>> {
         let alone = ["form", "target"].iter().find_map(|key| t.get(key));
         return match alone {
             Some(value) => Err(value
-                .error("goes only with `bound_dps`: forms are compared by what they cost for a bound")
+                .error(
+                    "goes only with `bound_dps`: forms are compared by what they cost for a bound",
+                )
                 .help("add `bound_dps = 0.01`, the error that is acceptable, in deg/s")
                 .into()),
             None => Ok(None),
@@ -81,11 +83,7 @@ pub fn hindrance(c: &Compensation) -> Option<(&'static str, &'static str)> {
 }
 
 /// Reads `[compensation.evaluation]` of a compensation that is otherwise complete.
-pub(super) fn evaluation(
-    t: &Table,
-    c: &Compensation,
-    circuit: &Circuit,
-) -> Result<Option<Stored>> {
+pub(super) fn evaluation(t: &Table, c: &Compensation, circuit: &Circuit) -> Result<Option<Stored>> {
     let table = t.section("evaluation")?;
     if !table.is_given() {
         return Ok(None);

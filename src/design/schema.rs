@@ -1,9 +1,9 @@
 //! The design as the program sees it. The keys of `[circuit]` and `[compensation]` are those of
 //! `docs/manual.md`; their meaning is stated there and only summarised here.
 
+use super::bound::BiasBound;
 use super::effects::Effects;
 pub use super::log_axis::LogAxis;
-use super::bound::BiasBound;
 use crate::approx::form::stored::Stored;
 use crate::correction::Planned;
 use crate::numeric::format::{Format, Overflow, Quantizer, Rounding, pow2};

@@ -132,8 +132,13 @@ impl Theory<'_> {
         else {
             return;
         };
-        // The theory is that of Horner's steps.
-        if c.input != CompensationInput::Phase || c.form.is_some() {
+        if c.form.is_some() {
+            for node in bias..bias + 3 {
+                set(all, node, None, &["other_form"]);
+            }
+            return;
+        }
+        if c.input != CompensationInput::Phase {
             return;
         }
         let mut flags = phase.flags.clone();

@@ -150,7 +150,10 @@ fn lines(ways: &[Way], chosen: usize, output: Format) -> Vec<Line> {
         undominated: a.undominated,
         chosen: a.chosen,
     };
-    choice::judged(listed, chosen).into_iter().map(line).collect()
+    choice::judged(listed, chosen)
+        .into_iter()
+        .map(line)
+        .collect()
 }
 
 fn output_rounding_dps(c: &Compensation) -> f64 {
@@ -239,7 +242,10 @@ fn polynomial_within(design: &Design, room: f64) -> Result<Reached> {
     }
     let said = format!(
         "coefficients {} and accumulator {} for the bound, instead of {} and {}",
-        finer.coefficient_format, finer.accumulator.format, c.coefficient_format, c.accumulator.format
+        finer.coefficient_format,
+        finer.accumulator.format,
+        c.coefficient_format,
+        c.accumulator.format
     );
     let raw = coefficients::best(&design.circuit, &finer, &exact, &finer.coefficients_raw)?;
     let searched = Compensation {
@@ -338,3 +344,7 @@ fn unreached(
         ),
     }))
 }
+
+#[cfg(test)]
+#[path = "bound_tests.rs"]
+mod tests;

@@ -1,7 +1,7 @@
 //! From a record to a compensation in its formats.
 
-use super::coefficients::{self, Rounded};
 use super::bound::{self, Kept};
+use super::coefficients::{self, Rounded};
 use super::{formats, warning};
 use crate::closure::{self, BaselineFit};
 use crate::design::{Compensation, CompensationInput, Design, FitOptions, FitOrder};

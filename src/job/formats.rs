@@ -3,8 +3,8 @@
 use crate::closure::BaselineFit;
 use crate::cosim::scale::{nominal_full_scale_dps, power_of_two_near};
 use crate::design::{
-    BiasBound, ChannelInput, Circuit, Compensation, CompensationInput, Design, Outside, RecordMapping,
-    TuningInput,
+    BiasBound, ChannelInput, Circuit, Compensation, CompensationInput, Design, Outside,
+    RecordMapping, TuningInput,
 };
 use crate::error::{InputError, Result};
 use crate::numeric::format::{Format, Overflow, Quantizer, Rounding};

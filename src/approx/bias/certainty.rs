@@ -290,9 +290,14 @@ pub fn sentences(design: &Design, bounds: &Bounds) -> Vec<String> {
     )];
     if let Some(asked) = design.bound {
         let covered = bounds.certified_max_dps + output_rounding_dps(c);
-        let word = if covered <= asked.bound_dps { "kept" } else { "NOT kept" };
+        let word = if covered <= asked.bound_dps {
+            "kept"
+        } else {
+            "NOT kept"
+        };
         lines.push(format!(
-            "asked: bias and rate within {} deg/s of it at every calibrated input; with the rounding of the rate they are              within {covered:.3e}: {word}",
+            "asked: bias and rate within {} deg/s of it at every calibrated input; with the rounding of the rate they are \
+             within {covered:.3e}: {word}",
             asked.bound_dps
         ));
     }

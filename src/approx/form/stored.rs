@@ -209,7 +209,10 @@ fn check_entries(read: Read, split: &Split, entries: &[Vec<i64>]) -> Result<()> 
             "tables of {has:?} entries where {lengths:?} are needed"
         ));
     }
-    let large = entries.iter().flatten().find(|v| v.unsigned_abs() > LARGEST_ENTRY as u64);
+    let large = entries
+        .iter()
+        .flatten()
+        .find(|v| v.unsigned_abs() > LARGEST_ENTRY as u64);
     if let Some(v) = large {
         return refuse(format!("an entry {v}, beyond {LARGEST_ENTRY}"));
     }
