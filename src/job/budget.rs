@@ -47,6 +47,16 @@ pub fn budget(design: &Design, fit: &BaselineFit, certainty: &Certainty) -> Budg
         output_lsb: dps / output_lsb,
         kind,
     };
+    let (coefficients, evaluation) = match c.form {
+        None => (
+            "coefficients: rounding to their format",
+            "evaluation: rounding of each Horner step",
+        ),
+        Some(_) => (
+            "the form's data against the polynomial",
+            "evaluation: rounding inside the form",
+        ),
+    };
     let lines = vec![
         line(
             "calibration: noise of the fit",
@@ -59,16 +69,8 @@ pub fn budget(design: &Design, fit: &BaselineFit, certainty: &Certainty) -> Budg
             thermometer_half_step_dps(design, c, fit),
             "bound",
         ),
-        line(
-            "coefficients: rounding to their format",
-            certainty.bounds.coefficients_dps,
-            "bound",
-        ),
-        line(
-            "evaluation: rounding of each Horner step",
-            certainty.bounds.evaluation_dps,
-            "bound",
-        ),
+        line(coefficients, certainty.bounds.coefficients_dps, "bound"),
+        line(evaluation, certainty.bounds.evaluation_dps, "bound"),
         line(
             "output: rounding of bias and of rate",
             2.0 * certainty.bounds.output_dps,

@@ -209,6 +209,12 @@ pub fn formats(shown: &Shown) -> Vec<[String; 2]> {
             format!("sense I times {} deg/s", c.rate_full_scale_dps),
         ));
     }
+    if let Some(kept) = shown.summary.bound.as_ref().filter(|_| c.form.is_some()) {
+        lines.push(line(
+            "evaluated, instead of the polynomial, by",
+            kept.chosen.clone(),
+        ));
+    }
     if let Some((low, high)) = c.clamp_raw {
         lines.push(line(
             "input limited to (raw)",
