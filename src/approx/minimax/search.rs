@@ -42,7 +42,7 @@ pub trait Datapath {
 pub struct Effort {
     /// Lattice points that are run through the datapath.
     pub candidates: usize,
-    /// Calls of [`Datapath::sample_error`] altogether.
+    /// Calls of [`Datapath::sample_error`] before no further round of the proof is begun.
     pub evaluations: u64,
     /// Of each enumeration.
     pub budget: Budget,
@@ -55,7 +55,7 @@ impl Default for Effort {
     fn default() -> Self {
         Effort {
             candidates: 6000,
-            evaluations: 20_000,
+            evaluations: 8_000,
             budget: Budget { nodes: 1_000_000 },
             thorough: true,
         }
@@ -396,7 +396,11 @@ impl<'p> Run<'p> {
 
     /// True if what the output's codes allow leaves nothing better, which is then known to be all.
     fn prove(&mut self, budget: Budget) -> bool {
+        let most = self.most_evaluations;
         for _ in 0..PROOF_ROUNDS {
+            if self.evaluations > most {
+                return false;
+            }
             let before = self.total;
             let Some(widest) = self.near.first().map(|(c, _)| c.raw.clone()) else {
                 return false;
