@@ -47,7 +47,7 @@ fn random(seed: u64) -> Design {
         std_max_dps: 0.0,
         heldout_rms_dps: 0.0,
     });
-    let auto = seed % 3 != 0;
+    let auto = !seed.is_multiple_of(3);
     let targets = [Target::Host, Target::CortexM0, Target::CortexM4];
     design.bound = Some(BiasBound {
         bound_dps: c.output.format.lsb() * (1.3 + 300.0 * draw(9).powi(3)),
