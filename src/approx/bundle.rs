@@ -21,7 +21,8 @@ pub fn model(settled: &Settled) -> Result<Model> {
     Ok(model.with_damage::<1, 1, Form>(damaged(&settled.form), narrow))
 }
 
-fn damaged(form: &Form) -> Vec<Form> {
+/// Copies in which a rounding constant or a coefficient is off by one; tables are compared entry by entry.
+pub(crate) fn damaged(form: &Form) -> Vec<Form> {
     let mut all = form.with_nudged_casts();
     if let Form::Polynomial(p) = form {
         for order in p.monomials.exponents(p.coefficients.len() - 1) {

@@ -24,8 +24,6 @@ const FIRST_LOOK: u128 = 2000;
 const HIGHEST_DEGREE: usize = 12;
 /// Fraction bits of entries beyond the output's.
 const GUARD_BITS: [u32; 4] = [1, 2, 3, 6];
-/// Bytes of read-only memory that weigh as much as a cycle.
-const BYTES_A_CYCLE: u64 = 32;
 /// Pairs of sizes that are tried for a bipartite table.
 const PAIRS: usize = 12;
 
@@ -55,13 +53,7 @@ impl Candidate {
         if !keeps_to(&settled, reference, bound) {
             return None;
         }
-        let effort = Effort {
-            most_codes: QUICK_CODES,
-            sample: QUICK_SAMPLE,
-            threads: super::form::measure::threads(),
-            progress: &|_| (),
-        };
-        let measured = measure(&settled, reference, &effort).ok()?;
+        let measured = quick(&settled, reference).ok()?;
         (measured.certified <= bound).then(|| Candidate {
             detail: describe::detail(&settled.form),
             cost: Cost::of(&settled, target),
@@ -70,15 +62,24 @@ impl Candidate {
         })
     }
 
-    /// Cycles, and read-only memory weighed against them.
-    pub fn price(&self) -> u64 {
-        u64::from(self.cost.cycles) * BYTES_A_CYCLE + self.cost.rom_bytes
+    /// As a line of the list, not yet judged among the others.
+    pub fn listed(&self) -> Alternative {
+        Alternative {
+            form: self.settled.form.name(),
+            detail: self.detail.clone(),
+            cost: self.cost,
+            certified_max_abs: self.measured.certified,
+            undominated: false,
+            chosen: false,
+        }
     }
+}
 
+impl Alternative {
     /// In ROM, multiplications, additions and error.
-    fn dominates(&self, other: &Candidate) -> bool {
+    fn dominates(&self, other: &Alternative) -> bool {
         let (a, b) = (&self.cost, &other.cost);
-        let (x, y) = (self.measured.certified, other.measured.certified);
+        let (x, y) = (self.certified_max_abs, other.certified_max_abs);
         let no_worse = a.rom_bytes <= b.rom_bytes
             && a.multiplies <= b.multiplies
             && a.adds <= b.adds
@@ -87,6 +88,20 @@ impl Candidate {
             a.rom_bytes < b.rom_bytes || a.multiplies < b.multiplies || a.adds < b.adds || x < y;
         no_worse && better
     }
+}
+
+/// A form's error without running more codes than a search can afford: beyond them the bound comes from analysis.
+///
+/// # Errors
+/// A result outside the proved bound: an error of this program.
+pub fn quick(settled: &Settled, reference: &dyn Reference) -> Result<Measured> {
+    let effort = Effort {
+        most_codes: QUICK_CODES,
+        sample: QUICK_SAMPLE,
+        threads: super::form::measure::threads(),
+        progress: &|_| (),
+    };
+    measure(settled, reference, &effort)
 }
 
 /// Quickly: whether some codes keep to the bound. Most candidates do not.
@@ -161,20 +176,22 @@ pub fn candidates(
 
 /// The cheapest on the target.
 pub fn cheapest(candidates: &[Candidate]) -> Option<usize> {
-    (0..candidates.len()).min_by_key(|k| candidates[*k].price())
+    (0..candidates.len()).min_by_key(|k| candidates[*k].cost.price())
 }
 
 /// The list for the report.
 pub fn alternatives(candidates: &[Candidate], chosen: usize) -> Vec<Alternative> {
-    let one = |(k, c): (usize, &Candidate)| Alternative {
-        form: c.settled.form.name(),
-        detail: c.detail.clone(),
-        cost: c.cost,
-        certified_max_abs: c.measured.certified,
-        undominated: !candidates.iter().any(|other| other.dominates(c)),
-        chosen: k == chosen,
-    };
-    candidates.iter().enumerate().map(one).collect()
+    judged(candidates.iter().map(Candidate::listed).collect(), chosen)
+}
+
+/// The list with the undominated ones and the chosen one marked.
+pub fn judged(mut all: Vec<Alternative>, chosen: usize) -> Vec<Alternative> {
+    let free = |one: &Alternative| !all.iter().any(|other| other.dominates(one));
+    let undominated: Vec<bool> = all.iter().map(free).collect();
+    for ((k, one), undominated) in all.iter_mut().enumerate().zip(undominated) {
+        (one.undominated, one.chosen) = (undominated, k == chosen);
+    }
+    all
 }
 
 fn polynomials(search: &Search, request: &Request) -> Vec<Candidate> {

@@ -3,8 +3,12 @@
 use super::form::{Form, Settled};
 use crate::emit::machine::Width;
 use crate::emit::views::entry_type;
-use crate::numeric::trace::ir::{Function, Op};
+use crate::numeric::format::Format;
+use crate::numeric::trace::ir::{Function, Op, Program};
 use serde::Serialize;
+
+/// Bytes of read-only memory that weigh as much as a cycle.
+const BYTES_A_CYCLE: u64 = 32;
 
 /// A processor to estimate cycles for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, clap::ValueEnum)]
@@ -31,6 +35,16 @@ struct Weights {
 }
 
 impl Target {
+    /// As the command line and a design file spell it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Target::Host => "host",
+            Target::CortexM4 => "cortex-m4",
+            Target::CortexM0 => "cortex-m0",
+            Target::Riscv32 => "riscv32",
+        }
+    }
+
     fn weights(self) -> Weights {
         match self {
             Target::Host => Weights {
@@ -82,41 +96,53 @@ pub struct Cost {
 impl Cost {
     /// Of a form on a target.
     pub fn of(settled: &Settled, target: Target) -> Self {
+        Cost::of_program(&settled.program, &constants(&settled.form), target)
+    }
+
+    /// Of a program whose coefficients, beside its tables, have these formats.
+    pub fn of_program(program: &Program, coefficients: &[Format], target: Target) -> Self {
+        let tables = program.tables.iter();
+        let tables: usize = tables
+            .map(|t| t.entries.len() * entry_type(&t.entries).0)
+            .sum();
+        let constants: usize = coefficients.iter().map(bytes).sum();
         let mut cost = Cost {
-            rom_bytes: rom_bytes(settled),
+            rom_bytes: (tables + constants) as u64,
             multiplies: 0,
             adds: 0,
             cycles: 0,
         };
-        for function in &settled.program.functions {
+        for function in &program.functions {
             count(function, &target.weights(), &mut cost);
         }
         cost
     }
+
+    /// Cycles, and read-only memory weighed against them.
+    pub fn price(&self) -> u64 {
+        u64::from(self.cycles) * BYTES_A_CYCLE + self.rom_bytes
+    }
 }
 
-fn rom_bytes(settled: &Settled) -> u64 {
-    let tables: usize = settled
-        .program
-        .tables
-        .iter()
-        .map(|t| t.entries.len() * entry_type(&t.entries).0)
-        .sum();
-    let constants = match &settled.form {
+/// The formats of a form's coefficients that are no table.
+pub(super) fn constants(form: &Form) -> Vec<Format> {
+    match form {
         Form::Polynomial(p) => {
             let degree = p.coefficients.len().saturating_sub(1);
-            let formats = p.formats.coefficients.each(p.monomials, degree);
-            let bytes = formats.iter().map(|format| match format.bits() {
-                0..=8 => 1,
-                9..=16 => 2,
-                17..=32 => 4,
-                _ => 8,
-            });
-            bytes.sum()
+            p.formats.coefficients.each(p.monomials, degree)
         }
-        _ => 0,
-    };
-    (tables + constants) as u64
+        _ => Vec::new(),
+    }
+}
+
+/// Of a word at its type's width.
+fn bytes(format: &Format) -> usize {
+    match format.bits() {
+        0..=8 => 1,
+        9..=16 => 2,
+        17..=32 => 4,
+        _ => 8,
+    }
 }
 
 fn count(function: &Function, weights: &Weights, cost: &mut Cost) {
@@ -142,9 +168,16 @@ fn count(function: &Function, weights: &Weights, cost: &mut Cost) {
             // A rounding: an addition and a shift.
             Op::Cast(..) => cost.cycles += weights.add[width] + weights.shift[width],
             Op::Wrap(..) => cost.cycles += weights.shift[width],
+            // Emitted code has no limit that never acts.
+            Op::Limit(a, low, high) if is_within(function, a, low, high) => {}
             Op::Select(..) | Op::Limit(..) => cost.cycles += weights.select << width.min(1),
             Op::Lookup(..) => cost.cycles += weights.load,
             _ => {}
         }
     }
+}
+
+fn is_within(function: &Function, word: usize, low: i128, high: i128) -> bool {
+    let range = function.nodes.get(word).map(|node| node.range);
+    range.is_some_and(|r| low <= r.low && r.high <= high)
 }

@@ -5,7 +5,7 @@ use super::form::measure::Reference;
 use super::form::{Number, Piece};
 use super::minimax;
 use super::real::{Domain, Dyadic, Enclosure, Expression, Target as _};
-use crate::error::Result;
+use crate::error::{InputError, Result};
 
 /// A function on a domain, enclosed.
 #[derive(Debug, Clone)]
@@ -32,6 +32,22 @@ impl Function {
         Ok(Function {
             text: text.to_owned(),
             target: (expression, domain),
+            enclosure,
+        })
+    }
+
+    /// Encloses the polynomial with exactly these coefficients, lowest order first, from `low` to `high`.
+    ///
+    /// # Errors
+    /// An empty domain; a coefficient that is not finite.
+    pub fn of_polynomial(coefficients: &[f64], (low, high): (f64, f64)) -> Result<Function> {
+        let domain = Domain::between(low, high)?;
+        let enclosure = Enclosure::of_polynomial(coefficients, &domain).map_err(|e| {
+            InputError::new(format!("the polynomial cannot be bounded: {}", e.reason))
+        })?;
+        Ok(Function {
+            text: "polynomial".to_owned(),
+            target: (Expression::polynomial(coefficients), domain),
             enclosure,
         })
     }

@@ -8,9 +8,6 @@
 pub const NEGLIGIBLE: f64 = 0.01;
 /// Rounding up to this part of the whole error is small.
 pub const SMALL: f64 = 0.1;
-/// Whole errors within this part of the least count as equal; then the ideal error decides.
-pub const NEAR: f64 = crate::approx::minimax::search::NEAR;
-
 /// Why coefficients were taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -20,7 +17,7 @@ pub enum Reason {
     /// Rounding is a small part, and the best under ideal evaluation are ahead of what rounding and the
     /// lattice heuristic give in the same datapath, or nothing is ahead of them.
     RoundingSmall,
-    /// The least error of the whole evaluation, to half a per cent.
+    /// The least error of the whole evaluation.
     LeastTotal,
 }
 
@@ -53,9 +50,8 @@ pub fn select(
     if ideal.total.is_finite() && rounding <= SMALL * ideal.total && ahead {
         return (None, Reason::RoundingSmall);
     }
-    // Nearly as good is not good enough where it loses what the least one wins.
-    let good =
-        |e: &Errors| e.total <= least || (e.total <= least * (1.0 + NEAR) && e.total < to_beat);
+    // Nearly as good is not good enough: another choice of coefficients may be between the two.
+    let good = |e: &Errors| e.total <= least;
     let best = (0..near.len())
         .filter(|k| near.get(*k).is_some_and(good))
         .min_by(|a, b| {
@@ -96,16 +92,16 @@ mod tests {
     }
 
     #[test]
-    fn else_the_least_total_error_and_near_it_the_least_ideal_one() {
-        let near = [e(1.3, 2.0), e(1.2, 2.009), e(1.1, 2.02)];
+    fn else_the_least_total_error_and_among_equals_the_least_ideal_one() {
+        let near = [e(1.3, 2.0), e(1.2, 2.0), e(1.1, 2.009)];
         let taken = select(e(1.0, 2.2), 1.0, &[e(1.1, 2.1)], &near);
         assert_eq!(taken, (Some(1), Reason::LeastTotal));
-        // Not one that only equals what the least one beats.
-        let taken = select(e(1.0, 2.2), 1.0, &[e(1.2, 2.009)], &near);
-        assert_eq!(taken, (Some(0), Reason::LeastTotal));
-        // The best coefficients themselves are near the least.
-        let taken = select(e(1.0, 2.005), 1.0, &[e(1.2, 2.1)], &near);
+        // The best coefficients themselves have the least.
+        let taken = select(e(1.0, 2.0), 1.0, &[e(1.2, 2.1)], &near);
         assert_eq!(taken, (None, Reason::LeastTotal));
+        // They are only near it.
+        let taken = select(e(1.0, 2.005), 1.0, &[e(1.2, 2.1)], &near);
+        assert_eq!(taken, (Some(1), Reason::LeastTotal));
         // Coefficients that the datapath cannot take are not taken.
         let taken = select(e(1.0, f64::INFINITY), 0.001, &[], &near);
         assert_eq!(taken, (Some(1), Reason::LeastTotal));

@@ -1,18 +1,22 @@
 //! The bias compensation: a polynomial in the virtual thermometer by Horner's rule, subtracted from
 //! the rate (contract, step 6; seed paper, eq. 9).
 //!
+//! The polynomial is evaluated as it is ([`Horner`]) or by a form that stands for it ([`Evaluation::Form`]).
+//!
 //! Two blocks: [`Bias`] depends on the thermometer alone, so that its emitted code can be compared
 //! with the model over every input code; [`Rate`] subtracts it.
 
+use crate::approx::form::{Codes, Form};
 use crate::design::{Circuit, Compensation, CompensationInput, Outside};
 use crate::numeric::arithmetic::{Arithmetic, Block, Port};
 use crate::numeric::cast::{Cast, Label, Target};
+use crate::numeric::format::Format;
 use crate::numeric::trace::ir::Interval;
 
 const ACCUMULATOR: Label = Label::of("compensation.accumulator");
 const OUTPUT: Label = Label::of("compensation.output");
 
-/// The polynomial's configuration.
+/// The bias's configuration.
 #[derive(Debug, Clone)]
 pub struct Bias {
     /// Every raw input code.
@@ -25,6 +29,23 @@ pub struct Bias {
     offset: i128,
     /// The input is read in another unit: its value times 2^this.
     read_exponent: i32,
+    /// From the variable to the bias.
+    pub evaluation: Evaluation,
+    meanings: [String; 2],
+}
+
+/// How the bias follows from the variable.
+#[derive(Debug, Clone)]
+pub enum Evaluation {
+    /// The design's polynomial.
+    Horner(Box<Horner>),
+    /// What `form = "auto"` chose: see [`crate::approx::form`].
+    Form(Box<Form>),
+}
+
+/// Horner's rule in the design's formats.
+#[derive(Debug, Clone)]
+pub struct Horner {
     coefficients: Vec<i128>,
     coefficient_fraction_bits: i32,
     accumulator_fraction_bits: i32,
@@ -38,7 +59,6 @@ pub struct Bias {
     pub output: Cast,
     /// Beyond the calibrated range: the tangent.
     tangent: Option<Tangent>,
-    meanings: [String; 2],
 }
 
 /// The polynomial's slopes at both ends of the calibrated range, with which it goes on beyond them.
@@ -87,7 +107,57 @@ impl Bias {
                     )
                 }
             };
-        let p = input_fraction_bits - read_exponent;
+        let evaluation = match form(circuit, compensation) {
+            Some(form) => Evaluation::Form(Box::new(form)),
+            None => {
+                let p = input_fraction_bits - read_exponent;
+                Evaluation::Horner(Box::new(Horner::new(circuit, compensation, p)))
+            }
+        };
+        Bias {
+            input_range,
+            input_fraction_bits,
+            clamp: compensation.clamp_raw,
+            offset,
+            read_exponent,
+            evaluation,
+            meanings: [meaning, format!("bias in deg/s, {}", compensation.output)],
+        }
+    }
+}
+
+/// The stored form, if the design has one; a design with one that cannot be built has been refused.
+fn form(circuit: &Circuit, compensation: &Compensation) -> Option<Form> {
+    let stored = compensation.form.as_ref()?;
+    let codes = codes(circuit, compensation);
+    let built = stored.build(codes, compensation.output.format);
+    built.ok()
+}
+
+/// The words of the polynomial's variable inside the calibrated range (every word, where there is none).
+pub fn codes(circuit: &Circuit, compensation: &Compensation) -> Codes {
+    let (offset, fraction_bits) = compensation.variable_scale(circuit);
+    let all = match &compensation.input {
+        CompensationInput::Phase => Interval::of_bits(circuit.cordic.angle_bits),
+        CompensationInput::TuningWord(_) => Interval::of_bits(circuit.nco.phase_bits),
+        CompensationInput::Channel(channel) => {
+            Interval::new(channel.format.min_raw(), channel.format.max_raw())
+        }
+    };
+    let (low, high) = compensation.clamp_raw.unwrap_or((all.low, all.high));
+    let range = Interval::new(low - offset, high - offset);
+    let fraction_bits = fraction_bits.max(0) as u32;
+    let integer_bits = range.bits().saturating_sub(fraction_bits).max(1);
+    Codes {
+        format: Format::q(integer_bits, fraction_bits),
+        low: range.low,
+        high: range.high,
+    }
+}
+
+impl Horner {
+    /// `p` are the variable's fraction bits.
+    fn new(circuit: &Circuit, compensation: &Compensation, p: i32) -> Self {
         let coefficient = compensation.coefficient_format.fraction_bits as i32;
         let accumulator = compensation.accumulator.format.fraction_bits as i32;
         let last = if compensation.coefficients_raw.len() > 1 {
@@ -103,13 +173,8 @@ impl Bias {
             rise: Cast::to(ACCUMULATOR, coefficient + p, 0, compensation.accumulator),
             sum: Cast::to(ACCUMULATOR, accumulator, 0, compensation.accumulator),
         });
-        Bias {
-            input_range,
-            input_fraction_bits,
+        Horner {
             tangent,
-            clamp: compensation.clamp_raw,
-            offset,
-            read_exponent,
             coefficients: compensation.coefficients_raw.clone(),
             coefficient_fraction_bits: coefficient,
             accumulator_fraction_bits: accumulator,
@@ -119,25 +184,10 @@ impl Bias {
             outer: Cast::to(ACCUMULATOR, accumulator, 0, compensation.accumulator)
                 .with_coefficient(accumulator - coefficient),
             output: Cast::to(OUTPUT, last, 0, compensation.output),
-            meanings: [meaning, format!("bias in deg/s, {}", compensation.output)],
         }
     }
-}
 
-impl Bias {
-    /// Fraction bits of the thermometer's word as it comes.
-    pub fn input_fraction_bits(&self) -> i32 {
-        self.input_fraction_bits
-    }
-
-    /// What the thermometer's word is, for emitted code.
-    pub fn input_meaning(&self) -> &str {
-        let [input, _] = &self.meanings;
-        input
-    }
-
-    /// Every cast, in a fixed order.
-    pub fn casts_mut(&mut self) -> Vec<&mut Cast> {
+    fn casts_mut(&mut self) -> Vec<&mut Cast> {
         let mut casts = vec![
             &mut self.first,
             &mut self.inner,
@@ -149,32 +199,15 @@ impl Bias {
         }
         casts
     }
-}
 
-impl<A: Arithmetic> Block<A, 1, 1> for Bias {
-    type State = ();
-    const NAME: &'static str = "bias";
-
-    fn inputs(&self) -> [Port; 1] {
-        [Port::new("thermometer", self.meanings[0].clone())]
-    }
-
-    fn outputs(&self) -> [Port; 1] {
-        [Port::new("bias", self.meanings[1].clone())]
-    }
-
+    /// The bias at the variable p; `beyond` is how far the word is outside the calibrated range.
     #[inline(always)]
-    fn step(&self, ar: &A, _state: &mut (), [input]: [A::Word; 1]) -> [A::Word; 1] {
-        let limited = match self.clamp {
-            Some((low, high)) => ar.limit(input, low, high, self.input_fraction_bits),
-            None => input,
-        };
-        let from_centre = match self.offset {
-            0 => limited,
-            offset => ar.sub(limited, ar.constant(offset, self.input_fraction_bits)),
-        };
-        let p = ar.read_as(from_centre, self.read_exponent);
-
+    fn evaluate<A: Arithmetic>(
+        &self,
+        ar: &A,
+        p: A::Word,
+        beyond: impl FnOnce() -> A::Word,
+    ) -> A::Word {
         let (fine, coarse) = (
             self.accumulator_fraction_bits,
             self.coefficient_fraction_bits,
@@ -204,14 +237,83 @@ impl<A: Arithmetic> Block<A, 1, 1> for Bias {
             reported = t;
         }
         if let Some(tangent) = &self.tangent {
-            let beyond = ar.read_as(ar.sub(input, limited), self.read_exponent);
+            let beyond = beyond();
             let [below, above] = tangent.slopes.map(|s| ar.constant(s, coarse));
             let slope = ar.select(ar.is_negative(beyond), below, above);
             let rise = ar.cast(ar.mul(slope, beyond), &tangent.rise, &[slope, beyond]);
             t = ar.cast(ar.add(t, rise), &tangent.sum, &[t, rise]);
         }
-        [ar.cast(t, &self.output, &[t])]
+        ar.cast(t, &self.output, &[t])
     }
+}
+
+impl Bias {
+    /// Fraction bits of the thermometer's word as it comes.
+    pub fn input_fraction_bits(&self) -> i32 {
+        self.input_fraction_bits
+    }
+
+    /// What the thermometer's word is, for emitted code.
+    pub fn input_meaning(&self) -> &str {
+        let [input, _] = &self.meanings;
+        input
+    }
+
+    /// Every cast, in a fixed order.
+    pub fn casts_mut(&mut self) -> Vec<&mut Cast> {
+        match &mut self.evaluation {
+            Evaluation::Horner(horner) => horner.casts_mut(),
+            Evaluation::Form(form) => form.casts_mut(),
+        }
+    }
+
+    /// The cast to the bias's format.
+    pub fn output_cast(&self) -> &Cast {
+        match &self.evaluation {
+            Evaluation::Horner(horner) => &horner.output,
+            Evaluation::Form(form) => form.output_cast(),
+        }
+    }
+}
+
+impl<A: Arithmetic> Block<A, 1, 1> for Bias {
+    type State = ();
+    const NAME: &'static str = "bias";
+
+    fn inputs(&self) -> [Port; 1] {
+        [Port::new("thermometer", self.meanings[0].clone())]
+    }
+
+    fn outputs(&self) -> [Port; 1] {
+        [Port::new("bias", self.meanings[1].clone())]
+    }
+
+    #[inline(always)]
+    fn step(&self, ar: &A, _state: &mut (), [input]: [A::Word; 1]) -> [A::Word; 1] {
+        let limited = match self.clamp {
+            Some((low, high)) => ar.limit(input, low, high, self.input_fraction_bits),
+            None => input,
+        };
+        let from_centre = match self.offset {
+            0 => limited,
+            offset => ar.sub(limited, ar.constant(offset, self.input_fraction_bits)),
+        };
+        let p = ar.read_as(from_centre, self.read_exponent);
+
+        [match &self.evaluation {
+            Evaluation::Horner(horner) => horner.evaluate(ar, p, || {
+                ar.read_as(ar.sub(input, limited), self.read_exponent)
+            }),
+            Evaluation::Form(form) => by_form(ar, form, p),
+        }]
+    }
+}
+
+/// Apart, so that chains without a form do not carry its code in their loops.
+#[inline(never)]
+fn by_form<A: Arithmetic>(ar: &A, form: &Form, p: A::Word) -> A::Word {
+    let [bias] = Block::<A, 1, 1>::step(form, ar, &mut (), [p]);
+    bias
 }
 
 /// The subtraction's configuration.

@@ -1,11 +1,11 @@
 //! `gyrogen approx`: a function in fixed point, with its certified error.
 
-use super::OutputFormat;
+use super::{OutputFormat, alternatives};
 use crate::approx::bundle;
 use crate::approx::cost::Target;
 use crate::approx::form::polynomial::{Monomials, Scheme};
 use crate::approx::job::{self, Asked, Request, Weight};
-use crate::approx::outcome::{Outcome, Search};
+use crate::approx::outcome::{Alternative, Outcome, Search};
 use crate::approx::selection::Reason;
 use crate::emit::files;
 use crate::emit::views::Language;
@@ -224,35 +224,8 @@ fn command(a: &Arguments) -> String {
 }
 
 fn print(o: &Outcome, out: &std::path::Path) {
-    if let Some(alternatives) = &o.alternatives {
-        let mut table = super::table(&[
-            "form",
-            "ROM, bytes",
-            "multiplies",
-            "adds",
-            "cycles (estimate)",
-            "certified error",
-            "",
-        ]);
-        for a in alternatives {
-            let mark = match (a.chosen, a.undominated) {
-                (true, _) => "chosen",
-                (false, true) => "undominated",
-                (false, false) => "",
-            };
-            table.add_row([
-                a.detail.clone(),
-                a.cost.rom_bytes.to_string(),
-                a.cost.multiplies.to_string(),
-                a.cost.adds.to_string(),
-                a.cost.cycles.to_string(),
-                format!("{:.4e}", a.certified_max_abs),
-                mark.to_owned(),
-            ]);
-        }
-        for column in table.column_iter_mut().skip(1).take(5) {
-            column.set_cell_alignment(comfy_table::CellAlignment::Right);
-        }
+    if let Some(listed) = &o.alternatives {
+        let table = alternatives::table(&["certified error"], listed.iter().map(alternative));
         say!("{table}");
     }
     if let Some(search) = &o.search {
@@ -312,6 +285,16 @@ fn print(o: &Outcome, out: &std::path::Path) {
         spelled(&o.target)
     );
     say!("wrote {}", out.display());
+}
+
+fn alternative(a: &Alternative) -> alternatives::Line<'_> {
+    alternatives::Line {
+        detail: &a.detail,
+        cost: a.cost,
+        errors: vec![format!("{:.4e}", a.certified_max_abs)],
+        undominated: a.undominated,
+        chosen: a.chosen,
+    }
 }
 
 /// Why the coefficients were taken and what that gains, in a line.

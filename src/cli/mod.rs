@@ -12,6 +12,7 @@ macro_rules! say {
     }};
 }
 
+mod alternatives;
 mod approx;
 mod close;
 mod emit;

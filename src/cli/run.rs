@@ -1,8 +1,9 @@
 //! `gyrogen run`: the main job, end to end.
 
-use super::OutputFormat;
+use super::{OutputFormat, alternatives};
 use crate::error::{Error, Result};
 use crate::job;
+use crate::job::bound::Line;
 use crate::job::outcome::{Drift, Outcome};
 use std::io::IsTerminal;
 use std::path::PathBuf;
@@ -121,6 +122,15 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
     for line in &s.certainty_text {
         say!("{line}");
     }
+    if let Some(kept) = &s.bound {
+        let errors = ["certified, deg/s", "output LSB"];
+        say!(
+            "bias function for a bound of {} deg/s on {}:\n{}",
+            kept.bound_dps,
+            kept.target.name(),
+            alternatives::table(&errors, kept.alternatives.iter().map(alternative))
+        );
+    }
     say!(
         "calibrated for {:.6} .. {:.6} {}",
         s.fit.range.0,
@@ -133,4 +143,17 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
         s.equivalence.mismatches
     );
     say!("wrote {} ({:.1} s)", out.display(), s.seconds);
+}
+
+fn alternative(line: &Line) -> alternatives::Line<'_> {
+    alternatives::Line {
+        detail: &line.detail,
+        cost: line.cost,
+        errors: vec![
+            format!("{:.4e}", line.certified_max_dps),
+            format!("{:.3}", line.certified_max_lsb),
+        ],
+        undominated: line.undominated,
+        chosen: line.chosen,
+    }
 }

@@ -1,6 +1,7 @@
 //! `[circuit]` and `[compensation]`: the keys of `docs/manual.md`, each with its
 //! range.
 
+use super::bound;
 use super::keys::{self, THERMOMETERS};
 use super::schema::*;
 use super::table::{Real, Table, Value};
@@ -234,6 +235,7 @@ pub(super) fn compensation(t: &Table, circuit: &Circuit) -> Result<Compensation>
     let coefficients_raw = coefficients(t, coefficient_format, accumulator.format)?;
     let mut compensation = Compensation {
         fitted: fitted(t, coefficients_raw.len())?,
+        form: None,
         coefficients_raw,
         coefficient_format,
         accumulator,
@@ -244,6 +246,7 @@ pub(super) fn compensation(t: &Table, circuit: &Circuit) -> Result<Compensation>
         input,
     };
     compensation.outside = outside(t, &compensation, circuit)?;
+    compensation.form = bound::evaluation(t, &compensation, circuit)?;
     Ok(compensation)
 }
 

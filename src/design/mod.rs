@@ -2,9 +2,10 @@
 //!
 //! [`schema`] is what the rest of the program sees; [`reader`] turns a file into it, with the
 //! place of every mistake (`table` keeps the places, `keys` knows every key, `suggest` what was
-//! meant, `circuit_tables` and `device_tables` read the tables); [`effects`] are those of the simulated
+//! meant, `circuit_tables`, `device_tables` and [`bound`] read the tables); [`effects`] are those of the simulated
 //! gyro, by name, [`user_effects`] those that the user suspects in a record; [`limits`] refuses formats whose exact intermediates the engine cannot hold; [`template`] holds the embedded default and what `gyrogen init` writes.
 
+pub mod bound;
 mod circuit_tables;
 mod correction_table;
 mod device_tables;
@@ -20,6 +21,7 @@ mod table;
 pub mod template;
 pub mod user_effects;
 
+pub use bound::BiasBound;
 pub use effects::Effects;
 pub use schema::*;
 pub use user_effects::UserEffect;

@@ -1,7 +1,9 @@
 //! From a design file to a checked [`Design`], with the place of every mistake.
 
 use super::table::{Doc, Table};
-use super::{circuit_tables, correction_table, device_tables, limits, template, user_effects};
+use super::{
+    bound, circuit_tables, correction_table, device_tables, limits, template, user_effects,
+};
 use crate::design::schema::*;
 use crate::error::{Error, InputError, Result, io_error};
 use sha2::{Digest, Sha256};
@@ -61,7 +63,8 @@ fn build(text: &str, file: Option<&Path>, base: Option<&Design>) -> Result<Desig
         _ => circuit_tables::circuit(&root.need_section("circuit")?)?,
     };
     let own = root.section("compensation")?;
-    let compensation = if own.is_given() {
+    let asked = bound::only_asks(&own);
+    let compensation = if own.is_given() && !asked {
         Some(circuit_tables::compensation(&own, &circuit)?)
     } else if given.is_given() {
         None
@@ -80,7 +83,8 @@ fn build(text: &str, file: Option<&Path>, base: Option<&Design>) -> Result<Desig
         compensation,
         correction,
         // The embedded default's formats are nobody's choice.
-        compensation_is_own: own.is_given() && base.is_some(),
+        bound: bound::bound(&own)?,
+        compensation_is_own: own.is_given() && !asked && base.is_some(),
         gyro: device_tables::gyro(&section("gyro")?, base.map(|b| &b.gyro))?,
         thermal_run: device_tables::thermal_run(
             &section("thermal_run")?,

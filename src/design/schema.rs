@@ -1,9 +1,11 @@
 //! The design as the program sees it. The keys of `[circuit]` and `[compensation]` are those of
 //! `docs/manual.md`; their meaning is stated there and only summarised here.
 
+use super::bound::BiasBound;
 use super::effects::Effects;
 pub use super::log_axis::LogAxis;
 use super::user_effects::UserEffect;
+use crate::approx::form::stored::Stored;
 use crate::correction::Planned;
 use crate::numeric::format::{Format, Overflow, Quantizer, Rounding, pow2};
 use std::collections::BTreeMap;
@@ -20,6 +22,8 @@ pub struct Design {
     pub compensation: Option<Compensation>,
     /// A correction of averaged readings beside it; from `gyrogen close`.
     pub correction: Option<Planned>,
+    /// What the compensation's error is asked to be.
+    pub bound: Option<BiasBound>,
     /// True if the file gave its own `[compensation]` (and so chose the formats itself).
     pub compensation_is_own: bool,
     /// The gyro: the declared model and the plant's parameters.
@@ -223,6 +227,8 @@ pub struct Compensation {
     pub outside: Outside,
     /// The fit that the coefficients stand for, where there is one.
     pub fitted: Option<Fitted>,
+    /// `[compensation.evaluation]`: the form that stands for the polynomial; none = Horner's rule.
+    pub form: Option<Stored>,
 }
 
 /// `outside`: the polynomial beyond the calibrated range.

@@ -65,6 +65,9 @@ fn every_setting_that_is_off_can_be_turned_on() {
         "integra",
         "clamp_raw",
         "outside",
+        "bound_dps",
+        "form = ",
+        "target = ",
         "[compensation.fitted]",
         "coefficients_dps",
         "std_max_dps",
@@ -90,6 +93,7 @@ fn every_setting_that_is_off_can_be_turned_on() {
     assert!(d.circuit.phase_loop.is_some());
     let low = d.compensation.as_ref().unwrap().clamp_raw.unwrap().0;
     assert_eq!(low, -5900000);
+    assert_eq!(d.bound.map(|b| (b.bound_dps, b.auto)), Some((0.01, true)));
     let fitted = d.compensation.as_ref().and_then(|c| c.fitted.as_ref());
     assert_eq!(fitted.map(|f| f.coefficients_dps.len()), Some(3));
     assert_eq!(d.record.columns.len(), 12);

@@ -90,7 +90,10 @@ impl Layout {
         if let Some(c) = &design.compensation
             && c.input.is_of_chain()
         {
-            let steps = c.coefficients_raw.len().saturating_sub(1);
+            let steps = match c.form {
+                Some(_) => 0,
+                None => c.coefficients_raw.len().saturating_sub(1),
+            };
             self.places.horner = Some((self.identities.len(), steps));
             for k in (0..steps).rev() {
                 for part in ["inner", "outer"] {

@@ -41,7 +41,7 @@ pub struct Prediction {
 }
 
 /// Every flag and what it means.
-pub const FLAGS: [(&str, &str); 11] = [
+pub const FLAGS: [(&str, &str); 12] = [
     (
         "coherent_nco",
         "the oscillator visits few phases again and again: its table errors are lines, not noise, and roundings may repeat; a figure beside this flag takes the table's errors as they are, and the roundings as noise",
@@ -70,6 +70,10 @@ pub const FLAGS: [(&str, &str); 11] = [
     (
         "open_loop_integral",
         "an integral of the error: it grows with time",
+    ),
+    (
+        "other_form",
+        "the bias is a table or another form that stands for the polynomial; the theory is that of Horner's steps",
     ),
     ("overflow", "this node or one before it has overflowed"),
     (

@@ -7,6 +7,7 @@ use super::node::{History, Node};
 use super::overflow::Event;
 use super::polar::Polar;
 use crate::circuit::chain::Chain;
+use crate::circuit::compensation::Evaluation;
 use crate::design::Design;
 use crate::numeric::cast::{Cast, Label};
 use crate::numeric::format::pow2;
@@ -96,24 +97,26 @@ impl Probe {
             role(&chain.cics[k].output, Role::Node(places.decimator + k));
         }
         if let (Some((bias, rate)), Some(at)) = (&chain.compensation, places.bias) {
-            if let Some((first, _)) = places.horner {
+            if let (Some((first, _)), Evaluation::Horner(horner)) =
+                (places.horner, &bias.evaluation)
+            {
                 role(
-                    &bias.first,
+                    &horner.first,
                     Role::Horner {
                         first,
                         outer: false,
                     },
                 );
                 role(
-                    &bias.inner,
+                    &horner.inner,
                     Role::Horner {
                         first,
                         outer: false,
                     },
                 );
-                role(&bias.outer, Role::Horner { first, outer: true });
+                role(&horner.outer, Role::Horner { first, outer: true });
             }
-            role(&bias.output, Role::Bias(at));
+            role(bias.output_cast(), Role::Bias(at));
             role(&rate.scale, Role::Node(at + 1));
             role(&rate.output, Role::Node(at + 2));
         }

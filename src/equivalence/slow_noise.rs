@@ -132,6 +132,12 @@ impl Theory<'_> {
         else {
             return;
         };
+        if c.form.is_some() {
+            for node in bias..bias + 3 {
+                set(all, node, None, &["other_form"]);
+            }
+            return;
+        }
         if c.input != CompensationInput::Phase {
             return;
         }

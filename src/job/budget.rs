@@ -3,7 +3,7 @@
 use super::coefficients::variable;
 use crate::approx::bias::certainty::Certainty;
 use crate::closure::BaselineFit;
-use crate::design::{CompensationInput, Design};
+use crate::design::{Compensation, CompensationInput, Design};
 use crate::numeric::format::pow2;
 use serde::Serialize;
 
@@ -47,16 +47,16 @@ pub fn budget(design: &Design, fit: &BaselineFit, certainty: &Certainty) -> Budg
         output_lsb: dps / output_lsb,
         kind,
     };
-    let (_, scale) = variable(&design.circuit, c);
-    let input_step = match &c.input {
-        CompensationInput::Phase => 2.0 * pow2(-(design.circuit.cordic.angle_bits as i32)),
-        CompensationInput::TuningWord(t) => pow2(-(t.scale_bits as i32)),
-        CompensationInput::Channel(channel) => pow2(-(channel.scale_bits as i32)),
+    let (coefficients, evaluation) = match c.form {
+        None => (
+            "coefficients: rounding to their format",
+            "evaluation: rounding of each Horner step",
+        ),
+        Some(_) => (
+            "the form's data against the polynomial",
+            "evaluation: rounding inside the form",
+        ),
     };
-    let slope = (0..=100)
-        .map(|k| fit.centre + fit.half_span * (f64::from(k) / 50.0 - 1.0))
-        .map(|t| fit.slope_dps(t).abs())
-        .fold(0.0, f64::max);
     let lines = vec![
         line(
             "calibration: noise of the fit",
@@ -66,19 +66,11 @@ pub fn budget(design: &Design, fit: &BaselineFit, certainty: &Certainty) -> Budg
         line("fit: held-out rms", fit.heldout_rms_dps, "estimate"),
         line(
             "thermometer: half a step of its word",
-            slope * scale * input_step / 2.0,
+            thermometer_half_step_dps(design, c, fit),
             "bound",
         ),
-        line(
-            "coefficients: rounding to their format",
-            certainty.bounds.coefficients_dps,
-            "bound",
-        ),
-        line(
-            "evaluation: rounding of each Horner step",
-            certainty.bounds.evaluation_dps,
-            "bound",
-        ),
+        line(coefficients, certainty.bounds.coefficients_dps, "bound"),
+        line(evaluation, certainty.bounds.evaluation_dps, "bound"),
         line(
             "output: rounding of bias and of rate",
             2.0 * certainty.bounds.output_dps,
@@ -94,4 +86,19 @@ pub fn budget(design: &Design, fit: &BaselineFit, certainty: &Certainty) -> Budg
         estimate_dps: of("estimate").iter().map(|v| v * v).sum::<f64>().sqrt(),
         lines,
     }
+}
+
+/// How far half a step of the thermometer's word moves the fit where it is steepest, deg/s.
+pub fn thermometer_half_step_dps(design: &Design, c: &Compensation, fit: &BaselineFit) -> f64 {
+    let (_, scale) = variable(&design.circuit, c);
+    let input_step = match &c.input {
+        CompensationInput::Phase => 2.0 * pow2(-(design.circuit.cordic.angle_bits as i32)),
+        CompensationInput::TuningWord(t) => pow2(-(t.scale_bits as i32)),
+        CompensationInput::Channel(channel) => pow2(-(channel.scale_bits as i32)),
+    };
+    let slope = (0..=100)
+        .map(|k| fit.centre + fit.half_span * (f64::from(k) / 50.0 - 1.0))
+        .map(|t| fit.slope_dps(t).abs())
+        .fold(0.0, f64::max);
+    slope * scale * input_step / 2.0
 }

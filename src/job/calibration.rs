@@ -1,5 +1,6 @@
 //! From a record to a compensation in its formats.
 
+use super::bound::{self, Kept};
 use super::coefficients::{self, Rounded};
 use super::{formats, warning};
 use crate::closure::{self, BaselineFit};
@@ -16,6 +17,8 @@ pub struct Calibration {
     pub chosen: Vec<String>,
     /// The coefficients in their formats.
     pub rounded: Rounded,
+    /// How the design's bound is kept, if it has one.
+    pub kept: Option<Kept>,
     /// Of the fit.
     pub warnings: Vec<Warning>,
 }
@@ -55,7 +58,7 @@ pub fn calibrate(
     };
     let fit = closure::fit(record, &mapping, &options)?;
     warnings.extend(fit.warnings.iter().cloned());
-    let chosen = formats::fill(design, &fit, record)?;
+    let mut chosen = formats::fill(design, &fit, record)?;
     let rounded = coefficients::round(design, &fit)?;
     // A fit of another order than the file's has other products.
     crate::design::limits::check(design).map_err(|excess| {
@@ -65,10 +68,15 @@ pub fn calibrate(
         );
         InputError::new(message).help(excess.remedy())
     })?;
+    let kept = bound::keep(design, &fit)?.map(|(kept, said)| {
+        chosen.extend(said);
+        kept
+    });
     Ok(Calibration {
         fit,
         chosen,
         rounded,
+        kept,
         warnings,
     })
 }

@@ -76,6 +76,7 @@ pub fn round(design: &mut Design, fit: &BaselineFit) -> Result<Rounded> {
             std_max_dps: fit.std_max_dps(),
             heldout_rms_dps: fit.heldout_rms_dps,
         }),
+        form: None,
         ..c.clone()
     };
     chosen.coefficients_raw = best_coefficients::best(&design.circuit, &chosen, &exact, &raw)?;
@@ -104,17 +105,20 @@ fn check_slopes(circuit: &Circuit, c: &Compensation) -> Result<()> {
 
 /// Nearest, ties up.
 fn quantise(order: usize, value: f64, format: Format) -> Result<i128> {
-    let raw = (value / format.lsb() + 0.5).floor();
-    let held = raw.is_finite() && format.contains(raw as i128);
-    if !held {
+    nearest(value, format).ok_or_else(|| {
         let needed = (value.abs() + 1.0).log2().ceil() as i32 + 1;
-        return Err(InputError::new(format!(
+        InputError::new(format!(
             "the fitted coefficient of order {order} is {value}, which {format} cannot hold"
         ))
         .help(format!(
             "give `compensation.coefficient_format` at least {needed} integer bits, or fit a lower order"
         ))
-        .into());
-    }
-    Ok(raw as i128)
+        .into()
+    })
+}
+
+/// The raw word nearest to a value, ties up; `None` if the format does not hold it.
+pub(super) fn nearest(value: f64, format: Format) -> Option<i128> {
+    let raw = (value / format.lsb() + 0.5).floor();
+    (raw.is_finite() && format.contains(raw as i128)).then_some(raw as i128)
 }

@@ -1,7 +1,9 @@
 //! The design with the fitted compensation as a design file of its own: what reproduces the firmware.
 
+use crate::approx::cost::Target;
 use crate::correction::Planned;
-use crate::design::{Compensation, CompensationInput, Design, Outside};
+use crate::design::bound::evaluation_text;
+use crate::design::{BiasBound, Compensation, CompensationInput, Design, Outside};
 use crate::numeric::format::Quantizer;
 use std::fmt::Write as _;
 
@@ -12,7 +14,7 @@ pub fn text(design: &Design) -> String {
     if let Some(c) = &design.compensation {
         text = text.trim_end().to_owned();
         text += "\n\n# Fitted; the calibrated range is clamp_raw.\n";
-        text += &compensation(c);
+        text += &compensation(c, design.bound);
     }
     text
 }
@@ -47,7 +49,7 @@ fn without(text: &str, table: &str) -> String {
     kept
 }
 
-fn compensation(c: &Compensation) -> String {
+fn compensation(c: &Compensation, bound: Option<BiasBound>) -> String {
     let mut text = String::from("[compensation]\n");
     match &c.input {
         CompensationInput::Phase => text += "input = \"phase\"\n",
@@ -74,6 +76,19 @@ fn compensation(c: &Compensation) -> String {
     }
     if c.outside != Outside::Clamp {
         _ = writeln!(text, "outside = \"{}\"", c.outside.name());
+    }
+    if let Some(bound) = bound {
+        _ = writeln!(text, "bound_dps = {:?}", bound.bound_dps);
+        if bound.auto {
+            text += "form = \"auto\"\n";
+        }
+        if bound.target != Target::default() {
+            _ = writeln!(text, "target = \"{}\"", bound.target.name());
+        }
+    }
+    if let Some(form) = &c.form {
+        text += "\n# The form that stands for the polynomial.\n";
+        text += &evaluation_text(form);
     }
     if let Some(fitted) = &c.fitted {
         text += "\n# The fit before its coefficients were put into their format; for the error budget.\n";

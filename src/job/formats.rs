@@ -3,8 +3,8 @@
 use crate::closure::BaselineFit;
 use crate::cosim::scale::{nominal_full_scale_dps, power_of_two_near};
 use crate::design::{
-    ChannelInput, Circuit, Compensation, CompensationInput, Design, Outside, RecordMapping,
-    TuningInput,
+    BiasBound, ChannelInput, Circuit, Compensation, CompensationInput, Design, Outside,
+    RecordMapping, TuningInput,
 };
 use crate::error::{InputError, Result};
 use crate::numeric::format::{Format, Overflow, Quantizer, Rounding};
@@ -74,7 +74,9 @@ pub fn column_of(compensation: &Compensation) -> &str {
 pub fn fill(design: &mut Design, fit: &BaselineFit, record: &ThermalRecord) -> Result<Vec<String>> {
     let own = design.compensation_is_own;
     let usable = |c: &Compensation| {
-        column_of(c) == fit.thermometer && (own || holds(&design.circuit, c, fit))
+        let fine = |b: BiasBound| 4.0 * c.output.format.lsb() <= b.bound_dps;
+        let serves = || holds(&design.circuit, c, fit) && design.bound.is_none_or(fine);
+        column_of(c) == fit.thermometer && (own || serves())
     };
     if design.compensation.as_ref().is_some_and(usable) {
         return Ok(Vec::new());
@@ -86,12 +88,13 @@ pub fn fill(design: &mut Design, fit: &BaselineFit, record: &ThermalRecord) -> R
         .filter(|v| !v.is_nan())
         .fold(0.0, |m: f64, v| m.max(v.abs()));
     // Rate and bias, and their difference, with a factor of two to spare.
-    let step = fit.noise_floor_rms_dps / 64.0;
+    let wanted = design.bound.map_or(f64::INFINITY, |b| b.bound_dps);
+    let step = (fit.noise_floor_rms_dps / 64.0).min(wanted / 4.0);
     let output = no_finer_than(4.0 * greatest, step, 16..=WORD_BITS)?;
     let (input, mut said) = match fit.thermometer.as_str() {
         "phase_rad" => (CompensationInput::Phase, Vec::new()),
         "freq_hz" if design.circuit.phase_loop.is_some() => tuning_word(design, fit),
-        _ => channel(fit, output)?,
+        _ => channel(fit, output, wanted)?,
     };
     let of_chain = input.is_of_chain();
     let mut compensation = Compensation {
@@ -104,6 +107,7 @@ pub fn fill(design: &mut Design, fit: &BaselineFit, record: &ThermalRecord) -> R
         clamp_raw: None,
         outside: Outside::Clamp,
         fitted: None,
+        form: None,
     };
     if of_chain {
         compensation.rate_full_scale_dps = power_of_two_near(nominal_full_scale_dps(design));
@@ -192,7 +196,11 @@ fn tuning_word(design: &Design, fit: &BaselineFit) -> (CompensationInput, Vec<St
 }
 
 /// A word for the thermometer: one LSB moves the bias by at most a sixteenth of the noise floor.
-fn channel(fit: &BaselineFit, rate_format: Format) -> Result<(CompensationInput, Vec<String>)> {
+fn channel(
+    fit: &BaselineFit,
+    rate_format: Format,
+    bound_dps: f64,
+) -> Result<(CompensationInput, Vec<String>)> {
     let reach = fit.range.0.abs().max(fit.range.1.abs());
     let margin = 0.25 * (fit.range.1 - fit.range.0);
     let slope = (0..=100)
@@ -200,7 +208,9 @@ fn channel(fit: &BaselineFit, rate_format: Format) -> Result<(CompensationInput,
         .map(|t| fit.slope_dps(t).abs())
         .fold(0.0, f64::max);
     let floor = fit.noise_floor_rms_dps.max(1e-9);
-    let format = no_finer_than(reach + margin, floor / 16.0 / slope.max(1e-12), INPUT_BITS)?;
+    // Half a step within half the bound, if one is asked for.
+    let step_dps = (floor / 16.0).min(bound_dps);
+    let format = no_finer_than(reach + margin, step_dps / slope.max(1e-12), INPUT_BITS)?;
     let lsb = format.lsb();
     let offset_raw = (fit.centre / lsb).round() as i128;
     let half_range = (fit.half_span / lsb).max(1.0);

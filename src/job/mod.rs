@@ -4,10 +4,11 @@
 //!
 //! [`own_run`] is the design's own thermal run through the circuit, [`from_record`] a measured
 //! record through the compensation alone; [`calibration`] fits, [`formats`] chooses formats that the design leaves open,
-//! [`coefficients`] rounds the fit into them, [`budget`] adds up what each step costs; [`firmware`]
+//! [`coefficients`] rounds the fit into them, [`bound`] keeps to the error that was asked for, [`budget`] adds up what each step costs; [`firmware`]
 //! emits, builds and compares; [`fitted_design`] is the
 //! design that reproduces it; [`outcome`] is what comes of it.
 
+pub mod bound;
 pub mod budget;
 pub mod calibration;
 pub mod coefficients;
@@ -77,6 +78,9 @@ pub fn run(
             ),
         ));
     }
+    if calibration.kept.is_some() {
+        bound::refuse_saturation(&certainty)?;
+    }
     let budget = budget::budget(&design, &fit, &certainty);
 
     say("emitting, building and comparing C and Rust");
@@ -99,6 +103,7 @@ pub fn run(
         chosen,
         rounded,
         budget,
+        kept: calibration.kept,
         certainty,
         firmware,
         compared,

@@ -1,5 +1,6 @@
 //! What the main job comes to: `summary.json` and everything that the report shows.
 
+use super::bound::Kept;
 use super::budget::Budget;
 use super::coefficients::Rounded;
 use super::firmware::Firmware;
@@ -57,6 +58,8 @@ pub struct Parts {
     pub rounded: Rounded,
     /// What each step costs.
     pub budget: Budget,
+    /// How the design's bound is kept, if it has one.
+    pub kept: Option<Kept>,
     /// The bias against the fit, proved and run.
     pub certainty: Certainty,
     /// Emitted and built.
@@ -96,6 +99,9 @@ pub struct Summary {
     pub budget: Budget,
     /// The emitted bias against the fitted polynomial: proved, and run over the calibrated inputs.
     pub certainty: Certainty,
+    /// How `compensation.bound_dps` is kept.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bound: Option<Kept>,
     /// The same in words.
     pub certainty_text: Vec<String>,
     /// Emitted code against the model.
@@ -253,6 +259,7 @@ impl Outcome {
                 text
             },
             certainty: parts.certainty.clone(),
+            bound: parts.kept.clone(),
             equivalence: Equivalence {
                 compared: parts.compared.iter().map(|c| c.compared).sum(),
                 mismatches: parts.compared.iter().map(|c| c.mismatches).sum::<u64>() + on_record,

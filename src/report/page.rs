@@ -31,6 +31,8 @@ pub struct Page {
     pub budget_sums: Vec<[String; 4]>,
     /// The bias against the fit, in sentences.
     pub certainty: Vec<String>,
+    /// Forms that keep to the design's bound; empty without one.
+    pub alternatives: Vec<Alternative>,
     /// The fit: name, value.
     pub fit: Vec<[String; 2]>,
     /// Orders that were tried.
@@ -70,6 +72,19 @@ pub struct Order {
     pub used: bool,
     /// In-sample, held-out, held-out without spikes.
     pub rms: [String; 3],
+}
+
+/// A form that keeps to the design's bound.
+#[derive(Debug)]
+pub struct Alternative {
+    /// In words.
+    pub detail: String,
+    /// ROM, multiplications, additions, cycles, certified error in deg/s and in output LSB.
+    pub numbers: [String; 6],
+    /// The firmware's.
+    pub chosen: bool,
+    /// `chosen`, `undominated` or nothing.
+    pub mark: &'static str,
 }
 
 /// A line of the comparison.
@@ -121,6 +136,7 @@ impl Page {
                 ),
             ],
             certainty: s.certainty_text.clone(),
+            alternatives: tables::alternatives(shown),
             fit: tables::fit(shown),
             orders: tables::orders(shown),
             unit: shown.fit.unit.to_owned(),

@@ -105,6 +105,7 @@ impl Made {
                 outliers: 0,
             },
             budget,
+            bound: None,
             certainty_text: certainty::sentences(&design, &certainty.bounds),
             certainty,
             equivalence: Equivalence {

@@ -1,7 +1,7 @@
 //! The tables about the fit, its coefficients and the formats.
 
 use super::Shown;
-use super::page::Order;
+use super::page::{Alternative, Order};
 use super::text::{grouped, minus, significant, superscript, trimmed};
 use crate::design::CompensationInput;
 
@@ -64,6 +64,31 @@ pub fn fit(shown: &Shown) -> Vec<[String; 2]> {
         ));
     }
     lines
+}
+
+/// The forms that keep to the design's bound.
+pub fn alternatives(shown: &Shown) -> Vec<Alternative> {
+    let Some(kept) = &shown.summary.bound else {
+        return Vec::new();
+    };
+    let line = |l: &crate::job::bound::Line| Alternative {
+        detail: l.detail.clone(),
+        numbers: [
+            grouped(l.cost.rom_bytes),
+            l.cost.multiplies.to_string(),
+            l.cost.adds.to_string(),
+            l.cost.cycles.to_string(),
+            significant(l.certified_max_dps, 4),
+            significant(l.certified_max_lsb, 4),
+        ],
+        chosen: l.chosen,
+        mark: match (l.chosen, l.undominated) {
+            (true, _) => "chosen",
+            (false, true) => "undominated",
+            (false, false) => "",
+        },
+    };
+    kept.alternatives.iter().map(line).collect()
 }
 
 /// The orders that were tried.
@@ -182,6 +207,12 @@ pub fn formats(shown: &Shown) -> Vec<[String; 2]> {
         lines.push(line(
             "input: rate",
             format!("sense I times {} deg/s", c.rate_full_scale_dps),
+        ));
+    }
+    if let Some(kept) = shown.summary.bound.as_ref().filter(|_| c.form.is_some()) {
+        lines.push(line(
+            "evaluated, instead of the polynomial, by",
+            kept.chosen.clone(),
         ));
     }
     if let Some((low, high)) = c.clamp_raw {

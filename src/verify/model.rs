@@ -1,7 +1,7 @@
 //! The bit-accurate model of each emitted function without state, as something that can be called.
 
 use crate::circuit::chain::Chain;
-use crate::circuit::compensation::{Bias, Rate};
+use crate::circuit::compensation::{Bias, Evaluation, Rate};
 use crate::design::{Compensation, Design};
 use crate::emit::bundle::Compensate;
 use crate::numeric::arithmetic::Block;
@@ -251,6 +251,15 @@ pub fn sensitive_inputs(design: &Design, candidates: &[i128]) -> Vec<i128> {
     };
     let nominal = Bias::new(&design.circuit, compensation);
     let mut inputs = Vec::new();
+    if let Evaluation::Form(form) = &nominal.evaluation {
+        for damaged in crate::approx::bundle::damaged(form) {
+            let mut other = nominal.clone();
+            other.evaluation = Evaluation::Form(Box::new(damaged));
+            let differs = |x: &&i128| evaluate(&other, **x) != evaluate(&nominal, **x);
+            inputs.extend(candidates.iter().filter(differs).take(EACH));
+        }
+        return inputs;
+    }
     let mut search = |damaged: &Compensation| {
         let damaged = Bias::new(&design.circuit, damaged);
         let differs = |x: &&i128| evaluate(&damaged, **x) != evaluate(&nominal, **x);

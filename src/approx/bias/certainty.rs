@@ -1,9 +1,13 @@
 //! How far the emitted bias is from the polynomial that it stands for: proved over the calibrated range, run over
 //! its input words, and bounded outside.
 
-use super::Evaluation;
+use super::{Evaluation, alternatives, one_rounding};
+use crate::approx::choice;
+use crate::approx::describe;
+use crate::approx::form::stored::Stored;
 use crate::approx::real::{Domain, Dyadic, Enclosure};
-use crate::design::{Design, Outside};
+use crate::circuit::compensation::codes;
+use crate::design::{Compensation, Design, Outside};
 use crate::error::{Error, InputError, Result};
 use serde::Serialize;
 
@@ -80,6 +84,9 @@ pub fn bounds(design: &Design) -> Result<Option<Bounds>> {
     let p_max = [low, high].map(|word| evaluation.variable(word).abs());
     let evaluation_dps = evaluation.steps_bound_dps(p_max[0].max(p_max[1]));
     let output_dps = evaluation.output_bound_dps();
+    if let Some(form) = &c.form {
+        return of_form(design, &evaluation, form).map(Some);
+    }
     Ok(Some(Bounds {
         coefficients_dps,
         evaluation_dps,
@@ -88,6 +95,23 @@ pub fn bounds(design: &Design) -> Result<Option<Bounds>> {
         may_saturate: evaluation.may_saturate(),
         outside: beyond(&evaluation, &wanted)?,
     }))
+}
+
+/// The bounds where a form stands for the polynomial.
+fn of_form(design: &Design, evaluation: &Evaluation, form: &Stored) -> Result<Bounds> {
+    let c = evaluation.compensation;
+    let settled = form.settle(codes(&design.circuit, c), c.output.format)?;
+    let measured = choice::quick(&settled, &alternatives::function(evaluation)?)?;
+    let pieces = settled.form.pieces().into_iter();
+    let evaluation_dps = pieces.map(|p| p.evaluation_bound).fold(0.0, f64::max);
+    Ok(Bounds {
+        coefficients_dps: measured.data_only,
+        evaluation_dps,
+        output_dps: evaluation.output_bound_dps(),
+        certified_max_dps: measured.certified * (1.0 + 1e-12),
+        may_saturate: evaluation.may_saturate(),
+        outside: beyond(evaluation, &evaluation.wanted())?,
+    })
 }
 
 /// The bounds, with the bias run over its calibrated words; `None` if the design has no compensation.
@@ -264,6 +288,24 @@ pub fn sentences(design: &Design, bounds: &Bounds) -> Vec<String> {
         bounds.evaluation_dps,
         bounds.output_dps
     )];
+    if let Some(asked) = design.bound {
+        let covered = bounds.certified_max_dps + output_rounding_dps(c);
+        let word = if covered <= asked.bound_dps {
+            "kept"
+        } else {
+            "NOT kept"
+        };
+        lines.push(format!(
+            "asked: bias and rate within {} deg/s of it at every calibrated input; with the rounding of the rate they are \
+             within {covered:.3e}: {word}",
+            asked.bound_dps
+        ));
+    }
+    if let Some(form) = c.form.as_ref() {
+        let built = form.build(codes(&design.circuit, c), c.output.format);
+        let detail = built.map_or(String::new(), |f| describe::detail(&f));
+        lines.push(format!("evaluated by a form that stands for it: {detail}"));
+    }
     if let Some(fitted) = &c.fitted {
         lines.push(format!(
             "the fit itself: noise {:.3e} deg/s (one standard deviation), held-out rms {:.3e} deg/s",
@@ -300,6 +342,11 @@ pub fn run_sentence(design: &Design, certainty: &Certainty) -> String {
             ""
         }
     )
+}
+
+/// What one rounding to the output can add, deg/s.
+fn output_rounding_dps(c: &Compensation) -> f64 {
+    one_rounding(c.output.rounding) * c.output.format.lsb()
 }
 
 fn figure(design: &Design, dps: f64) -> String {

@@ -20,6 +20,7 @@ const EFFORT: Effort = Effort {
     candidates: 200,
     evaluations: 2000,
     budget: Budget { nodes: 200_000 },
+    thorough: false,
 };
 
 /// Raw coefficients for `exact` (in the variable p, lowest order first), in the compensation's formats. Never worse

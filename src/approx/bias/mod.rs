@@ -1,6 +1,7 @@
 //! The compensation's bias as firmware evaluates it: exact results on its input words ([`Evaluation`]), its integer
-//! coefficients ([`coefficients`]), its proved errors ([`certainty`]).
+//! coefficients ([`coefficients`]), its proved errors ([`certainty`]), forms that can stand for it ([`alternatives`]).
 
+pub mod alternatives;
 pub mod certainty;
 pub mod coefficients;
 #[cfg(test)]
@@ -12,6 +13,7 @@ use crate::numeric::arithmetic::Block;
 use crate::numeric::fixed::Fixed;
 use crate::numeric::format::{Rounding, pow2};
 use crate::numeric::trace::Trace;
+use crate::numeric::trace::ir::Program;
 
 /// A compensation's polynomial as it is evaluated in firmware.
 #[derive(Debug, Clone)]
@@ -55,16 +57,21 @@ impl<'a> Evaluation<'a> {
         }
     }
 
-    /// True if intervals cannot exclude that a cast of the bias leaves its format.
-    pub fn may_saturate(&self) -> bool {
+    /// The bias as a program, its casts numbered in their order.
+    pub fn program(&self) -> Program {
         let mut bias = self.bias.clone();
         for (id, cast) in bias.casts_mut().into_iter().enumerate() {
             cast.id = id;
         }
         let trace = Trace::new();
         trace.record(&bias, &(), [bias.input_range]);
-        let program = trace.finish();
-        let casts = bias.casts_mut().len();
+        trace.finish()
+    }
+
+    /// True if intervals cannot exclude that a cast of the bias leaves its format.
+    pub fn may_saturate(&self) -> bool {
+        let program = self.program();
+        let casts = self.bias.clone().casts_mut().len();
         (0..casts).any(|id| !program.is_proved_in_range(id))
     }
 

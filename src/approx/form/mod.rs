@@ -12,6 +12,7 @@ pub mod piecewise;
 pub mod plan;
 pub mod polynomial;
 pub mod split;
+pub mod stored;
 pub mod table;
 
 use crate::error::{InputError, Result};
@@ -175,6 +176,11 @@ impl Form {
         }
     }
 
+    /// The cast to the output.
+    pub(crate) fn output_cast(&self) -> &Cast {
+        each!(self, f => f.output_cast())
+    }
+
     /// The input's codes.
     pub fn codes(&self) -> Codes {
         each!(self, f => f.codes)
@@ -190,7 +196,8 @@ impl Form {
         each!(self, f => f.pieces())
     }
 
-    fn casts_mut(&mut self) -> Vec<&mut Cast> {
+    /// Every cast, in a fixed order; the output's is the last.
+    pub(crate) fn casts_mut(&mut self) -> Vec<&mut Cast> {
         each!(self, f => f.casts_mut())
     }
 

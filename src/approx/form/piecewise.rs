@@ -89,6 +89,10 @@ impl Piecewise {
         self.tables.len() - 1
     }
 
+    pub(super) fn output_cast(&self) -> &Cast {
+        &self.last
+    }
+
     pub(super) fn casts_mut(&mut self) -> Vec<&mut Cast> {
         let mut casts = self.split.casts_mut();
         casts.push(&mut self.align);

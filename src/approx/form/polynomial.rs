@@ -141,6 +141,10 @@ impl Polynomial {
         })
     }
 
+    pub(super) fn output_cast(&self) -> &Cast {
+        &self.last
+    }
+
     pub(super) fn casts_mut(&mut self) -> Vec<&mut Cast> {
         let casts = self.square.iter_mut().chain(self.plan.casts_mut());
         casts.chain([&mut self.last]).collect()

@@ -106,6 +106,10 @@ impl Table {
         }
     }
 
+    pub(super) fn output_cast(&self) -> &Cast {
+        &self.last
+    }
+
     pub(super) fn casts_mut(&mut self) -> Vec<&mut Cast> {
         let mut casts = self.split.casts_mut();
         casts.extend([
@@ -238,6 +242,10 @@ impl Bipartite {
             last: Cast::to(Label::of("output"), f, 0, Quantizer::default_of(output)),
             split,
         }
+    }
+
+    pub(super) fn output_cast(&self) -> &Cast {
+        &self.last
     }
 
     pub(super) fn casts_mut(&mut self) -> Vec<&mut Cast> {

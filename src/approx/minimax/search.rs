@@ -42,18 +42,22 @@ pub trait Datapath {
 pub struct Effort {
     /// Lattice points that are run through the datapath.
     pub candidates: usize,
-    /// Calls of [`Datapath::sample_error`] altogether.
+    /// Calls of [`Datapath::sample_error`] before no further round of the proof is begun.
     pub evaluations: u64,
     /// Of each enumeration.
     pub budget: Budget,
+    /// Pairs of lattice vectors are steps too, more choices are starting points, and the local search starts again
+    /// from what it found.
+    pub thorough: bool,
 }
 
 impl Default for Effort {
     fn default() -> Self {
         Effort {
             candidates: 6000,
-            evaluations: 20_000,
+            evaluations: 8_000,
             budget: Budget { nodes: 1_000_000 },
+            thorough: true,
         }
     }
 }
@@ -105,6 +109,8 @@ pub struct Found {
 
 /// Total errors within this part of the smallest count as equal; then the ideal error decides.
 pub const NEAR: f64 = 0.005;
+/// Total errors within this part of the smallest make a starting point of a thorough search.
+const START_NEAR: f64 = 0.02;
 /// Starting points of the local search.
 const STARTS: usize = 24;
 /// Rounds of the proof, each with the least total error that the one before it found.
@@ -135,7 +141,7 @@ pub fn search_from(
     datapath: &dyn Datapath,
     effort: Effort,
 ) -> Result<Found> {
-    let mut run = Run::new(problem, datapath, effort.evaluations);
+    let mut run = Run::new(problem, datapath, effort);
     let ideal = Candidate {
         raw: best.raw.clone(),
         error: best.error,
@@ -159,9 +165,15 @@ pub fn search_from(
     for candidate in &listed.candidates {
         all &= run.judge(candidate);
     }
-    let steps = steps(problem, &best);
-    for start in run.pool(STARTS) {
-        run.walk(start, &steps);
+    let steps = steps(problem, &best, effort.thorough);
+    loop {
+        let before = run.total;
+        for start in run.pool(STARTS) {
+            run.walk(start, &steps);
+        }
+        if !effort.thorough || run.total >= before {
+            break;
+        }
     }
     let needed = run.total + run.largest_bound;
     let complete = all && !problem.samples.is_continuous() && listed.complete_below >= needed;
@@ -212,7 +224,7 @@ fn candidates(run: &Run, best: &Best, effort: Effort) -> Result<Enumeration> {
 }
 
 /// Steps of the local search: one and two units of a coefficient, pairs of units, short lattice vectors.
-fn steps(problem: &Problem, best: &Best) -> Vec<Vec<i128>> {
+fn steps(problem: &Problem, best: &Best, pairs: bool) -> Vec<Vec<i128>> {
     let n = problem.formats.len();
     let mut steps: Vec<Vec<i128>> = Vec::new();
     let unit = |pairs: &[(usize, i64)]| {
@@ -230,9 +242,22 @@ fn steps(problem: &Problem, best: &Best) -> Vec<Vec<i128>> {
     let lattice = problem
         .frame(&best.raw, best.error, None)
         .map(|f| f.transform);
-    for vector in lattice.unwrap_or_default() {
+    let lattice = lattice.unwrap_or_default();
+    for vector in &lattice {
         steps.push(vector.iter().map(|v| v.saturating_neg()).collect());
-        steps.push(vector);
+        steps.push(vector.clone());
+    }
+    // Two of them at once: along a plateau of the ideal error (a value at an end that no coefficients better) the way to a
+    // smaller total error is seldom one vector.
+    for (k, first) in lattice.iter().enumerate().filter(|_| pairs) {
+        for second in lattice.iter().skip(k + 1) {
+            for (a, b) in [(1, 1), (1, -1), (-1, 1), (-1, -1)] {
+                let both = first.iter().zip(second);
+                let sum =
+                    both.map(|(x, y)| x.saturating_mul(a).saturating_add(y.saturating_mul(b)));
+                steps.push(sum.collect());
+            }
+        }
     }
     for pairs in super::coefficients::moves(n) {
         if pairs.len() == 2 {
@@ -252,19 +277,24 @@ struct Run<'p> {
     largest_bound: f64,
     /// All with a total error near the least one, with it.
     near: Vec<(Candidate, f64)>,
+    /// Those from which the local search may start.
+    starts: Vec<(Candidate, f64)>,
+    start_near: f64,
     seen: HashSet<Vec<i128>>,
 }
 
 impl<'p> Run<'p> {
-    fn new(problem: &'p Problem, datapath: &'p dyn Datapath, most_evaluations: u64) -> Self {
+    fn new(problem: &'p Problem, datapath: &'p dyn Datapath, effort: Effort) -> Self {
         Run {
             problem,
             datapath,
-            most_evaluations,
+            most_evaluations: effort.evaluations,
             evaluations: 0,
             total: f64::INFINITY,
             largest_bound: 0.0,
             near: Vec::new(),
+            starts: Vec::new(),
+            start_near: if effort.thorough { START_NEAR } else { NEAR },
             seen: HashSet::new(),
         }
     }
@@ -299,6 +329,8 @@ impl<'p> Run<'p> {
             .fold(f64::INFINITY, |m, (c, _)| m.min(c.error));
         let wanted = candidate.error < least || self.near.len() < MOST_NEAR;
         let part = if wanted { NEAR } else { -1e-12 };
+        let few = self.start_near > NEAR && self.starts.len() < STARTS;
+        let part = if few { self.start_near } else { part };
         let limit = self.total * (1.0 + part);
         if candidate.error > limit + bound {
             return true; // its total error cannot be near the least one
@@ -319,11 +351,14 @@ impl<'p> Run<'p> {
         self.near.push((candidate.clone(), total));
         let limit = self.total * (1.0 + NEAR);
         self.near.retain(|(_, t)| *t <= limit);
+        self.starts.push((candidate.clone(), total));
+        let limit = self.total * (1.0 + self.start_near);
+        self.starts.retain(|(_, t)| *t <= limit);
     }
 
     /// The best ones, by total error.
     fn pool(&self, most: usize) -> Vec<Candidate> {
-        let mut pool = self.near.clone();
+        let mut pool = self.starts.clone();
         pool.sort_by(|a, b| {
             let by_error = a.1.total_cmp(&b.1).then(a.0.error.total_cmp(&b.0.error));
             by_error.then_with(|| a.0.raw.cmp(&b.0.raw))
@@ -361,7 +396,11 @@ impl<'p> Run<'p> {
 
     /// True if what the output's codes allow leaves nothing better, which is then known to be all.
     fn prove(&mut self, budget: Budget) -> bool {
+        let most = self.most_evaluations;
         for _ in 0..PROOF_ROUNDS {
+            if self.evaluations > most {
+                return false;
+            }
             let before = self.total;
             let Some(widest) = self.near.first().map(|(c, _)| c.raw.clone()) else {
                 return false;

@@ -357,7 +357,11 @@ impl<'a> Parser<'a> {
         let meant = alias
             .map(|(_, ours)| *ours)
             .or_else(|| nearest(&plain, &known));
+        let letter = alias.is_none() && name.chars().count() == 1;
         let help = match meant {
+            _ if letter => format!(
+                "the variable is `x`; a value of your own is given with `--parameter {name}=1.5`"
+            ),
             Some(meant) => format!("did you mean `{meant}`?"),
             None => format!("known names are {}", known.join(", ")),
         };

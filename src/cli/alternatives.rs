@@ -1,0 +1,48 @@
+//! The table of forms that meet a bound.
+
+use crate::approx::cost::Cost;
+use comfy_table::{CellAlignment, Table};
+
+/// A line: form in words, cost, errors as they are shown, undominated, chosen.
+pub(super) struct Line<'a> {
+    pub detail: &'a str,
+    pub cost: Cost,
+    pub errors: Vec<String>,
+    pub undominated: bool,
+    pub chosen: bool,
+}
+
+/// The table; `errors` are the titles of the errors' columns.
+pub(super) fn table<'a>(errors: &[&str], lines: impl Iterator<Item = Line<'a>>) -> Table {
+    let titles = [
+        "form",
+        "ROM, bytes",
+        "multiplies",
+        "adds",
+        "cycles (estimate)",
+    ];
+    let mut all: Vec<&str> = titles.into_iter().chain(errors.iter().copied()).collect();
+    all.push("");
+    let mut table = super::table(&all);
+    for line in lines {
+        let mark = match (line.chosen, line.undominated) {
+            (true, _) => "chosen",
+            (false, true) => "undominated",
+            (false, false) => "",
+        };
+        let mut row = vec![
+            line.detail.to_owned(),
+            line.cost.rom_bytes.to_string(),
+            line.cost.multiplies.to_string(),
+            line.cost.adds.to_string(),
+            line.cost.cycles.to_string(),
+        ];
+        row.extend(line.errors);
+        row.push(mark.to_owned());
+        table.add_row(row);
+    }
+    for column in table.column_iter_mut().skip(1).take(4 + errors.len()) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}
