@@ -87,6 +87,20 @@ fn parameters_have_their_values() {
 }
 
 #[test]
+fn without_x_the_only_other_letter_is_the_variable() {
+    let none = BTreeMap::new();
+    let value = |text: &str| Expression::parse_with(text, &none).map(|f| f.value(2.0));
+    assert_eq!(value("3*p^2 + p").unwrap(), 14.0);
+    assert_eq!(value("exp(0)*t").unwrap(), 2.0);
+    // Two letters, a letter beside x, a parameter's letter.
+    assert!(value("a*p").is_err() && value("x + p").is_err());
+    let parameters = BTreeMap::from([("k".to_owned(), 5.0)]);
+    let f = Expression::parse_with("k*p", &parameters).unwrap();
+    assert_eq!(f.value(2.0), 10.0);
+    assert!(Expression::parse_with("k*x + p", &parameters).is_err());
+}
+
+#[test]
 fn mistakes_have_a_column_what_was_met_and_help() {
     for (text, column, message, help) in [
         ("", 1, "met the end", ""),

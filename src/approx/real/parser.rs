@@ -51,6 +51,8 @@ struct Parser<'a> {
     /// The names that stand for themselves, in the order in which they are met; `None`: there are none,
     /// and the variable is `x`.
     names: Option<Vec<String>>,
+    /// What the variable is called ([`variable`]).
+    variable: &'a str,
     /// Byte offset of the token that is looked at, and of what follows it.
     start: usize,
     next: usize,
@@ -70,6 +72,28 @@ pub(super) fn parse_named(text: &str) -> Result<(Expression, Vec<String>)> {
     let none = BTreeMap::new();
     let parser = read(text, &none, Some(Vec::new()))?;
     Ok((parser.list, parser.names.unwrap_or_default()))
+}
+
+/// The name of the variable: `x`, or, in a text without `x`, the only other letter that stands for nothing
+/// else (`136.82*p^2 + 242.97*p`).
+fn variable<'a>(text: &'a str, parameters: &BTreeMap<String, f64>) -> &'a str {
+    let is_name = |c: char| c.is_alphanumeric() || c == '_';
+    let mut letters = Vec::new();
+    for word in text.split(|c: char| !is_name(c)) {
+        // `2p` is refused later: a number needs a sign before a name.
+        let open = word.chars().count() == 1 && word.chars().all(char::is_alphabetic);
+        let taken = word == "e" || parameters.contains_key(word);
+        if word == "x" {
+            return "x";
+        }
+        if open && !taken && !letters.contains(&word) {
+            letters.push(word);
+        }
+    }
+    match letters.as_slice() {
+        [only] => only,
+        _ => "x",
+    }
 }
 
 /// Reads all of `text`.
@@ -92,6 +116,7 @@ fn read<'a>(
         text,
         parameters,
         names,
+        variable: variable(text, parameters),
         start: 0,
         next: 0,
         token: Token::End,
@@ -310,7 +335,7 @@ impl<'a> Parser<'a> {
         let kind = match (name, self.parameters.get(name)) {
             ("pi", _) => pi(),
             _ if self.names.is_some() => self.own_name(name, start)?,
-            ("x", _) => Kind::X,
+            (name, _) if name == self.variable => Kind::X,
             (_, Some(value)) => Kind::Constant {
                 text: name.to_owned(),
                 double: *value,
