@@ -17,7 +17,7 @@ const FEW: usize = 2;
 /// to each other are soon explained by a shape with a few parameters, less so by a threshold
 /// without a free coefficient.
 const WORTH: f64 = 20.0;
-const WORTH_WHOLE: f64 = 8.0;
+const WORTH_WHOLE: f64 = 5.0;
 
 /// Most rounds of forward steps and sweeps.
 const ROUNDS: usize = 3;
