@@ -121,9 +121,6 @@ struct Profile {
     held: Vec<Vec<f64>>,
 }
 
-/// Of the grid's shapes every so many are looked at where nothing but the best points is asked for.
-const THIRD: usize = 3;
-
 /// Scores all groups. See the module.
 pub fn score(fit: &Fit, groups: &[Group], options: &Options) -> Scores {
     let grid = Grid::new(fit);
@@ -141,10 +138,7 @@ pub fn score(fit: &Fit, groups: &[Group], options: &Options) -> Scores {
     // Without surrogates only the best point of each group is asked for, and it is the same for
     // neighbouring shapes.
     let looked = if options.surrogates == 0 && options.draws == 0 {
-        Grid {
-            shapes: grid.shapes.iter().copied().step_by(THIRD).collect(),
-            weights: grid.weights.iter().copied().step_by(THIRD).collect(),
-        }
+        grid.thinned()
     } else {
         grid.clone()
     };

@@ -5,7 +5,7 @@ use super::{LEVEL, MOST_RIVALS, Model, Search, tones};
 use crate::closure::channels::Channels;
 use crate::closure::effects::tone::Pickup;
 use crate::closure::effects::{Bias, Candidate, Missing, Point};
-use crate::closure::likelihood::candidates::{Grid, Group};
+use crate::closure::likelihood::candidates::Group;
 use crate::closure::likelihood::reml::Fit;
 use crate::closure::likelihood::score::{self, Scores};
 use std::cmp::Ordering;
@@ -110,7 +110,11 @@ impl Search<'_> {
             })
             .collect();
         let scores = scored(fit, &groups, surrogates);
-        let tone = tones::strongest(c, fit, &Grid::new(fit));
+        let grid = match surrogates {
+            0 => scores.grid.thinned(),
+            _ => scores.grid.clone(),
+        };
+        let tone = tones::strongest(c, fit, &grid);
         if let Some(tone) = tone {
             let pickup: Arc<dyn Candidate> = Arc::new(Pickup {
                 frequency_hz: tone.frequency_hz,
