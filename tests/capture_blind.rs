@@ -105,7 +105,8 @@ fn single_effects_are_named() {
         "{} singles: first {first:.3}, with more {extra:.3}",
         marks.len()
     );
-    // What stands today (0.89 of 57), so that it does not fall unseen. To reach: 0.98.
+    // What stands today (0.89 of 57), so that it does not fall unseen. To reach: 0.98. Other seeds (sets 3 and 4,
+    // 142 and 110 captures): first 0.92 and 0.90, with more 0.08 and 0.10.
     assert!(first >= 0.85 && extra <= 0.06, "{first} {extra}");
 }
 

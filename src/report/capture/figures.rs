@@ -1,10 +1,8 @@
-//! The figures of a capture: residual over time and frequency, against code and slope, and the histogram.
+//! The figures of a capture: residual over time, against code and slope, and the histogram.
 
+use super::spectrum::spectrum;
 use super::view::{CELLS, Cell, Left, SLOPES, View};
 use crate::closure::capture::candidates::Effect;
-use crate::closure::capture::columns::HARMONICS;
-use crate::closure::capture::tone::fold;
-use crate::closure::capture::{mains, spur};
 use crate::report::axis::{Axis, Interval};
 use crate::report::closure::view::scatter;
 use crate::report::figures::Figure;
@@ -12,17 +10,13 @@ use crate::report::svg::{Frame, Shape, Svg, Swatch};
 use crate::report::text::significant;
 
 /// Width of a figure, px.
-const WIDTH: f64 = 960.0;
-/// Columns of a spectrum.
-const COLUMNS: usize = 480;
-/// Least power that is drawn, dBFS.
-const LEAST_DB: f64 = -200.0;
+pub(super) const WIDTH: f64 = 960.0;
 /// Missing codes that are marked one by one.
 const MARKED: usize = 300;
 /// Rows of a cell below which its mean says nothing.
 const FEW: f64 = 3.0;
 /// Names of the channels.
-const NAMES: [&str; 2] = ["drive", "sense"];
+pub(super) const NAMES: [&str; 2] = ["drive", "sense"];
 
 const DOT: Swatch = Swatch::Marker(Shape::Dot);
 const BEFORE: &str = "declared model alone";
@@ -44,7 +38,7 @@ pub fn all(view: &View) -> Vec<Figure> {
 }
 
 /// What is drawn of a channel: class and what is left.
-fn series<'a>(view: &'a View, channel: usize) -> Vec<(&'static str, &'a Left)> {
+pub(super) fn series<'a>(view: &'a View, channel: usize) -> Vec<(&'static str, &'a Left)> {
     let after = ("after", &view.after[channel]);
     if view.has_steps() {
         vec![("before", &view.before[channel]), after]
@@ -53,7 +47,7 @@ fn series<'a>(view: &'a View, channel: usize) -> Vec<(&'static str, &'a Left)> {
     }
 }
 
-fn legend(view: &View, swatch: Swatch) -> Vec<(&'static str, Swatch, String)> {
+pub(super) fn legend(view: &View, swatch: Swatch) -> Vec<(&'static str, Swatch, String)> {
     let dots = swatch == DOT;
     let class = |name: &'static str, dotted: &'static str| if dots { dotted } else { name };
     let mut out = Vec::new();
@@ -65,7 +59,7 @@ fn legend(view: &View, swatch: Swatch) -> Vec<(&'static str, Swatch, String)> {
     out
 }
 
-fn axis(interval: Interval, quantity: &str, unit: &str) -> Axis {
+pub(super) fn axis(interval: Interval, quantity: &str, unit: &str) -> Axis {
     Axis {
         interval,
         quantity: quantity.to_owned(),
@@ -74,7 +68,7 @@ fn axis(interval: Interval, quantity: &str, unit: &str) -> Axis {
 }
 
 /// Frames one below the other over one horizontal axis, which only the last one labels.
-fn stacked(
+pub(super) fn stacked(
     svg: &mut Svg,
     height: f64,
     x: &[Axis],
@@ -89,7 +83,7 @@ fn stacked(
     }
 }
 
-fn figure(svg: Svg, title: &str, caption: String) -> Figure {
+pub(super) fn figure(svg: Svg, title: &str, caption: String) -> Figure {
     Figure {
         svg: svg.finish(title),
         title: title.to_owned(),
@@ -153,140 +147,6 @@ fn over_time(view: &View) -> Figure {
          of each stretch are drawn. Each frame has its own scale."
             .to_owned(),
     )
-}
-
-/// Marks of a spectrum: class, shape, words, frequencies in turns a sample.
-fn marks(view: &View) -> Vec<(&'static str, Shape, String, Vec<f64>)> {
-    let findings = &view.closed.findings;
-    let [_, model] = &findings.models;
-    let resolution = 1.0 / view.closed.capture.rows() as f64;
-    let lines = |effect: Effect| -> Vec<f64> {
-        let taken = findings.lines.iter().filter(|l| l.1 == effect);
-        taken.map(|l| l.0).collect()
-    };
-    let of_tone = |k: f64| fold(k * model.tone.turns);
-    let mut out = vec![
-        (
-            "cooling",
-            Shape::Down,
-            "tone".to_owned(),
-            vec![of_tone(1.0)],
-        ),
-        (
-            "c",
-            Shape::Down,
-            format!("its harmonics 2 to {HARMONICS}"),
-            (2..=HARMONICS).map(|k| of_tone(k as f64)).collect(),
-        ),
-    ];
-    if let Some(fs) = view.closed.capture.meta.fs_hz {
-        let places = mains::MAINS_HZ.iter().map(|hz| hz / fs);
-        let shown = places.filter(|t| *t > resolution && *t < 0.5).collect();
-        out.push(("rust", Shape::Plus, "50 and 60 Hz".to_owned(), shown));
-    }
-    let found = lines(Effect::Mains);
-    out.push(("heating", Shape::Up, "pickup found".to_owned(), found));
-    let mut spurs = lines(Effect::Spur);
-    let truncated = spurs.is_empty()
-        && (view.closed.closure.steps.iter()).any(|s| s.effect == Effect::Spur.id());
-    if truncated && let Some(bits) = model.truncation {
-        spurs = spur::places_of(&model.tone, bits);
-    }
-    out.push(("fixed", Shape::Cross, "spur found".to_owned(), spurs));
-    out.retain(|m| !m.3.is_empty());
-    out
-}
-
-/// Spectrum of the residual before and after, both channels.
-fn spectrum(view: &View) -> Figure {
-    let fs = view.closed.capture.meta.fs_hz;
-    let unit = if fs.is_some() { "Hz" } else { "per sample" };
-    let fs = fs.unwrap_or(1.0);
-    let bins = view.after[0].spectrum.len().saturating_sub(1).max(2) as f64;
-    let across = Interval {
-        low: (0.5 * fs / bins).log10(),
-        high: (0.5 * fs).log10(),
-    }
-    .padded(0.015);
-    let curve = |left: &Left| columns(&left.spectrum, fs, across);
-    let curves: Vec<Vec<(&str, Vec<(f64, f64)>)>> = (0..2)
-        .map(|c| {
-            let shown = series(view, c).into_iter();
-            shown.map(|(class, left)| (class, curve(left))).collect()
-        })
-        .collect();
-    let x = [axis(across, "", unit), axis(across, "frequency", unit)];
-    let y: Vec<Axis> = (0..2)
-        .map(|c: usize| {
-            let values = curves[c].iter().flat_map(|s| s.1.iter().map(|p| p.1));
-            // Room for the marks above.
-            let found = Interval::of(values);
-            let span = found.high - found.low;
-            let interval = Interval {
-                low: found.low - 0.04 * span,
-                high: found.high + 0.16 * span,
-            };
-            axis(interval, NAMES[c], "dBFS")
-        })
-        .collect();
-    let marks = marks(view);
-    let mut svg = Svg::new(WIDTH);
-    let mut entries = legend(view, Swatch::Line);
-    let shown = marks.iter();
-    entries.extend(
-        shown.map(|(class, shape, words, _)| (*class, Swatch::Marker(*shape), words.clone())),
-    );
-    svg.legend(&entries);
-    stacked(&mut svg, 230.0, &x, &y, |c, frame| {
-        let mut frame = match x.get(c) {
-            Some(x) => frame.logarithmic_across(x),
-            None => frame,
-        };
-        for (class, points) in curves.get(c).into_iter().flatten() {
-            frame.line(class, points);
-        }
-        if let Some(y) = y.get(c).map(|y| y.interval) {
-            let at = y.high - 0.06 * (y.high - y.low);
-            for (class, shape, _, turns) in &marks {
-                let points = turns.iter().filter(|t| **t > 0.5 / bins);
-                let points: Vec<_> = points.map(|t| ((t * fs).log10(), at)).collect();
-                frame.markers(class, *shape, 5.0, &points);
-            }
-        }
-        frame
-    });
-    figure(
-        svg,
-        "Spectrum of the residual",
-        "Amplitude of a line relative to a sine at full scale, Hann window; the largest bin of each column of the figure. \
-         Marks stand above the frequencies of the tone, of its harmonics (folded at half the sample rate), of power lines \
-         and of the lines that a step took."
-            .to_owned(),
-    )
-}
-
-/// The largest bin of each column over a logarithmic axis: (log10 of the frequency, dBFS).
-fn columns(power: &[f64], fs: f64, across: Interval) -> Vec<(f64, f64)> {
-    let bins = power.len().saturating_sub(1).max(1) as f64;
-    let mut out: Vec<(f64, f64)> = Vec::new();
-    let mut column = usize::MAX;
-    // Zero frequency and the bin beside it are the window's.
-    for (k, power) in power.iter().enumerate().skip(1) {
-        let at = (k as f64 * 0.5 * fs / bins).log10();
-        let db = (10.0 * power.log10()).max(LEAST_DB);
-        let place = (at - across.low) / (across.high - across.low) * COLUMNS as f64;
-        let here = place.max(0.0) as usize;
-        match out.last_mut().filter(|_| here == column) {
-            Some(last) => {
-                if db > last.1 {
-                    *last = (at, db);
-                }
-            }
-            None => out.push((at, db)),
-        }
-        column = here;
-    }
-    out
 }
 
 /// Means of cells at the middles of their places: (place, mean, its standard error).

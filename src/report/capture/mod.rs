@@ -1,10 +1,11 @@
 //! The page of a closed capture: that of a record, with figures of codes.
 //!
-//! [`view`] goes over the rows once for each model and gathers what [`figures`] draw and [`histogram`] expects;
+//! [`view`] goes over the rows once for each model and gathers what [`figures`] and [`spectrum`] draw and [`histogram`] expects;
 //! [`words`] are the texts.
 
 pub mod figures;
 pub mod histogram;
+pub mod spectrum;
 pub mod view;
 pub mod words;
 
