@@ -1,6 +1,7 @@
 //! The closure of captures against a bank of captures whose cause only the bank knows.
 //!
-//! `GYROGEN_BLIND_CAPTURES=N` takes N seeds of each kind instead of the committed number.
+//! `GYROGEN_BLIND_CAPTURES=N` takes N seeds of each kind instead of the committed number, and
+//! `GYROGEN_SEED=S` other seeds: those of the S-th set (0 is the committed one).
 
 mod blind_capture;
 
@@ -10,9 +11,10 @@ use blind_capture::score::{Answer, Confusion, Mark, mark};
 use gyrogen::closure::capture::{self, input::Capture, report::Findings};
 use gyrogen::record::capture_meta::CaptureMeta;
 
-fn seeds(committed: u64) -> u64 {
-    let asked = std::env::var("GYROGEN_BLIND_CAPTURES").ok();
-    asked.and_then(|n| n.parse().ok()).unwrap_or(committed)
+fn seeds(first: u64, committed: u64) -> std::ops::Range<u64> {
+    let asked = |name: &str| std::env::var(name).ok().and_then(|n| n.parse::<u64>().ok());
+    let first = first + 1_000_000 * asked("GYROGEN_SEED").unwrap_or(0);
+    first..first + asked("GYROGEN_BLIND_CAPTURES").unwrap_or(committed)
 }
 
 fn analysed(bench: &Bench, faults: &Faults) -> Findings {
@@ -84,7 +86,7 @@ fn share(marks: &[Mark], of: impl Fn(&Mark) -> bool) -> f64 {
 
 #[test]
 fn single_effects_are_named() {
-    let cases = (1000..1000 + seeds(66)).filter_map(|seed| {
+    let cases = seeds(1000, 66).filter_map(|seed| {
         let mut bench = Bench::draw(seed);
         let mut dice = Dice::new(seed.wrapping_mul(77) + 5);
         let kind = (seed % 11) as usize;
@@ -103,13 +105,14 @@ fn single_effects_are_named() {
         "{} singles: first {first:.3}, with more {extra:.3}",
         marks.len()
     );
-    // What stands today (0.89 of 57), so that it does not fall unseen. To reach: 0.98.
+    // What stands today (0.89 of 57), so that it does not fall unseen. To reach: 0.98. Other seeds (sets 3 and 4,
+    // 142 and 110 captures): first 0.92 and 0.90, with more 0.08 and 0.10.
     assert!(first >= 0.85 && extra <= 0.06, "{first} {extra}");
 }
 
 #[test]
 fn clean_captures_name_nothing() {
-    let cases = (5000..5000 + seeds(60)).map(|seed| {
+    let cases = seeds(5000, 60).map(|seed| {
         let mut bench = Bench::draw(seed);
         let mut dice = Dice::new(seed);
         if seed % 4 == 0 {
@@ -126,7 +129,7 @@ fn clean_captures_name_nothing() {
 
 #[test]
 fn pairs_are_named_in_full() {
-    let cases = (9000..9000 + seeds(40)).filter_map(|seed| {
+    let cases = seeds(9000, 40).filter_map(|seed| {
         let bench = Bench::draw(seed);
         let mut dice = Dice::new(seed.wrapping_mul(31) + 3);
         let (a, b) = (dice.below(11), dice.below(11));

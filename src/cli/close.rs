@@ -65,9 +65,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     };
     let out = arguments.out.as_deref().unwrap_or(Path::new(FOLDER));
     let closure = if let Some(path) = &arguments.capture {
-        let (closure, _) = capture::close(path, &design, &called("capture", path))?;
+        let closed = capture::close(path, &design, &called("capture", path))?;
+        let page = crate::report::capture::html(&closed, &file_name(path))?;
         super::make_folder(out)?;
-        closure
+        crate::output::write_whole(&out.join("report.html"), page.as_bytes())?;
+        closed.closure
     } else if let Some(path) = &arguments.record {
         let command = called("record", path);
         let (record, warnings) = crate::record::read_any(path, &design.record)?;
@@ -89,10 +91,15 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
+fn file_name(path: &Path) -> std::borrow::Cow<'_, str> {
+    path.file_name()
+        .unwrap_or(path.as_os_str())
+        .to_string_lossy()
+}
+
 /// The report, and the correction's sources where there is one.
 fn write(closed: &Closed, path: &Path, design: &Design, out: &Path) -> Result<()> {
-    let name = path.file_name().unwrap_or(path.as_os_str());
-    let page = crate::report::closure::html(closed, &name.to_string_lossy())?;
+    let page = crate::report::closure::html(closed, &file_name(path))?;
     let mut bundles = Vec::new();
     if let Some(correction) = &closed.correction {
         let origin = Origin {

@@ -141,6 +141,14 @@ impl Rows {
         sum + hat(at) * (1.0 - part) + hat(at + 1) * part
     }
 
+    /// The code less all that the model makes of row `i`, limits and missing codes among it.
+    pub fn error(&self, model: &Model, channel: usize, i: usize) -> f64 {
+        let value = self.value(channel, i, &model.coefficients[channel]);
+        let sigma = model.variance.base[channel].sqrt();
+        let shift = model.limits[channel].shift(self.signal[channel][i], sigma);
+        self.target[channel][i] - value - shift
+    }
+
     /// The code itself.
     pub fn code(&self, channel: usize, i: usize) -> f64 {
         self.code[channel][i]

@@ -28,11 +28,8 @@ pub fn judge(capture: &Capture, model: &Model) -> Judged {
             rows.fill(capture, model, chunk);
             for channel in 0..2 {
                 let base = model.variance.base[channel];
-                let limits = model.limits[channel];
                 for i in 0..n {
-                    let value = rows.value(channel, i, &model.coefficients[channel]);
-                    let shift = limits.shift(rows.signal[channel][i], base.sqrt());
-                    let error = rows.target[channel][i] - value - shift;
+                    let error = rows.error(model, channel, i);
                     sums[held][0] += 1.0;
                     sums[held][1] += error * error;
                     let slope = rows.slope[channel][i];

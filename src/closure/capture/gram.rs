@@ -199,15 +199,36 @@ fn product(sums: &[Vec<f64>; 2], a: &Combo, b: &Combo) -> f64 {
 /// Weighted least squares of the target on combos; `ridge` is one over the prior variance of each
 /// (0: free). Combos that lie in the span of those before them are left out.
 pub fn solve(sums: &[Vec<f64>; 2], combos: &[&Combo], ridge: &[f64], detail: Detail) -> Solved {
+    let target = |a: &&Combo| -> f64 {
+        let parts = a.parts.iter();
+        parts.map(|(c, k, f)| f * sums[*c][k * SIDE + ALL]).sum()
+    };
+    let right: Vec<f64> = combos.iter().map(target).collect();
+    let (lower, used) = factor(sums, combos, ridge);
+    back(&lower, &right, &used, detail)
+}
+
+/// Standard deviations of weighted sums of the coefficients that [`solve`] finds; `weights` are by combo.
+pub fn deviations(
+    sums: &[Vec<f64>; 2],
+    combos: &[&Combo],
+    ridge: &[f64],
+    weights: &[Vec<f64>],
+) -> Vec<f64> {
+    let (lower, used) = factor(sums, combos, ridge);
+    // w' (L L')^-1 w is the square of L^-1 w.
+    let deviation = |w: &Vec<f64>| (2.0 * back(&lower, w, &used, Detail::Gain).gain).sqrt();
+    weights.iter().map(deviation).collect()
+}
+
+/// The lower Cholesky factor of the combos' sums of products, and which of them are independent.
+fn factor(sums: &[Vec<f64>; 2], combos: &[&Combo], ridge: &[f64]) -> (Vec<f64>, Vec<bool>) {
     let n = combos.len();
     let mut matrix = vec![0.0; n * n];
-    let mut right = vec![0.0; n];
     for (i, a) in combos.iter().enumerate() {
         for (j, b) in combos.iter().enumerate().take(i + 1) {
             matrix[i * n + j] = product(sums, a, b);
         }
-        let parts = a.parts.iter();
-        right[i] = parts.map(|(c, k, f)| f * sums[*c][k * SIDE + ALL]).sum();
     }
     let diagonal: Vec<f64> = (0..n).map(|i| matrix[i * n + i]).collect();
     for (i, r) in ridge.iter().enumerate().take(n) {
@@ -237,7 +258,7 @@ pub fn solve(sums: &[Vec<f64>; 2], combos: &[&Combo], ridge: &[f64], detail: Det
             }
         }
     }
-    back(&matrix, &right, &used, detail)
+    (matrix, used)
 }
 
 /// Forward and backward substitution, and the inverse's diagonal.

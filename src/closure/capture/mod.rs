@@ -11,8 +11,9 @@
 //! [`search`] chooses. Outside of the linear part are [`clipping`], [`missing`] (the histogram), [`jitter`] (the
 //! variance). [`spectrum`] gives noise and lines, [`wander`] the slow noise that must not pass for an
 //! effect. [`fit`] runs them in rounds; [`report`] judges on held-out rows, with [`errors`], [`rivals`],
-//! [`structure`] and [`firmware`].
+//! [`structure`] and [`firmware`]; [`bend`] is for the page, which is made in `report::capture`.
 
+pub mod bend;
 pub mod candidates;
 pub mod clipping;
 pub mod columns;
@@ -56,19 +57,43 @@ use tone::Tone;
 /// Fewest periods of the tone in a capture.
 const LEAST_PERIODS: f64 = 4.0;
 
+/// A closed capture, with what a report shows.
+pub struct Closed {
+    /// `closure.json`.
+    pub closure: Closure,
+    /// The codes.
+    pub capture: Capture,
+    /// Models and evidence.
+    pub findings: Findings,
+}
+
 /// The closure of a capture file, and what a report shows beside it.
 ///
 /// # Errors
 /// A file that cannot be read as a capture, too few rows, no tone.
-pub fn close(path: &Path, design: &Design, command: &str) -> Result<(Closure, Findings)> {
+pub fn close(path: &Path, design: &Design, command: &str) -> Result<Closed> {
     let start = std::time::Instant::now();
     let bits = design.circuit.adc.format.bits();
     let (capture, mut warnings) = input::read(path, bits)?;
     warnings.extend(key_warnings(&capture, bits));
-    let findings = analyse(&capture).map_err(|e| match e {
+    closed(capture, warnings, design, command, start).map_err(|e| match e {
         crate::error::Error::Input(e) => (*e).in_file(path).into(),
         other => other,
-    })?;
+    })
+}
+
+/// The same for a capture in memory, with what was seen when it was read.
+///
+/// # Errors
+/// Those of [`analyse`].
+pub fn closed(
+    capture: Capture,
+    mut warnings: Vec<Warning>,
+    design: &Design,
+    command: &str,
+    start: std::time::Instant,
+) -> Result<Closed> {
+    let findings = analyse(&capture)?;
     warnings.extend(findings.warnings.iter().cloned());
     let closure = Closure {
         schema: SCHEMA,
@@ -87,10 +112,14 @@ pub fn close(path: &Path, design: &Design, command: &str) -> Result<(Closure, Fi
         warnings,
         seconds: start.elapsed().as_secs_f64(),
     };
-    Ok((closure, findings))
+    Ok(Closed {
+        closure,
+        capture,
+        findings,
+    })
 }
 
-/// The same for a capture in memory.
+/// Models and evidence for a capture in memory.
 ///
 /// # Errors
 /// A capture without a tone, or with less than four periods of it.

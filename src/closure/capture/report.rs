@@ -5,9 +5,9 @@ use super::columns::{ALL, Model};
 use super::errors::{Judged, judge};
 use super::fit::{Fitted, spread};
 use super::gram::{Combo, Solved};
-use super::input::{Capture, Part};
+use super::input::Capture;
 use super::search::Search;
-use super::{firmware, jitter, mains, rivals, structure};
+use super::{bend, firmware, jitter, rivals, structure};
 use crate::closure::likelihood::tail::chi_square_surprise;
 use crate::closure::verdict::{Errors, Evidence, FirmwareErrors, Step, Structure};
 use crate::record::Warning;
@@ -34,6 +34,10 @@ pub struct Findings {
     pub noise_floor_rms: f64,
     /// Model before and after all steps.
     pub models: [Model; 2],
+    /// The bend that a step took, by channel.
+    pub bends: [Option<Vec<bend::Point>>; 2],
+    /// Frequencies of lines that a step took, turns a sample, with the step's effect.
+    pub lines: Vec<(f64, Effect)>,
 }
 
 /// A step that is taken in its turn.
@@ -108,7 +112,6 @@ pub fn findings(capture: &Capture, known: &Known, plain: &Model, fitted: &Fitted
         step.heldout_rms = judged.errors.heldout_rms;
         steps.push(step);
     }
-    let has_jitter = order.iter().any(|o| o.0 == Turn::Jitter);
     let mut last = fitted.model.clone();
     last.coefficients = without_nuisance(fitted, &combos, &solved);
     let after = if order.is_empty() {
@@ -131,7 +134,6 @@ pub fn findings(capture: &Capture, known: &Known, plain: &Model, fitted: &Fitted
         &mut warnings,
     );
     let evidence = rivals::evidence(capture, known, fitted, &mut search, &steps, &taken);
-    let _ = has_jitter;
     Findings {
         before: before.errors,
         steps,
@@ -141,6 +143,8 @@ pub fn findings(capture: &Capture, known: &Known, plain: &Model, fitted: &Fitted
         evidence,
         warnings,
         noise_floor_rms: (0.5 * (fitted.noise[0] + fitted.noise[1])).sqrt(),
+        bends: bends(fitted, &search, &set, (&combos, &solved)),
+        lines: taken_lines(fitted, &set),
         models: [plain.clone(), last],
     }
 }
@@ -254,15 +258,7 @@ fn linear_step(
     let surprise = chi_square_surprise(columns, 2.0 * gain.max(0.0));
     let tried = (fitted.variants.len() as f64).ln() + search_cost.max(0.0);
     step.p_value = (tried - surprise).exp().min(1.0);
-    let before: usize = set.iter().take_while(|k| **k != member).count();
-    let skipped: usize = set
-        .iter()
-        .take(before)
-        .filter_map(|k| fitted.variants.get(*k))
-        .map(|v| v.combos.len())
-        .sum();
-    let start = fitted.base.len() + fitted.nuisance.len() + skipped;
-    let own = start..start + columns;
+    let own = own_combos(fitted, set, member);
     parameters(&mut step, combos, solved, own);
     let names: Vec<String> = step.parameters.keys().cloned().collect();
     for (i, turns) in fitted.model.lines.iter().enumerate() {
@@ -281,6 +277,43 @@ fn linear_step(
         step.separating_experiment = Some(variant.effect.experiment().to_owned());
     }
     step
+}
+
+/// The places of a member's combos in the solution of a set.
+fn own_combos(fitted: &Fitted, set: &[usize], member: usize) -> std::ops::Range<usize> {
+    let count = |k: &usize| fitted.variants.get(*k).map_or(0, |v| v.combos.len());
+    let before: usize = set.iter().take_while(|k| **k != member).map(count).sum();
+    let start = fitted.base.len() + fitted.nuisance.len() + before;
+    start..start + count(&member)
+}
+
+/// The bend that a member of the set fits, if one does.
+fn bends(
+    fitted: &Fitted,
+    search: &Search,
+    set: &[usize],
+    solution: (&[&Combo], &Solved),
+) -> [Option<Vec<bend::Point>>; 2] {
+    let mut out = [None, None];
+    for member in set {
+        let own = own_combos(fitted, set, *member);
+        let curves = bend::curves(search, &fitted.model, set, solution, own);
+        for (out, curve) in out.iter_mut().zip(curves) {
+            *out = curve.or(out.take());
+        }
+    }
+    out
+}
+
+/// The lines of the members of a set.
+fn taken_lines(fitted: &Fitted, set: &[usize]) -> Vec<(f64, Effect)> {
+    let members = || set.iter().filter_map(|k| fitted.variants.get(*k));
+    let of = |(i, turns): (usize, &f64)| {
+        let user = members().find(|v| rivals::uses_line(v, i))?;
+        Some((*turns, user.effect))
+    };
+    let lines = fitted.model.lines.iter().enumerate();
+    lines.filter_map(of).collect()
 }
 
 /// Values and deviations; of sine and cosine of the same name also the amplitude; of a table its extremes.
@@ -428,15 +461,4 @@ fn firmware_errors(
         spread(combos, &own)
     };
     firmware::corrected(capture, last, &last.coefficients, &effects)
-}
-
-/// Rows that are held out.
-pub fn heldout_rows(capture: &Capture) -> usize {
-    let held = capture.segments.iter().filter(|s| s.part == Part::HeldOut);
-    held.map(|s| s.rows.len()).sum()
-}
-
-/// Whether a line is that of a power line.
-pub fn is_power_line(known: &Known, turns: f64, rows: usize) -> bool {
-    mains::is_mains(known, turns, 0.5 / rows as f64)
 }

@@ -69,7 +69,8 @@ pub fn alike(
     out.into_iter().map(|e| e.id().to_owned()).collect()
 }
 
-fn uses_line(variant: &Variant, i: usize) -> bool {
+/// Whether a variant has the columns of line i.
+pub fn uses_line(variant: &Variant, i: usize) -> bool {
     let (sin, _) = super::columns::line(i);
     let uses = |c: &super::gram::Combo| c.parts.iter().any(|p| p.1 == sin);
     variant.combos.iter().any(uses)

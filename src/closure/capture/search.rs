@@ -62,6 +62,12 @@ impl<'a> Search<'a> {
         (combos, solved)
     }
 
+    /// Standard deviations of weighted sums of a set's coefficients (weights by combo of [`Search::solution`]).
+    pub fn deviations(&self, set: &[usize], weights: &[Vec<f64>]) -> Vec<f64> {
+        let (combos, ridge) = self.combos(set);
+        super::gram::deviations(self.sums, &combos, &ridge, weights)
+    }
+
     /// The gain of a set beyond the base.
     pub fn gain(&mut self, set: &[usize]) -> f64 {
         let mut key = set.to_vec();

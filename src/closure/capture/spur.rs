@@ -26,9 +26,17 @@ pub fn places(tone: &Tone) -> Vec<f64> {
     let truncates = |p: &u32| u64::from(word) % (1u64 << (32 - p)) != 0;
     ADDRESS_BITS
         .filter(truncates)
-        .flat_map(|p| ORDERS.map(|k| (1 + k * (1i64 << p)) * i64::from(word)))
-        .map(|steps| fold(steps.rem_euclid(1i64 << 32) as f64 / 4_294_967_296.0))
+        .flat_map(|p| places_of(tone, p))
         .collect()
+}
+
+/// Places of the spurs of one number of address bits.
+pub fn places_of(tone: &Tone, bits: u32) -> Vec<f64> {
+    let word = i64::from(tone.word.unwrap_or(0));
+    let steps = ORDERS.map(|k| (1 + k * (1i64 << bits.min(31))) * word);
+    steps
+        .map(|s| fold(s.rem_euclid(1i64 << 32) as f64 / 4_294_967_296.0))
+        .to_vec()
 }
 
 /// Whether line i is at such a place, or has a partner at the same distance from the tone. Mains itself,

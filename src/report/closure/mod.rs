@@ -15,7 +15,7 @@ mod page_tests;
 
 use super::figures::Figure;
 use crate::closure::close::Closed;
-use crate::closure::verdict::Verdict;
+use crate::closure::verdict::{Closure, Verdict};
 use crate::error::{InputError, Result};
 use askama::Template;
 use tables::{TakenStep, Told};
@@ -27,23 +27,32 @@ use view::View;
 struct Page {
     name: String,
     headline: String,
-    finding: String,
     /// Class and text of the verdict's flag.
     flag: [&'static str; 2],
     unit: &'static str,
     /// Model, training rms, held-out rms, largest held-out, held-out rms over the noise floor.
     errors: Vec<[String; 5]>,
-    floor: String,
-    firmware: String,
-    steps: Vec<TakenStep>,
-    /// Residuals and steps.
-    figures: Vec<Figure>,
-    /// The Allan deviation, after the evidence.
-    last: Figure,
     evidence: Vec<Told>,
     /// Code, column, message.
     warnings: Vec<[String; 3]>,
-    provenance: Vec<[String; 2]>,
+    own: Own,
+}
+
+/// What the pages of records and of captures each say in their own way.
+#[derive(Debug)]
+pub struct Own {
+    /// What follows from the verdict.
+    pub finding: String,
+    /// Over the table of errors.
+    pub lead: String,
+    /// In order.
+    pub steps: Vec<TakenStep>,
+    /// Residuals and steps.
+    pub figures: Vec<Figure>,
+    /// After the evidence.
+    pub last: Option<Figure>,
+    /// Name and value.
+    pub provenance: Vec<[String; 2]>,
 }
 
 /// The report as one HTML file; `name` is that of the record.
@@ -53,10 +62,32 @@ struct Page {
 pub fn html(closed: &Closed, name: &str) -> Result<String> {
     let c = &closed.closure;
     let view = View::new(closed);
+    let lead = format!(
+        "Output less applied rate and less the model. Held-out rows are whole stretches of time that no estimate has \
+         seen. The noise floor, from differences of neighbouring rows, is {} {} rms. {}",
+        tables::value(c.noise_floor_rms),
+        c.unit,
+        tables::firmware(c)
+    );
+    let own = Own {
+        finding: tables::finding(&view),
+        lead,
+        steps: tables::steps(closed),
+        figures: figures::all(&view),
+        last: Some(figures::allan_deviation(&view)),
+        provenance: tables::provenance(closed),
+    };
+    page(c, name, own)
+}
+
+/// The page around what is its own.
+///
+/// # Errors
+/// A page that cannot be rendered, which would be a fault of this program.
+pub fn page(c: &Closure, name: &str, own: Own) -> Result<String> {
     let page = Page {
         name: name.to_owned(),
         headline: tables::headline(c),
-        finding: tables::finding(&view),
         flag: match c.verdict {
             Verdict::Complete => ["good", "complete"],
             Verdict::Explained => ["good", "explained"],
@@ -65,11 +96,6 @@ pub fn html(closed: &Closed, name: &str) -> Result<String> {
         },
         unit: c.unit,
         errors: tables::errors(c),
-        floor: tables::value(c.noise_floor_rms),
-        firmware: tables::firmware(c),
-        steps: tables::steps(closed),
-        figures: figures::all(&view),
-        last: figures::allan_deviation(&view),
         evidence: tables::evidence(c),
         warnings: c
             .warnings
@@ -79,7 +105,7 @@ pub fn html(closed: &Closed, name: &str) -> Result<String> {
                 [w.code.to_owned(), column, w.message.clone()]
             })
             .collect(),
-        provenance: tables::provenance(closed),
+        own,
     };
     page.render()
         .map_err(|e| InputError::new(format!("the report cannot be rendered: {e}")).into())

@@ -58,7 +58,7 @@ pub fn value(of: f64) -> String {
 }
 
 /// A probability.
-fn probability(p: f64) -> String {
+pub fn probability(p: f64) -> String {
     if p <= 1e-300 {
         return "below 10⁻³⁰⁰".to_owned();
     }
@@ -96,7 +96,11 @@ pub fn headline(c: &Closure) -> String {
         "rises"
     };
     let unit = c.unit;
-    let change = format!("the held-out error {change} from {before} to {after} {unit} rms");
+    let change = if before == after {
+        format!("the held-out error stays at {after} {unit} rms")
+    } else {
+        format!("the held-out error {change} from {before} to {after} {unit} rms")
+    };
     match c.verdict {
         Verdict::Complete => format!(
             "Complete: the declared model leaves {before} {unit} rms on held-out rows, and nothing in it beyond noise."
@@ -214,7 +218,7 @@ fn unit(name: &str) -> &'static str {
 }
 
 /// A value with as many decimals as its deviation has in two digits.
-fn with_deviation(value: f64, std: f64) -> String {
+pub fn with_deviation(value: f64, std: f64) -> String {
     if std.is_nan() || std <= 0.0 || !value.is_finite() {
         return trimmed(&significant(value, 4));
     }
