@@ -1,4 +1,4 @@
-//! From found effects to the correction that firmware runs; [`clock`]: its steps beside the record's rows.
+//! From found effects to the correction that firmware runs; `clock`: its steps beside the record's rows.
 
 mod clock;
 
