@@ -68,8 +68,11 @@ fn a_bundle_verifies_from_its_files_and_damage_to_a_constant_shows() {
                 unseen.push((what, share));
             }
         }
+        // All passes over the laws of the rate but the last one see their constants through the laws' slopes.
+        let laws = plan.terms.iter().filter(|t| t.is_on_rate()).count();
+        let blurred = laws * (correction.formats.passes(&plan) - 1);
         assert!(
-            count >= 10 && unseen.len() <= count / 10,
+            count >= 10 && unseen.len() <= count / 10 + blurred,
             "{count}: {unseen:#?}"
         );
         assert!(
