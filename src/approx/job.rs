@@ -142,13 +142,13 @@ pub fn approximate(
     let codes = check::codes(request, &function)?;
     check::output(request, &function)?;
     check::polynomial(request, &function, codes)?;
-    let (form, search, candidates) = choose(request, &function, codes)?;
+    let (form, mut search, candidates) = choose(request, &function, codes)?;
     let most_codes = if request.exhaustive {
         MOST_CODES
     } else {
         EXHAUSTIVE_CODES
     };
-    let settled = form.settle()?;
+    let mut settled = form.settle()?;
     overflow::refuse(&settled, most_codes)?;
     let total = codes.count();
     let effort = Effort {
@@ -157,7 +157,16 @@ pub fn approximate(
         threads,
         progress: &|count| progress(total, count),
     };
-    let measured = measure(&settled, &function, &effort)?;
+    let mut measured = measure(&settled, &function, &effort)?;
+    if let (Some(bound), Some((all, chosen))) = (request.bound, &candidates)
+        && measured.certified > bound
+    {
+        // The search has the least error that runs; what is proved of it may still be more than what is
+        // proved of the coefficients that were listed.
+        settled = all[*chosen].settled.clone();
+        search = None;
+        measured = measure(&settled, &function, &effort)?;
+    }
     let alternatives = candidates.map(|(all, chosen)| choice::alternatives(&all, chosen));
     let (coefficients, table) = describe::data(&settled.form);
     let ideal = match (&settled.form, &search) {
