@@ -6,7 +6,6 @@ use super::firmware;
 pub use super::intake::channels_of;
 use super::intake::refused;
 use super::likelihood::blocks::{self, Split};
-use super::search::judge::Round;
 use super::search::{Effort, Found, LEVEL, Model, Search};
 use super::verdict::{
     Closure, Errors, Evidence, Fate, FirmwareErrors, SCHEMA, Step, Structure, Verdict,
@@ -196,7 +195,7 @@ impl Told<'_> {
             };
             let mut others = terms.clone();
             others.remove(k);
-            let round: Round = self.search.judge(&self.search.model(&others)?, 0);
+            let round = self.search.round(&self.search.model(&others)?, 0);
             let reported = term.candidate.report(self.search.channels, estimate);
             out.push(Step {
                 effect: term.id(),

@@ -1,34 +1,87 @@
 //! Dot products, orthonormal bases, products of tall matrices; all in a fixed order of operations,
 //! so that the bits do not depend on the processor.
 
+use super::wide::{Kernel, widest};
 use nalgebra::DMatrix;
 
 /// A pivot that falls below this share of the column's norm is rounding: the column lies in the
 /// span of those before it.
 pub const DEPENDENT: f64 = 1e-8;
 
-/// Sum of products, in four interleaved partial sums.
+/// Partial sums of a product of columns: enough that no sum waits for the one before.
+const SUMS: usize = 16;
+
+/// Sum of products, in interleaved partial sums.
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 4];
-    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
-    let rest: f64 = a4
-        .remainder()
-        .iter()
-        .zip(b4.remainder())
-        .map(|(a, b)| a * b)
-        .sum();
-    for (a, b) in a4.zip(b4) {
+    widest(Dot { a, b })
+}
+
+struct Dot<'a> {
+    a: &'a [f64],
+    b: &'a [f64],
+}
+
+impl Kernel for Dot<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run(self) -> f64 {
+        product(self.a, self.b)
+    }
+}
+
+#[inline(always)]
+fn product(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; SUMS];
+    let (many_a, many_b) = (a.chunks_exact(SUMS), b.chunks_exact(SUMS));
+    let mut rest = 0.0;
+    for (a, b) in many_a.remainder().iter().zip(many_b.remainder()) {
+        rest += a * b;
+    }
+    for (a, b) in many_a.zip(many_b) {
         for ((s, a), b) in sums.iter_mut().zip(a).zip(b) {
             *s += a * b;
         }
     }
-    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
+    let mut width = SUMS / 2;
+    while width > 0 {
+        for k in 0..width {
+            sums[k] += sums[k + width];
+        }
+        width /= 2;
+    }
+    sums[0] + rest
 }
 
 /// y += factor x.
 pub fn add_scaled(y: &mut [f64], factor: f64, x: &[f64]) {
     for (y, x) in y.iter_mut().zip(x) {
         *y += factor * x;
+    }
+}
+
+/// Takes orthonormal columns out of another, `passes` times; adds what was taken to `taken`.
+struct Projection<'a> {
+    q: &'a [Vec<f64>],
+    column: &'a mut [f64],
+    taken: &'a mut [f64],
+    passes: usize,
+}
+
+impl Kernel for Projection<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for _ in 0..self.passes {
+            for (q, t) in self.q.iter().zip(self.taken.iter_mut()) {
+                let part = product(q, self.column);
+                *t += part;
+                for (y, x) in self.column.iter_mut().zip(q) {
+                    *y -= part * x;
+                }
+            }
+        }
     }
 }
 
@@ -80,14 +133,23 @@ impl Basis {
 
     /// Takes the span out of a column, twice; returns what was taken, in coordinates of Q.
     pub fn project_off(&self, column: &mut [f64]) -> Vec<f64> {
+        self.project_off_in(2, column)
+    }
+
+    /// Takes the span out of a column once: enough for a column of which a share is left that is large against
+    /// the rounding of its norm.
+    pub fn project_off_once(&self, column: &mut [f64]) {
+        self.project_off_in(1, column);
+    }
+
+    fn project_off_in(&self, passes: usize, column: &mut [f64]) -> Vec<f64> {
         let mut taken = vec![0.0; self.q.len()];
-        for _ in 0..2 {
-            for (q, t) in self.q.iter().zip(&mut taken) {
-                let part = dot(q, column);
-                *t += part;
-                add_scaled(column, -part, q);
-            }
-        }
+        widest(Projection {
+            q: &self.q,
+            column,
+            taken: &mut taken,
+            passes,
+        });
         taken
     }
 
@@ -138,67 +200,93 @@ impl Basis {
     }
 }
 
-/// All dot products of the columns of `a` with those of `b`: entry [i * b.len() + j]. Blocked, so
-/// that both stay in the cache.
-pub fn dots(a: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<f64> {
-    const BLOCK: usize = 1024;
-    let mut out = vec![0.0; a.len() * b.len()];
-    let n = a.first().map_or(0, Vec::len);
-    for start in (0..n).step_by(BLOCK) {
-        let end = (start + BLOCK).min(n);
-        for (i, a4) in a.chunks(4).enumerate() {
-            for (j, b2) in b.chunks(2).enumerate() {
-                if let ([a0, a1, a2, a3], [b0, b1]) = (a4, b2) {
-                    let a = [a0, a1, a2, a3].map(|c| &c[start..end]);
-                    let sums = tile(a, [&b0[start..end], &b1[start..end]]);
-                    for (k, row) in sums.iter().enumerate() {
-                        for (l, s) in row.iter().enumerate() {
-                            out[(4 * i + k) * b.len() + 2 * j + l] += s;
+/// All dot products of the columns of `a` with those of `b`: entry [i * b.len() + j].
+pub fn dots<A: AsRef<[f64]>, B: AsRef<[f64]>>(a: &[A], b: &[B]) -> Vec<f64> {
+    widest(Dots { a, b })
+}
+
+struct Dots<'a, A, B> {
+    a: &'a [A],
+    b: &'a [B],
+}
+
+impl<A: AsRef<[f64]>, B: AsRef<[f64]>> Kernel for Dots<'_, A, B> {
+    type Output = Vec<f64>;
+
+    /// Blocked, so that both stay in the cache.
+    #[inline(always)]
+    fn run(self) -> Vec<f64> {
+        const BLOCK: usize = 1024;
+        let (a, b) = (self.a, self.b);
+        let mut out = vec![0.0; a.len() * b.len()];
+        let n = a.first().map_or(0, |a| a.as_ref().len());
+        for start in (0..n).step_by(BLOCK) {
+            let block = start..(start + BLOCK).min(n);
+            for (i, a4) in a.chunks(4).enumerate() {
+                for (j, b2) in b.chunks(2).enumerate() {
+                    if let ([a0, a1, a2, a3], [b0, b1]) = (a4, b2) {
+                        let a = [a0, a1, a2, a3].map(|c| &c.as_ref()[block.clone()]);
+                        let sums = tile(a, [b0, b1].map(|c| &c.as_ref()[block.clone()]));
+                        for (k, row) in sums.iter().enumerate() {
+                            for (l, s) in row.iter().enumerate() {
+                                out[(4 * i + k) * b.len() + 2 * j + l] += s;
+                            }
                         }
-                    }
-                } else {
-                    for (k, a) in a4.iter().enumerate() {
-                        for (l, c) in b2.iter().enumerate() {
-                            out[(4 * i + k) * b.len() + 2 * j + l] +=
-                                dot(&a[start..end], &c[start..end]);
+                    } else {
+                        for (k, a) in a4.iter().enumerate() {
+                            for (l, c) in b2.iter().enumerate() {
+                                let (a, c) = (a.as_ref(), c.as_ref());
+                                out[(4 * i + k) * b.len() + 2 * j + l] +=
+                                    product(&a[block.clone()], &c[block.clone()]);
+                            }
                         }
                     }
                 }
+            }
+        }
+        out
+    }
+}
+
+/// Rows that a tile's sums take side by side.
+const ROWS: usize = 4;
+
+/// Four columns against two.
+#[inline(always)]
+fn tile(a: [&[f64]; 4], b: [&[f64]; 2]) -> [[f64; 2]; 4] {
+    let mut sums = [[[0.0f64; ROWS]; 2]; 4];
+    let (a, rest_a) = parted(a);
+    let (b, rest_b) = parted(b);
+    let n = b[0].len();
+    let (a, b) = (a.map(|c| &c[..n]), b.map(|c| &c[..n]));
+    for i in 0..n {
+        let right = [b[0][i], b[1][i]];
+        for (sums, a) in sums.iter_mut().zip(&a) {
+            let left = a[i];
+            for (s, r) in sums.iter_mut().zip(&right) {
+                for k in 0..ROWS {
+                    s[k] += left[k] * r[k];
+                }
+            }
+        }
+    }
+    let mut out = [[0.0; 2]; 4];
+    for ((out, sums), a) in out.iter_mut().zip(&sums).zip(&rest_a) {
+        for ((o, s), b) in out.iter_mut().zip(sums).zip(&rest_b) {
+            *o = (s[0] + s[1]) + (s[2] + s[3]);
+            for (a, b) in a.iter().zip(*b) {
+                *o += a * b;
             }
         }
     }
     out
 }
 
-/// Four columns against two.
-fn tile(a: [&[f64]; 4], b: [&[f64]; 2]) -> [[f64; 2]; 4] {
-    let n = b[0].len();
-    let mut sums = [[[0.0f64; 2]; 2]; 4];
-    let a = a.map(|c| &c[..n]);
-    let b = b.map(|c| &c[..n]);
-    let even = n / 2 * 2;
-    let mut i = 0;
-    while i < even {
-        let right = [[b[0][i], b[0][i + 1]], [b[1][i], b[1][i + 1]]];
-        for (sums, a) in sums.iter_mut().zip(&a) {
-            let left = [a[i], a[i + 1]];
-            for (s, r) in sums.iter_mut().zip(&right) {
-                s[0] += left[0] * r[0];
-                s[1] += left[1] * r[1];
-            }
-        }
-        i += 2;
-    }
-    let mut out = [[0.0; 2]; 4];
-    for ((out, sums), a) in out.iter_mut().zip(&sums).zip(&a) {
-        for ((o, s), b) in out.iter_mut().zip(sums).zip(&b) {
-            *o = s[0] + s[1];
-            if even < n {
-                *o += a[even] * b[even];
-            }
-        }
-    }
-    out
+/// Columns as chunks of [`ROWS`] rows, and their last rows.
+#[inline(always)]
+fn parted<const N: usize>(columns: [&[f64]; N]) -> ([&[[f64; ROWS]]; N], [&[f64]; N]) {
+    let parts = columns.map(|c| c.as_chunks::<ROWS>());
+    (parts.map(|p| p.0), parts.map(|p| p.1))
 }
 
 #[cfg(test)]

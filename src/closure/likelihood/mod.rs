@@ -7,12 +7,11 @@
 //! squares; [`reml`] estimates the strengths ([`robust`]: spikes; [`decimate`]: long records);
 //! [`candidates`] measures a dictionary of candidate effects; [`null`] and [`score`] say how often
 //! chance alone does as well ([`tail`]: small probabilities); [`blocks`] cuts held-out blocks.
-//! [`linear`] and [`random`] are tools.
+//! [`linear`], [`random`] and [`wide`] are tools.
 //!
 //! Nothing here is random: surrogates are functions of a seed and a counter ([`random`]).
 
 pub mod blocks;
-
 pub mod candidates;
 pub mod decimate;
 pub mod lattice;
@@ -25,6 +24,7 @@ pub mod robust;
 pub mod score;
 pub mod tail;
 pub mod whiten;
+pub mod wide;
 
 #[cfg(test)]
 mod calibration_tests;

@@ -8,9 +8,10 @@
 //! columns (rows times states each).
 
 use super::noise::{Shape, State, Timeline};
+use super::wide::{Kernel, widest};
 
 /// Columns that are filtered side by side.
-const LANES: usize = 4;
+const LANES: usize = 8;
 
 /// Gains of the filter for one timeline and one shape of the noise, the white variance being 1.
 #[derive(Debug, Clone, PartialEq)]
@@ -200,41 +201,79 @@ fn filter<const N: usize>(
     inputs: &[impl AsRef<[f64]>],
     outputs: &mut [Vec<f64>],
 ) {
-    let n = whitener.inverse_std.len();
     let empty: &[f64] = &[];
     let mut columns = [empty; LANES];
     for (c, input) in columns.iter_mut().zip(inputs) {
         *c = input.as_ref();
     }
-    let mut m = [[0.0f64; LANES]; N];
-    for row in 0..n {
-        let inverse = whitener.inverse_std[row];
-        let (decays, gains) = whitener.coefficients[2 * N * row..2 * N * (row + 1)].split_at(N);
-        let mut v = [0.0f64; LANES];
-        if inverse > 0.0 {
-            for (v, c) in v.iter_mut().zip(&columns) {
-                *v = c.get(row).copied().unwrap_or(0.0);
-            }
-        }
-        let mut predicted = [0.0f64; LANES];
-        for (m, a) in m.iter_mut().zip(decays) {
-            for (m, p) in m.iter_mut().zip(&mut predicted) {
-                *m *= a;
-                *p += *m;
-            }
-        }
-        if inverse > 0.0 {
-            for (v, p) in v.iter_mut().zip(&predicted) {
-                *v -= p;
-            }
-            for (m, g) in m.iter_mut().zip(gains) {
-                for (m, v) in m.iter_mut().zip(&v) {
-                    *m += g * v;
+    widest(Filter::<N> {
+        whitener,
+        columns,
+        outputs,
+    });
+}
+
+/// The recursion of a whitener with N states.
+struct Filter<'a, const N: usize> {
+    whitener: &'a Whitener,
+    columns: [&'a [f64]; LANES],
+    outputs: &'a mut [Vec<f64>],
+}
+
+impl<const N: usize> Kernel for Filter<'_, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let mut m = [[0.0f64; LANES]; N];
+        let rows = self.whitener.coefficients.chunks_exact((2 * N).max(1));
+        let n = self.whitener.inverse_std.len();
+        let mut rows = rows.map(|row| row.split_at(N));
+        for row in 0..n {
+            let inverse = self.whitener.inverse_std[row];
+            let (decays, gains) = rows.next().unwrap_or((&[], &[]));
+            let mut v = [0.0f64; LANES];
+            if inverse > 0.0 {
+                for (v, c) in v.iter_mut().zip(&self.columns) {
+                    *v = c.get(row).copied().unwrap_or(0.0);
                 }
             }
-            for (out, v) in outputs.iter_mut().zip(&v) {
-                out[row] = v * inverse;
+            for (m, a) in m.iter_mut().zip(decays) {
+                for m in m.iter_mut() {
+                    *m *= a;
+                }
+            }
+            if inverse > 0.0 {
+                let predicted = total(&m);
+                for (v, p) in v.iter_mut().zip(&predicted) {
+                    *v -= p;
+                }
+                for (m, g) in m.iter_mut().zip(gains) {
+                    for (m, v) in m.iter_mut().zip(&v) {
+                        *m += g * v;
+                    }
+                }
+                for (out, v) in self.outputs.iter_mut().zip(&v) {
+                    out[row] = v * inverse;
+                }
             }
         }
     }
+}
+
+/// The sum of the states, by pairs: the filter waits for it in every row.
+#[inline(always)]
+fn total<const N: usize>(m: &[[f64; LANES]; N]) -> [f64; LANES] {
+    let mut sums = *m;
+    let mut count = N;
+    while count > 1 {
+        let half = count.div_ceil(2);
+        for k in half..count {
+            for lane in 0..LANES {
+                sums[k - half][lane] += sums[k][lane];
+            }
+        }
+        count = half;
+    }
+    sums.first().copied().unwrap_or([0.0; LANES])
 }

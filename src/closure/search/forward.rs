@@ -19,6 +19,10 @@ const FEW: usize = 2;
 const WORTH: f64 = 20.0;
 const WORTH_WHOLE: f64 = 5.0;
 
+/// Names that are looked at for spikes; what a quick look may be short of a thorough one.
+const LOOKED: usize = 5;
+const MARGIN: f64 = 4.0;
+
 /// Most rounds of forward steps and sweeps.
 const ROUNDS: usize = 3;
 
@@ -50,7 +54,8 @@ impl Search<'_> {
         for _ in 0..ROUNDS {
             model = self.forward(model, &mut found)?;
             let before: Vec<String> = model.terms.iter().map(Term::id).collect();
-            model = self.swept(model)?;
+            let swept = self.swept(model)?;
+            model = self.proven(self.without_undone(swept)?)?;
             if model.terms.iter().map(Term::id).eq(before) {
                 break;
             }
@@ -79,13 +84,13 @@ impl Search<'_> {
             if named >= self.effort.steps || model.terms.len() - named >= STRANGERS {
                 return Ok(model);
             }
-            let round = self.judge(&model, self.effort.surrogates);
+            let round = self.round(&model, self.effort.surrogates);
             if found.first.is_empty() {
                 found.first = round.judged.clone();
             }
             let next = self.next(&model, &round)?;
             if found.missing.is_empty() {
-                found.missing = round.missing;
+                found.missing.clone_from(&round.missing);
             }
             match next {
                 Next::Stop => return Ok(model),
@@ -95,7 +100,8 @@ impl Search<'_> {
                     found.undecided.extend(term.rivals);
                     return Ok(model);
                 }
-                Next::Add(term) => {
+                Next::Add(mut term) => {
+                    term.beside = model.terms.iter().map(Term::id).collect();
                     let mut terms = model.terms.clone();
                     terms.push(term);
                     model = self.polished(self.model(&terms)?)?;
@@ -139,15 +145,41 @@ impl Search<'_> {
             ..self.options()
         };
         let plain = self.model_with(&model.terms, &plainly)?;
-        let all = self.judge(&plain, self.effort.surrogates);
         let value = |j: &Judged| -> Result<f64, Unusable> {
             let mut terms = model.terms.clone();
             terms.push(Term::of(j, Vec::new()));
             Ok(self.model_with(&terms, &self.near(model))?.value - j.gain + j.net)
         };
+        let worth = |j: &Judged| match j.candidate.is_whole() {
+            true => WORTH_WHOLE,
+            false => WORTH,
+        };
+        // First without surrogates, which cost most and decide nothing where no name is worth it, or the best
+        // one leads without the spikes.
+        let quick = self.judge(&plain, 0);
+        let mut worthy: Option<(&Judged, f64)> = None;
+        for j in quick
+            .judged
+            .iter()
+            .filter(|j| j.candidate.named())
+            .take(LOOKED)
+        {
+            let above = value(j)? - model.value - worth(j) + MARGIN;
+            if above >= worthy.map_or(0.0, |w| w.1) {
+                worthy = Some((j, above));
+            }
+        }
+        let leads = |j: &Judged| {
+            let leader = found.first().map(|f| f.candidate.id());
+            !j.candidate.is_whole() && leader == Some(j.candidate.id())
+        };
+        if worthy.is_none_or(|(j, _)| leads(j)) {
+            return Ok(None);
+        }
+        let all = self.judge(&plain, self.effort.surrogates);
         let mut best: Option<(&Judged, f64)> = None;
         let mut others = Vec::new();
-        for j in all.judged.iter().filter(|j| j.is_found()).take(5) {
+        for j in all.judged.iter().filter(|j| j.is_found()).take(LOOKED) {
             let value = value(j)?;
             others.push((j.candidate.id(), value));
             if best.is_none_or(|b| value > b.1) {
@@ -157,12 +189,7 @@ impl Search<'_> {
         let Some((best, reached)) = best else {
             return Ok(None);
         };
-        let worth = if best.candidate.is_whole() {
-            WORTH_WHOLE
-        } else {
-            WORTH
-        };
-        if reached < model.value + worth {
+        if reached < model.value + worth(best) {
             return Ok(None);
         }
         for j in found.iter().take(2) {

@@ -13,11 +13,13 @@ pub mod forward;
 pub mod halves;
 pub mod heldout;
 pub mod judge;
+mod memo;
 pub mod refine;
 pub mod stairs;
 pub mod structure;
 pub mod sweep;
 pub mod tones;
+pub mod undone;
 
 use super::channels::{Channels, range};
 use super::effects::{self, Bias, Candidate, Missing, Point};
@@ -25,7 +27,8 @@ use super::likelihood::Unusable;
 use super::likelihood::blocks::Split;
 use super::likelihood::linear::{Basis, add_scaled, dot};
 use super::likelihood::reml::{self, Fit};
-use judge::Judged;
+use judge::{Judged, Round};
+use memo::Memo;
 use std::sync::Arc;
 
 /// How hard to search.
@@ -68,6 +71,8 @@ pub struct Term {
     pub rivals: Vec<String>,
     /// Gain in log-likelihood with all other terms in.
     pub gain: f64,
+    /// What the probability is beside: the ids of the terms that were in.
+    pub beside: Vec<String>,
 }
 
 impl Term {
@@ -79,6 +84,7 @@ impl Term {
             p_value: judged.p_value,
             gain: judged.gain,
             rivals,
+            beside: Vec::new(),
         }
     }
 
@@ -89,6 +95,7 @@ impl Term {
 }
 
 /// The declared model with terms, fitted on training rows.
+#[derive(Clone)]
 pub struct Model {
     /// Named and nameless terms.
     pub terms: Vec<Term>,
@@ -138,6 +145,8 @@ pub struct Search<'a> {
     /// How hard.
     pub effort: Effort,
     candidates: Vec<Arc<dyn Candidate>>,
+    models: Memo<Arc<Model>>,
+    rounds: Memo<Arc<Round>>,
 }
 
 /// The regressors of the declared model: 1, u, u^2.
@@ -169,6 +178,8 @@ impl<'a> Search<'a> {
             heldout: both(&split.heldout),
             effort,
             candidates,
+            models: Memo::default(),
+            rounds: Memo::default(),
         }
     }
 
@@ -183,7 +194,28 @@ impl<'a> Search<'a> {
     /// # Errors
     /// Too few rows.
     pub fn model(&self, terms: &[Term]) -> Result<Model, Unusable> {
-        self.model_with(terms, &self.options())
+        if let Some(known) = self.models.get(terms) {
+            return Ok(Model {
+                terms: terms.to_vec(),
+                ..(*known).clone()
+            });
+        }
+        let model = self.model_with(terms, &self.options())?;
+        self.models.keep(terms, Arc::new(model.clone()));
+        Ok(model)
+    }
+
+    /// Everything judged beside a [`Search::model`]; `surrogates` = 0: gains alone, which an earlier round
+    /// beside the same terms has as well.
+    pub fn round(&self, model: &Model, surrogates: usize) -> Arc<Round> {
+        if surrogates == 0
+            && let Some(known) = self.rounds.get(&model.terms)
+        {
+            return known;
+        }
+        let round = Arc::new(self.judge(model, surrogates));
+        self.rounds.keep(&model.terms, round.clone());
+        round
     }
 
     /// The usual way to fit.

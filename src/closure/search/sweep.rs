@@ -2,7 +2,7 @@
 
 use super::judge::{Judged, PRICE};
 use super::refine::{self, Bench};
-use super::{Found, MOST_RIVALS, Model, Search, Term, stairs, structure};
+use super::{Found, LEVEL, MOST_RIVALS, Model, Search, Term, stairs, structure};
 use crate::closure::effects::Point;
 use crate::closure::likelihood::Unusable;
 use crate::closure::likelihood::linear::add_scaled;
@@ -194,11 +194,16 @@ impl Search<'_> {
         own_spikes: usize,
     ) -> Result<Option<Term>, Unusable> {
         let without = self.model(others)?;
-        let round = self.judge(&without, 0);
+        let round = self.round(&without, 0);
         let same = round.judged.iter().find(|j| j.candidate.id() == own.id());
         let kept = |j: &Judged| {
             let mut term = Term::of(j, round.rivals(j));
             term.p_value = own.p_value;
+            term.beside.clone_from(&own.beside);
+            if term.id() != own.id() {
+                // The probability is that of another name.
+                term.beside.push(own.id());
+            }
             if term.rivals.len() > MOST_RIVALS {
                 term.rivals.truncate(MOST_RIVALS);
             }
@@ -236,6 +241,46 @@ impl Search<'_> {
             return Ok(Some(term));
         }
         Ok(None)
+    }
+
+    /// Tests again, with surrogates, every name whose probability was found beside terms that are no longer in:
+    /// two shapes that cancel each other out can both be beyond chance, and neither alone.
+    ///
+    /// # Errors
+    /// Too few rows.
+    pub fn proven(&self, mut model: Model) -> Result<Model, Unusable> {
+        let mut k = 0;
+        while k < model.terms.len() {
+            let mut others = model.terms.clone();
+            let mut own = others.remove(k);
+            let ids: Vec<String> = others.iter().map(Term::id).collect();
+            let holds = own.beside.iter().all(|id| ids.contains(id));
+            if holds || !own.candidate.named() {
+                k += 1;
+                continue;
+            }
+            let without = self.model(&others)?;
+            if self.spikes(&without.fit) > self.spikes(&model.fit) + 1 {
+                // Rows that only it explains are out beside the others.
+                k += 1;
+                continue;
+            }
+            let round = self.round(&without, self.effort.surrogates);
+            let again = round.judged.iter().find(|j| j.candidate.id() == own.id());
+            match again.filter(|j| j.p_value <= LEVEL) {
+                Some(j) => {
+                    own.p_value = j.p_value;
+                    own.beside = ids;
+                    model.terms[k] = own;
+                    k += 1;
+                }
+                None => {
+                    model = without;
+                    k = 0;
+                }
+            }
+        }
+        Ok(model)
     }
 
     /// Log-likelihood with one term more.
@@ -361,7 +406,7 @@ impl Search<'_> {
     fn stability(&self, model: &Model, term: usize) -> Result<f64, Unusable> {
         let mut others = model.terms.clone();
         others.remove(term);
-        let round = self.judge(&self.model(&others)?, 0);
+        let round = self.round(&self.model(&others)?, 0);
         Ok(self.selection_frequency(model, term, &round))
     }
 

@@ -3,7 +3,7 @@
 
 use crate::closure::channels::Channels;
 use crate::closure::likelihood::candidates::Grid;
-use crate::closure::likelihood::linear::{Basis, dot};
+use crate::closure::likelihood::linear::{dot, dots};
 use crate::closure::likelihood::null::bartlett;
 use crate::closure::likelihood::reml::Fit;
 use crate::closure::likelihood::tail::chi_square_surprise;
@@ -28,15 +28,71 @@ const OVERSAMPLING: f64 = 2.0;
 /// A noise of less posterior weight is not looked at.
 const LIGHT: f64 = 0.1;
 
-/// Turns (sine, cosine) pairs by the angles of others.
-fn turn(pair: &mut [Vec<f64>], step: &[Vec<f64>]) {
-    let [sines, cosines] = pair else { return };
-    let [step_sines, step_cosines] = step else {
-        return;
+/// Frequencies that are whitened side by side.
+const BATCH: usize = 16;
+
+/// A share of a tone's sum of squares below which it lies in the declared model.
+const DECLARED: f64 = 1e-8;
+
+/// Sine and cosine of one frequency at the rows' times, turned from one frequency to the next by a constant
+/// step.
+struct Turning {
+    pair: [Vec<f64>; 2],
+    step: [Vec<f64>; 2],
+}
+
+impl Turning {
+    fn new(times: &[f64], first: f64, step: f64) -> Self {
+        let angles = |w: f64| {
+            [
+                times.iter().map(|t| (w * t).sin()).collect(),
+                times.iter().map(|t| (w * t).cos()).collect(),
+            ]
+        };
+        Turning {
+            pair: angles(first),
+            step: angles(step),
+        }
+    }
+
+    /// The next `count` pairs, one after the other.
+    fn next(&mut self, count: usize) -> Vec<Vec<f64>> {
+        let mut out = Vec::with_capacity(2 * count);
+        for _ in 0..count {
+            out.extend(self.pair.iter().cloned());
+            let [sines, cosines] = &mut self.pair;
+            let steps = self.step[0].iter().zip(&self.step[1]);
+            for ((s, c), (ds, dc)) in sines.iter_mut().zip(cosines).zip(steps) {
+                (*s, *c) = (*s * dc + *c * ds, *c * dc - *s * ds);
+            }
+        }
+        out
+    }
+}
+
+/// What a pair of whitened columns explains of a signal that has nothing of the declared model any more:
+/// z' G^-1 z. `products` of each column: with the declared model's directions, then with the signal.
+fn explained(pair: [&[f64]; 2], products: [&[f64]; 2]) -> f64 {
+    let rank = products[0].len() - 1;
+    let gram = |i: usize, j: usize| {
+        let whole = dot(pair[i], pair[j]);
+        let parts = products[i][..rank].iter().zip(&products[j][..rank]);
+        (whole, whole - parts.map(|(a, b)| a * b).sum::<f64>())
     };
-    let steps = step_sines.iter().zip(step_cosines);
-    for ((s, c), (ds, dc)) in sines.iter_mut().zip(cosines).zip(steps) {
-        (*s, *c) = (*s * dc + *c * ds, *c * dc - *s * ds);
+    let ((ss, s), (cc, c), (_, sc)) = (gram(0, 0), gram(1, 1), gram(0, 1));
+    let (y_s, y_c) = (products[0][rank], products[1][rank]);
+    let alone = |whole: f64, left: f64, y: f64| {
+        if left > DECLARED * whole {
+            y * y / left
+        } else {
+            0.0
+        }
+    };
+    let determinant = s * c - sc * sc;
+    if s > DECLARED * ss && c > DECLARED * cc && determinant > DECLARED * ss * cc {
+        (c * y_s * y_s - 2.0 * sc * y_s * y_c + s * y_c * y_c) / determinant
+    } else {
+        alone(ss, s, y_s).max(alone(cc, c, y_c))
     }
 }
 
@@ -64,32 +120,24 @@ pub fn strongest(c: &Channels, fit: &Fit, grid: &Grid) -> Option<Tone> {
         let contrasts = whitener.used.saturating_sub(declared.rank());
         let rss = dot(&y, &y).max(f64::MIN_POSITIVE);
         let mut greatest = 0.0f64;
-        // Each frequency is the one before, turned by a constant step.
-        let angles = |w: f64| -> Vec<Vec<f64>> {
-            [
-                times.iter().map(|t| (w * t).sin()).collect(),
-                times.iter().map(|t| (w * t).cos()).collect(),
-            ]
-            .into()
-        };
-        let mut pair = angles(TAU * frequency(0));
-        let step = angles(TAU / (OVERSAMPLING * span));
-        for k in 0..count {
-            if k > 0 {
-                turn(&mut pair, &step);
-            }
-            let mut own = Basis::default();
-            for mut column in whitener.apply_all(&pair) {
-                declared.project_off(&mut column);
-                own.push(&column);
-            }
-            let explained: f64 = own.q.iter().map(|q| dot(q, &y).powi(2)).sum();
-            let ratio = -(-(explained / rss).clamp(0.0, 1.0 - 1e-12)).ln_1p();
-            let surprise = chi_square_surprise(2, bartlett(contrasts, 2) * ratio);
-            if surprise > greatest {
-                greatest = surprise;
-                if best.is_none_or(|b| surprise > b.1) {
-                    best = Some((frequency(k), surprise));
+        let mut turning = Turning::new(&times, TAU * frequency(0), TAU / (OVERSAMPLING * span));
+        let against: Vec<&[f64]> = declared.q.iter().chain([&y]).map(Vec::as_slice).collect();
+        let width = against.len();
+        for start in (0..count).step_by(BATCH) {
+            let pairs = turning.next(BATCH.min(count - start));
+            let white = whitener.apply_all(&pairs);
+            let products = dots(&white, &against);
+            let each = white.chunks_exact(2).zip(products.chunks_exact(2 * width));
+            for (k, (pair, products)) in each.enumerate() {
+                let (sine, cosine) = products.split_at(width);
+                let explained = explained([&pair[0], &pair[1]], [sine, cosine]);
+                let ratio = -(-(explained / rss).clamp(0.0, 1.0 - 1e-12)).ln_1p();
+                let surprise = chi_square_surprise(2, bartlett(contrasts, 2) * ratio);
+                if surprise > greatest {
+                    greatest = surprise;
+                    if best.is_none_or(|b| surprise > b.1) {
+                        best = Some((frequency(start + k), surprise));
+                    }
                 }
             }
         }

@@ -1,0 +1,108 @@
+//! Names that the rest of a model takes back.
+//!
+//! Two regressors that are nearly the same, in opposite directions, make a third one of what little they differ
+//! in: the noise of a column, say, which may well go with the output's noise. Both are then beyond chance, each
+//! beside the other, and neither is in the record.
+
+use super::{Model, Search, Term};
+use crate::closure::likelihood::Unusable;
+use crate::closure::likelihood::linear::{Basis, add_scaled, dot};
+use crate::closure::likelihood::whiten::Whitener;
+
+/// Share of a name's sum of squares that has to be left when shapes without a name are added to it.
+const STRANGERS: f64 = 0.5;
+
+/// The same when all other terms are added. Two causes in one record may be opposed.
+const ALL: f64 = 0.1;
+
+impl Search<'_> {
+    /// The model without names of which the other terms leave next to nothing.
+    ///
+    /// # Errors
+    /// Too few rows.
+    pub fn without_undone(&self, mut model: Model) -> Result<Model, Unusable> {
+        while let Some(k) = self.undone(&model) {
+            let mut terms = model.terms.clone();
+            terms.remove(k);
+            model = self.model(&terms)?;
+        }
+        Ok(model)
+    }
+
+    /// The first name that is taken back.
+    fn undone(&self, model: &Model) -> Option<usize> {
+        if model.terms.len() < 2 {
+            return None;
+        }
+        let parts = self.contributions(model);
+        let named: Vec<bool> = model.terms.iter().map(|t| t.candidate.named()).collect();
+        (0..parts.len()).find(|k| {
+            let others = |only_strangers: bool| -> Vec<&Vec<f64>> {
+                let each = parts.iter().zip(&named).enumerate();
+                each.filter(|(j, (_, named))| j != k && !(only_strangers && **named))
+                    .map(|(_, (part, _))| part)
+                    .collect()
+            };
+            named[*k]
+                && (is_undone(&parts[*k], &others(true), STRANGERS)
+                    || is_undone(&parts[*k], &others(false), ALL))
+        })
+    }
+
+    /// What each term contributes, whitened, without what the declared model could take up; rows of the fit.
+    fn contributions(&self, model: &Model) -> Vec<Vec<f64>> {
+        let c = self.channels;
+        let fit = &model.fit;
+        let whitener = Whitener::new(&fit.problem.line, fit.at.shape);
+        let declared = super::declared(c);
+        let mut next = declared.len();
+        let reduced: Vec<Vec<f64>> = declared.iter().map(|d| fit.reduce(d)).collect();
+        let basis = Basis::new(&whitener.apply_all(&reduced));
+        let part = |term: &Term| {
+            let count = term.candidate.columns(c, &model.bias, &term.point).len();
+            let mut sum = vec![0.0; c.len()];
+            for k in next..next + count {
+                if let (Some(column), Some(b)) = (model.columns.get(k), model.beta.get(k)) {
+                    add_scaled(&mut sum, *b, column);
+                }
+            }
+            next += count;
+            let mut white = whitener.apply(&fit.reduce(&sum));
+            basis.project_off(&mut white);
+            white
+        };
+        model.terms.iter().map(part).collect()
+    }
+}
+
+/// Whether others leave less than a share of a part's sum of squares.
+fn is_undone(part: &[f64], others: &[&Vec<f64>], share: f64) -> bool {
+    let mut sum = part.to_vec();
+    for other in others {
+        add_scaled(&mut sum, 1.0, other);
+    }
+    !others.is_empty() && dot(&sum, &sum) < share * dot(part, part)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::closure::likelihood::random::Stream;
+
+    #[test]
+    fn what_is_taken_back_is_undone_and_what_stands_beside_is_not() {
+        let part = Stream::new(3, 0).normals(500);
+        let beside = Stream::new(3, 1).normals(500);
+        let back = |share: f64| -> Vec<f64> {
+            let pairs = part.iter().zip(&beside);
+            pairs.map(|(p, b)| -share * p + 0.1 * b).collect()
+        };
+        assert!(!is_undone(&part, &[], 0.5));
+        assert!(!is_undone(&part, &[&beside], 0.5));
+        assert!(!is_undone(&part, &[&back(-1.0)], 0.5));
+        assert!(!is_undone(&part, &[&back(0.2)], 0.5));
+        assert!(is_undone(&part, &[&back(0.9)], 0.5));
+        assert!(is_undone(&part, &[&back(0.5), &back(0.5)], 0.1));
+        assert!(!is_undone(&part, &[&back(0.5)], 0.1));
+    }
+}
