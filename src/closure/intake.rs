@@ -1,10 +1,12 @@
 //! A record as candidates see it: which column is the thermometer, and what its readings are in degC.
 
 use super::channels::Channels;
+use super::quantised::{self, Course};
 use crate::design::{Design, Gyro, RecordMapping};
 use crate::error::{InputError, Result};
 use crate::record::columns::THERMOMETERS;
 use crate::record::{ThermalRecord, Warning, stats};
+use std::collections::BTreeMap;
 
 /// The bias model's thermometer in a record, if it has one.
 ///
@@ -109,8 +111,34 @@ pub fn channels_of(
         ));
     }
     let degc = |reading: f64| degc_of(&design.gyro, &name, nominal, reading);
-    Channels::new(&record.time_s, &columns, &name, degc)
-        .map_err(|missing| refused(record, format!("column {missing} holds no measured value")))
+    let seen = |columns: &BTreeMap<String, Vec<f64>>| {
+        let made = Channels::new(&record.time_s, columns, &name, degc);
+        made.map_err(|missing| refused(record, format!("column {missing} holds no measured value")))
+    };
+    let channels = seen(&columns)?;
+    let Some(course) = quantised::course(&channels) else {
+        return Ok(channels);
+    };
+    warnings.push(rounding(design, &name, &course));
+    columns.insert(name.clone(), course.reading);
+    seen(&columns)
+}
+
+/// What is said of a thermometer that is read in coarse steps.
+fn rounding(design: &Design, thermometer: &str, course: &Course) -> Warning {
+    let of_circuit = match quantised::predicted(design, thermometer) {
+        Some(step) if (0.5..2.0).contains(&(course.step / step)) => {
+            format!(", as the design's circuit predicts ({step:.3e})")
+        }
+        _ => String::new(),
+    };
+    let said = format!(
+        "{thermometer} is read in steps of {:.3e}{of_circuit}: their rounding makes {:.3e} deg/s rms of the declared \
+         bias. It is taken out before and after (causes are sought along the course between the steps); the \
+         firmware's error contains it: read the thermometer with more bits",
+        course.step, course.artefact_rms_dps
+    );
+    Warning::on("thermometer_quantised", thermometer, said)
 }
 
 /// Stands for the thermometer where there is none.

@@ -5,8 +5,8 @@
 //! correlation, and the coefficients' covariance), [`folds`] (held-out blocks), [`order`] (its
 //! choice), [`sweep`] (heating against cooling) and [`checks`] (what a user should know of before
 //! believing the fit). [`likelihood`] is what tells an effect from noise with a memory. [`capture`] does the
-//! same for ADC codes. [`close`] answers for a thermal record: [`channels`], candidate [`effects`] and
-//! their [`search`], [`firmware`]; [`verdict`] is the form of the answer. Nothing here knows the plant
+//! same for ADC codes. [`close`] answers for a thermal record: [`intake`] ([`quantised`]: coarse thermometers), [`channels`],
+//! candidate [`effects`] and their [`search`], [`firmware`]; [`verdict`] is the form of the answer. Nothing here knows the plant
 //! (law 4).
 
 pub mod baseline;
@@ -22,6 +22,7 @@ pub mod likelihood;
 pub mod noise;
 pub mod order;
 pub mod polynomial;
+pub mod quantised;
 pub mod search;
 pub mod sweep;
 pub mod verdict;

@@ -203,7 +203,14 @@ fn logged(record: &ThermalRecord, c: &Channels, plan: &Plan) -> ThermalRecord {
     let mut out = record.clone();
     for input in &plan.inputs {
         let filled = if input.column == c.thermometer {
-            Some(c.u.iter().map(|u| c.centre + c.half * u).collect())
+            // Firmware sees the reading itself, not its course between coarse steps.
+            let read = record.column(&input.column).unwrap_or(&[]);
+            let course = c.u.iter().map(|u| c.centre + c.half * u).enumerate();
+            let reading = |(i, course): (usize, f64)| {
+                let own = read.get(i).copied().filter(|r| r.is_finite());
+                own.unwrap_or(course)
+            };
+            Some(course.map(reading).collect())
         } else {
             c.column(&input.column).map(<[f64]>::to_vec)
         };
