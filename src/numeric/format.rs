@@ -68,8 +68,13 @@ impl Format {
 }
 
 /// 2^exponent as an f64 (exact inside the range of normal numbers).
+#[inline]
 pub fn pow2(exponent: i32) -> f64 {
-    f64::powi(2.0, exponent)
+    match exponent {
+        // Sign 0, the biased exponent, fraction 0.
+        -1022..=1023 => f64::from_bits(((exponent + 1023) as u64) << 52),
+        _ => f64::powi(2.0, exponent),
+    }
 }
 
 impl fmt::Display for Format {
