@@ -256,6 +256,19 @@ mod tests {
     }
 
     #[test]
+    fn powers_of_two_are_exact_to_the_ends_of_the_range() {
+        let mut expected = f64::MIN_POSITIVE;
+        for exponent in -1022..=1023 {
+            assert_eq!(pow2(exponent), expected, "{exponent}");
+            expected *= 2.0;
+        }
+        assert_eq!(
+            (pow2(1024), pow2(-1074)),
+            (f64::INFINITY, f64::from_bits(1))
+        );
+    }
+
+    #[test]
     fn impossible_formats_are_refused_with_the_rule() {
         for (text, rule) in [
             ("Q0.16", "sign"),

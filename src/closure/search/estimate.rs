@@ -143,3 +143,62 @@ impl Search<'_> {
             .collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::closure::effects::Point;
+    use crate::closure::likelihood::blocks;
+    use crate::closure::search::Effort;
+    use crate::closure::synthetic::{Random, triangle};
+    use std::collections::BTreeMap;
+
+    #[test]
+    fn the_tangent_of_a_transient_is_its_derivative_and_a_clip_has_no_gain() {
+        let (rows, tau_s) = (300, 400.0);
+        let mut random = Random::new(4);
+        let time_s: Vec<f64> = (0..rows).map(|k| 10.0 * k as f64).collect();
+        let output = time_s
+            .iter()
+            .map(|t| 0.4 * (-t / tau_s).exp() + 0.01 * random.normal());
+        let columns = BTreeMap::from([
+            ("rate_out_dps".to_owned(), output.collect()),
+            ("die_degc".to_owned(), triangle(rows)),
+        ]);
+        let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+        let split = blocks::split(&c.time_s, &c.u).unwrap();
+        let search = Search::new(&c, &split, Effort::default(), Vec::new());
+        let term = |id: &str, point: Point| Term {
+            candidate: search
+                .candidates()
+                .iter()
+                .find(|c| c.id() == id)
+                .unwrap()
+                .clone(),
+            point,
+            p_value: 0.0,
+            rivals: Vec::new(),
+            gain: 0.0,
+        };
+        let terms = [
+            term("output_saturation", Point::at(1, &[10.0])),
+            term("warmup_transient", Point::at(0, &[f64::ln(tau_s)])),
+        ];
+        let model = search.model(&terms).unwrap();
+        let found = tangents(&c, &model);
+        assert_eq!((found[0].own.clone(), found[1].own.clone()), (3..4, 4..5));
+        assert!(found[0].by_beta.is_empty());
+        let amplitude_dps = model.beta[4];
+        assert!((amplitude_dps - 0.4).abs() < 0.02, "{amplitude_dps}");
+        for (i, t) in time_s.iter().enumerate() {
+            let decay = (-t / tau_s).exp();
+            assert!((found[1].by_beta[0][i] - decay).abs() < 1e-12);
+            // By the logarithm of the time constant; at most 0.37 of the amplitude.
+            let slope = amplitude_dps * t / tau_s * decay;
+            assert!(
+                (found[1].by_theta[0][i] - slope).abs() < 2e-3 * amplitude_dps,
+                "{i}"
+            );
+        }
+    }
+}
