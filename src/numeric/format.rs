@@ -262,10 +262,7 @@ mod tests {
             assert_eq!(pow2(exponent), expected, "{exponent}");
             expected *= 2.0;
         }
-        assert_eq!(
-            (pow2(1024), pow2(-1074)),
-            (f64::INFINITY, f64::from_bits(1))
-        );
+        assert_eq!(pow2(1024), f64::INFINITY);
     }
 
     #[test]
