@@ -1,13 +1,16 @@
 //! `gyrogen close` with effects of the user's own (`[[effects]]` of a design).
 
-use gyrogen::closure::close::{self, Closed};
-use gyrogen::closure::search::Effort;
+mod common {
+    pub mod closing;
+    pub mod design;
+}
+
+use common::closing;
+use gyrogen::closure::close::Closed;
 use gyrogen::closure::verdict::{Fate, Step};
-use gyrogen::design::reader;
 use gyrogen::plant::noise::Noise;
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
-use std::path::Path;
 
 /// White noise of a row, deg/s.
 const NOISE_DPS: f64 = 0.01;
@@ -68,10 +71,7 @@ parameters = { g = {}, tau = { range = [1.0, 2.0] } }
 "#;
 
 fn closed(csv: &str) -> Closed {
-    let design = reader::parse(DESIGN, None).unwrap();
-    let read = gyrogen::record::thermal::parse(csv.as_bytes(), Path::new("r.csv"), &design.record);
-    let (record, warnings) = read.unwrap();
-    close::close(&record, warnings, &design, "test", Effort::default()).unwrap()
+    closing::closed(csv, DESIGN)
 }
 
 /// The only step; its parameters are within four standard deviations of the truth, and these are small.

@@ -1,13 +1,18 @@
 //! `gyrogen close --self-test`: its counts, on few records.
 
+mod common {
+    pub mod command;
+    pub mod design;
+}
+
+use common::command::gyrogen_in;
+use common::design::design;
 use gyrogen::closure::close::{self, Named};
 use gyrogen::closure::search::Effort;
-use gyrogen::design::{Design, reader};
 use gyrogen::error::Result;
 use gyrogen::record::ThermalRecord;
 use gyrogen::selftest::outcome::Outcome;
 use gyrogen::selftest::{Request, run, run_with};
-use std::process::Command;
 
 fn request(only: &[&str], records: usize, clean: usize) -> Request {
     Request {
@@ -17,10 +22,6 @@ fn request(only: &[&str], records: usize, clean: usize) -> Request {
         only: only.iter().map(|id| (*id).to_owned()).collect(),
         ..Request::default()
     }
-}
-
-fn design(text: &str) -> Design {
-    reader::parse(text, None).unwrap()
 }
 
 /// (detected, records) at a size.
@@ -143,14 +144,10 @@ fn an_effect_of_the_users_is_planted_too() {
     assert!(needs.remark.contains("pressure_hpa") && needs.minimum_detectable.is_none());
 }
 
-/// The command with a design; its output.
+/// The status and the output of a self-test.
 fn command(folder: &std::path::Path, more: &[&str]) -> (Option<i32>, Vec<u8>) {
-    let out = Command::new(env!("CARGO_BIN_EXE_gyrogen"))
-        .current_dir(folder)
-        .args(["close", "--self-test", "--format", "json"])
-        .args(more)
-        .output()
-        .unwrap();
+    let self_test = ["close", "--self-test", "--format", "json"];
+    let out = gyrogen_in(folder, &[&self_test[..], more].concat(), &[]);
     (out.status.code(), out.stdout)
 }
 
@@ -219,13 +216,8 @@ fn a_record_of_ones_own_gives_the_experiment_and_threads_do_not_matter() {
 fn options_of_a_self_test_need_one() {
     let folder = tempfile::tempdir().unwrap();
     let run = |arguments: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_gyrogen"));
-        let out = command
-            .current_dir(folder.path())
-            .arg("close")
-            .args(arguments)
-            .output();
-        out.unwrap().status.code()
+        let out = gyrogen_in(folder.path(), &[&["close"], arguments].concat(), &[]);
+        out.status.code()
     };
     assert_eq!(run(&["--record", "r.csv", "--seed", "3"]), Some(2));
     assert_eq!(run(&["--self-test", "--capture", "c.csv"]), Some(2));

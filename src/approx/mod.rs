@@ -12,6 +12,8 @@ pub mod coefficients;
 pub mod cost;
 mod datapath;
 mod describe;
+#[cfg(test)]
+pub(crate) mod draws;
 pub mod form;
 pub mod ideal;
 pub mod job;

@@ -3,13 +3,16 @@
 use super::OutputFormat;
 use crate::closure::capture;
 use crate::closure::close::{self, Closed};
+use crate::closure::firmware::emitted::{self, Emitted, Told};
 use crate::closure::search::Effort;
 use crate::closure::verdict::{Closure, Verdict};
 use crate::correction::Planned;
 use crate::correction::firmware::{self, Origin};
 use crate::design::Design;
+use crate::emit::files::EmittedFile;
 use crate::emit::views::Language;
-use crate::error::Result;
+use crate::error::{Error, Result};
+use crate::record::{ThermalRecord, Warning};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
@@ -26,6 +29,10 @@ pub struct Arguments {
     /// experiment and the noise of that record.
     #[arg(long, conflicts_with = "capture")]
     self_test: bool,
+    /// Builds the emitted C and Rust with this machine's compilers, runs the whole record through them and
+    /// compares every word with the model.
+    #[arg(long, conflicts_with_all = ["capture", "self_test"])]
+    verify: bool,
     /// Design file; the embedded default if left out.
     #[arg(long)]
     pub(super) design: Option<PathBuf>,
@@ -46,7 +53,8 @@ const FOLDER: &str = "gyrogen-close";
 /// Runs the command.
 ///
 /// # Errors
-/// An unusable design or record (exit 2).
+/// An unusable design or record; with `--verify` no compiler (exit 2); emitted code that differs from the model
+/// (exit 1).
 pub fn run(arguments: &Arguments) -> Result<()> {
     let design = super::design(arguments.design.as_deref())?;
     if arguments.self_test {
@@ -64,31 +72,47 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         command
     };
     let out = arguments.out.as_deref().unwrap_or(Path::new(FOLDER));
-    let closure = if let Some(path) = &arguments.capture {
+    let (closure, compared) = if let Some(path) = &arguments.capture {
         let closed = capture::close(path, &design, &called("capture", path))?;
         let page = crate::report::capture::html(&closed, &file_name(path))?;
         super::make_folder(out)?;
         crate::output::write_whole(&out.join("report.html"), page.as_bytes())?;
-        closed.closure
+        (closed.closure, None)
     } else if let Some(path) = &arguments.record {
         let command = called("record", path);
         let (record, warnings) = crate::record::read_any(path, &design.record)?;
-        let closed = close::close(&record, warnings, &design, &command, Effort::default())?;
-        write(&closed, path, &design, out)?;
-        closed.closure
+        let mut closed = close::close(&record, warnings, &design, &command, Effort::default())?;
+        let sources = sources(&closed)?;
+        let compared = if arguments.verify {
+            compared(&mut closed, &record, &sources)?
+        } else {
+            None
+        };
+        write(&closed, path, &design, &sources, compared.as_ref(), out)?;
+        (closed.closure, compared)
     } else {
         return Ok(());
     };
-    let json = super::json(&closure);
+    let json = super::json(&Told {
+        closure: &closure,
+        emitted: compared.as_ref(),
+    });
     crate::output::write_whole(&out.join("closure.json"), json.as_bytes())?;
     match arguments.format {
         OutputFormat::Json => say!("{}", json.trim_end()),
-        OutputFormat::Text => print(&closure, out),
+        OutputFormat::Text => print(&closure, compared.as_ref(), out),
     }
     for warning in &closure.warnings {
         eprintln!("warning: {} [{}]", warning.message, warning.code);
     }
-    Ok(())
+    let differences = compared.map_or(Vec::new(), |c| c.differences());
+    if differences.is_empty() {
+        return Ok(());
+    }
+    Err(Error::Check(format!(
+        "the emitted code is not the model: {}",
+        differences.join("; ")
+    )))
 }
 
 fn file_name(path: &Path) -> std::borrow::Cow<'_, str> {
@@ -97,23 +121,49 @@ fn file_name(path: &Path) -> std::borrow::Cow<'_, str> {
         .to_string_lossy()
 }
 
-/// The report, and the correction's sources where there is one.
-fn write(closed: &Closed, path: &Path, design: &Design, out: &Path) -> Result<()> {
-    let page = crate::report::closure::html(closed, &file_name(path))?;
-    let mut bundles = Vec::new();
-    if let Some(correction) = &closed.correction {
-        let origin = Origin {
-            prefix: "gyro",
-            sha256: &closed.closure.design_sha256,
-            command: &closed.closure.command,
-        };
-        for (language, folder) in [
-            (Language::C, "firmware/c"),
-            (Language::Rust, "firmware/rust"),
-        ] {
-            bundles.push((firmware::emit(correction, &origin, language)?, folder));
-        }
+/// Prefix of every name in the sources.
+const PREFIX: &str = "gyro";
+
+/// The correction in C and in Rust, where there is one.
+fn sources(closed: &Closed) -> Result<Option<[Vec<EmittedFile>; 2]>> {
+    let Some(correction) = &closed.correction else {
+        return Ok(None);
+    };
+    let origin = Origin {
+        prefix: PREFIX,
+        sha256: &closed.closure.design_sha256,
+        command: &closed.closure.command,
+    };
+    let of = |language| firmware::emit(correction, &origin, language);
+    Ok(Some([of(Language::C)?, of(Language::Rust)?]))
+}
+
+/// The sources beside the model; a warning where there are none.
+fn compared(
+    closed: &mut Closed,
+    record: &ThermalRecord,
+    sources: &Option<[Vec<EmittedFile>; 2]>,
+) -> Result<Option<Emitted>> {
+    if let Some(sources) = sources {
+        return emitted::check(closed, record, PREFIX, sources.clone());
     }
+    closed.closure.warnings.push(Warning::general(
+        "nothing_to_verify",
+        "no firmware was emitted, so that none was compared with the model",
+    ));
+    Ok(None)
+}
+
+/// The report, and the correction's sources where there is one.
+fn write(
+    closed: &Closed,
+    path: &Path,
+    design: &Design,
+    sources: &Option<[Vec<EmittedFile>; 2]>,
+    compared: Option<&Emitted>,
+    out: &Path,
+) -> Result<()> {
+    let page = crate::report::closure::html_compared(closed, compared, &file_name(path))?;
     super::make_folder(out)?;
     if let Some(correction) = &closed.correction {
         let planned = Planned {
@@ -123,13 +173,17 @@ fn write(closed: &Closed, path: &Path, design: &Design, out: &Path) -> Result<()
         let text = crate::job::fitted_design::with_correction(design, &planned);
         crate::output::write_whole(&out.join("design.toml"), text.as_bytes())?;
     }
-    for (files, folder) in &bundles {
+    for (files, folder) in sources
+        .iter()
+        .flatten()
+        .zip(["firmware/c", "firmware/rust"])
+    {
         crate::emit::files::write(files, &out.join(folder))?;
     }
     crate::output::write_whole(&out.join("report.html"), page.as_bytes())
 }
 
-fn print(c: &Closure, out: &Path) {
+fn print(c: &Closure, compared: Option<&Emitted>, out: &Path) {
     if !c.steps.is_empty() {
         let mut table = super::table(&["step", "parameters", "held-out rms", "p", "like it"]);
         for s in &c.steps {
@@ -167,6 +221,10 @@ fn print(c: &Closure, out: &Path) {
         say!("firmware, bit for bit: held-out rms {rms:.5} {}", c.unit);
     } else if c.unit == "deg/s" {
         say!("firmware cannot carry this: it does not see all that is needed");
+    }
+    if let Some(compared) = compared {
+        say!("{}", super::comparison_table(&compared.functions));
+        say!("emitted C and Rust: {}", compared.sentence());
     }
     say!("wrote {} ({:.1} s)", out.display(), c.seconds);
 }

@@ -223,14 +223,19 @@ impl Channels {
 
     /// Median distance of rows, s.
     pub fn period_s(&self) -> f64 {
-        let mut steps: Vec<f64> = self.time_s.windows(2).map(|w| w[1] - w[0]).collect();
-        steps.retain(|s| *s > 0.0);
-        if steps.is_empty() {
-            return 1.0;
-        }
-        let middle = steps.len() / 2;
-        *steps.select_nth_unstable_by(middle, f64::total_cmp).1
+        period_s(&self.time_s)
     }
+}
+
+/// Median distance of rows, s; 1 without any.
+fn period_s(time_s: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = time_s.windows(2).map(|w| w[1] - w[0]).collect();
+    steps.retain(|s| *s > 0.0);
+    if steps.is_empty() {
+        return 1.0;
+    }
+    let middle = steps.len() / 2;
+    *steps.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// (least, greatest); (0, 0) of nothing.
@@ -296,6 +301,8 @@ pub fn filled(time_s: &[f64], values: &[f64]) -> Option<Vec<f64>> {
 /// it, goes on with the clock. `None` without any value.
 fn since_power_on(time_s: &[f64], values: &[f64]) -> Option<Vec<f64>> {
     let mut out = values.to_vec();
+    // Both clocks are rounded: a row at power-on may seem to be a little before it.
+    let rounding_s = 0.01 * period_s(time_s);
     let mut next = None;
     for i in (0..out.len()).rev() {
         if out[i].is_finite() {
@@ -303,7 +310,11 @@ fn since_power_on(time_s: &[f64], values: &[f64]) -> Option<Vec<f64>> {
         } else if let Some(b) = next {
             // Negative: it was before the power-on that the later value counts from.
             let back = values[b] - (time_s[b] - time_s[i]);
-            out[i] = if back >= 0.0 { back } else { f64::NAN };
+            out[i] = if back >= -rounding_s {
+                back.max(0.0)
+            } else {
+                f64::NAN
+            };
         }
     }
     let mut before = None;

@@ -31,7 +31,13 @@ pub mod weights;
 #[cfg(test)]
 mod baseline_tests;
 #[cfg(test)]
+mod channels_tests;
+#[cfg(test)]
 mod check_tests;
+#[cfg(test)]
+mod clip_tests;
+#[cfg(test)]
+mod intake_tests;
 #[cfg(test)]
 mod lego_tests;
 #[cfg(test)]

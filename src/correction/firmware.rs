@@ -96,12 +96,27 @@ impl Firmware {
     /// # Errors
     /// No compiler; sources that do not compile.
     pub fn make(correction: &Correction, origin: &Origin) -> Result<Self> {
-        let one = |language| {
-            Built::of_files(emit(correction, origin, language)?, language, origin.prefix)
-        };
-        let (c, rust) = both(|| one(Language::C), || one(Language::Rust));
+        let c = emit(correction, origin, Language::C)?;
+        let rust = emit(correction, origin, Language::Rust)?;
+        Firmware::of_files(correction, origin.prefix, c, rust)
+    }
+
+    /// Builds both from emitted files.
+    ///
+    /// # Errors
+    /// As [`Firmware::make`].
+    pub fn of_files(
+        correction: &Correction,
+        prefix: &str,
+        c: Vec<EmittedFile>,
+        rust: Vec<EmittedFile>,
+    ) -> Result<Self> {
+        let (c, rust) = both(
+            || Built::of_files(c, Language::C, prefix),
+            || Built::of_files(rust, Language::Rust, prefix),
+        );
         Ok(Firmware {
-            bundle: stepped::bundle(origin.prefix, &correction.trace()),
+            bundle: stepped::bundle(prefix, &correction.trace()),
             c: c?,
             rust: rust?,
         })

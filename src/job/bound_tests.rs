@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::approx::bias::certainty::certainty;
+use crate::approx::draws::Draws;
 use crate::approx::form::stored::{Read, Stored};
 use crate::circuit::compensation::codes;
 use crate::closure::BaselineFit;
@@ -9,39 +10,30 @@ use crate::design::{ChannelInput, Fitted, Outside, reader};
 use crate::job::fitted_design;
 use crate::numeric::format::Rounding;
 
-/// Evenly spread over 0 .. 1 (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", 2014).
-fn uniform(k: u64) -> f64 {
-    let mut z = (k + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-}
-
 /// A fit of a die's temperature, in a word of 14 bits, by a polynomial of a random order.
 fn random(seed: u64) -> Design {
     let mut design = reader::read(None).expect("the default");
-    let draw = |k: u64| uniform(seed * 1000 + k);
-    let whole = |k: u64, from: i64, to: i64| from + (draw(k) * (to - from + 1) as f64) as i64;
+    let draws = Draws::new(seed);
     let c = design.compensation.as_mut().expect("a compensation");
-    let order = whole(0, 1, 5) as usize;
+    let order = draws.whole(0, 1, 5) as usize;
     c.input = CompensationInput::Channel(ChannelInput {
         column: "die_degc".into(),
         format: Format::q(8, 6),
-        offset_raw: whole(6, -500, 500).into(),
+        offset_raw: draws.whole(6, -500, 500).into(),
         scale_bits: 13,
         rate_format: Format::q(12, 16),
     });
     c.rate_full_scale_dps = 1.0;
-    c.coefficient_format = Format::q(12, whole(1, 2, 8) as u32);
+    c.coefficient_format = Format::q(12, draws.whole(1, 2, 8) as u32);
     c.accumulator.format = Format::q(15, c.coefficient_format.fraction_bits + 1);
-    c.output.format = Format::q(13, whole(2, 8, 14) as u32);
+    c.output.format = Format::q(13, draws.whole(2, 8, 14) as u32);
     let fitted: Vec<f64> = (0..=order as u64)
-        .map(|k| 600.0 * (draw(10 + k) - 0.5))
+        .map(|k| 600.0 * (draws.uniform(10 + k) - 0.5))
         .collect();
     let lsb = c.coefficient_format.lsb();
     c.coefficients_raw = fitted.iter().map(|v| (v / lsb).round() as i128).collect();
-    let low = whole(7, -8192, 2000);
-    c.clamp_raw = Some((low.into(), whole(8, low + 1000, 8191).into()));
+    let low = draws.whole(7, -8192, 2000);
+    c.clamp_raw = Some((low.into(), draws.whole(8, low + 1000, 8191).into()));
     c.fitted = Some(Fitted {
         coefficients_dps: fitted,
         std_max_dps: 0.0,
@@ -50,7 +42,7 @@ fn random(seed: u64) -> Design {
     let auto = !seed.is_multiple_of(3);
     let targets = [Target::Host, Target::CortexM0, Target::CortexM4];
     design.bound = Some(BiasBound {
-        bound_dps: c.output.format.lsb() * (1.3 + 300.0 * draw(9).powi(3)),
+        bound_dps: c.output.format.lsb() * (1.3 + 300.0 * draws.uniform(9).powi(3)),
         auto,
         target: targets[(seed % 3) as usize],
     });

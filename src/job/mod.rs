@@ -44,21 +44,15 @@ pub fn run(
 ) -> Result<Outcome> {
     let started = Instant::now();
     let mut design = design.clone();
-    let simulated = match record_path {
-        Some(_) => None,
+    let (simulated, (record, mut warnings)) = match record_path {
+        Some(path) => (None, record::read_any(path, &design.record)?),
         None => {
             say("simulating the design's own thermal run");
-            Some(own_run::OwnRun::simulate(&design)?)
+            let run = own_run::OwnRun::simulate(&design)?;
+            let (csv, path) = (run.record_csv(), Path::new("record.csv"));
+            let read = record::thermal::parse(csv.as_bytes(), path, &Default::default())?;
+            (Some(run), read)
         }
-    };
-    let (record, mut warnings) = match (&simulated, record_path) {
-        (Some(run), _) => record::thermal::parse(
-            run.record_csv().as_bytes(),
-            Path::new("record.csv"),
-            &Default::default(),
-        )?,
-        (None, Some(path)) => record::read_any(path, &design.record)?,
-        (None, None) => unreachable!("either a record or an own run"),
     };
 
     say("fitting the bias polynomial");

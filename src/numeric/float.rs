@@ -70,11 +70,15 @@ impl Arithmetic for Float {
     fn residue(&self, a: f64, ring: &Ring) -> i128 {
         // Round to the grid; a float's remainder modulo the circle is exact.
         let steps = a * grid(ring);
+        let half = pow2(127);
+        if (-half..half).contains(&steps) {
+            return steps.round_ties_even() as i128;
+        }
         let circle = pow2(128);
         let mut inside = steps % circle;
-        if inside >= pow2(127) {
+        if inside >= half {
             inside -= circle;
-        } else if inside < -pow2(127) {
+        } else if inside < -half {
             inside += circle;
         }
         inside.round_ties_even() as i128

@@ -68,8 +68,13 @@ impl Format {
 }
 
 /// 2^exponent as an f64 (exact inside the range of normal numbers).
+#[inline]
 pub fn pow2(exponent: i32) -> f64 {
-    f64::powi(2.0, exponent)
+    match exponent {
+        // Sign 0, the biased exponent, fraction 0.
+        -1022..=1023 => f64::from_bits(((exponent + 1023) as u64) << 52),
+        _ => f64::powi(2.0, exponent),
+    }
 }
 
 impl fmt::Display for Format {
@@ -248,6 +253,16 @@ mod tests {
         let u: Format = "UQ64.0".parse().unwrap();
         assert_eq!((u.min_raw(), u.max_raw()), (0, u64::MAX as i128));
         assert_eq!((u.bits(), u.signed_bits()), (64, 65));
+    }
+
+    #[test]
+    fn powers_of_two_are_exact_to_the_ends_of_the_range() {
+        let mut expected = f64::MIN_POSITIVE;
+        for exponent in -1022..=1023 {
+            assert_eq!(pow2(exponent), expected, "{exponent}");
+            expected *= 2.0;
+        }
+        assert_eq!(pow2(1024), f64::INFINITY);
     }
 
     #[test]

@@ -5,6 +5,7 @@ use super::figures::{self, Figure};
 use super::tables;
 use super::text::{decimals_of, fixed, grouped, percent, significant};
 use crate::job::outcome::Drift;
+use crate::verify::compare::Compared;
 use askama::Template;
 
 /// The page.
@@ -106,6 +107,22 @@ pub struct Equivalent {
     pub same: bool,
     /// In words.
     pub first: String,
+}
+
+impl Equivalent {
+    /// A comparison's line.
+    pub fn of(c: &Compared) -> Self {
+        Equivalent {
+            name: c.name.clone(),
+            language: language(c.language),
+            inputs: grouped(c.inputs),
+            coverage: if c.exhaustive { "all" } else { "sample" },
+            words: grouped(c.compared),
+            mismatches: grouped(c.mismatches),
+            same: c.mismatches == 0,
+            first: c.first.clone().unwrap_or_else(|| "–".to_owned()),
+        }
+    }
 }
 
 impl Page {
@@ -254,20 +271,7 @@ fn budget_line(what: &str, dps: f64, shown: &Shown, kind: &str) -> [String; 4] {
 
 fn equivalence(shown: &Shown) -> Vec<Equivalent> {
     let e = &shown.summary.equivalence;
-    let mut lines: Vec<Equivalent> = e
-        .functions
-        .iter()
-        .map(|c| Equivalent {
-            name: c.name.clone(),
-            language: language(c.language),
-            inputs: grouped(c.inputs),
-            coverage: if c.exhaustive { "all" } else { "sample" },
-            words: grouped(c.compared),
-            mismatches: grouped(c.mismatches),
-            same: c.mismatches == 0,
-            first: c.first.clone().unwrap_or_else(|| "–".to_owned()),
-        })
-        .collect();
+    let mut lines: Vec<Equivalent> = e.functions.iter().map(Equivalent::of).collect();
     let counted: u64 = e.functions.iter().map(|c| c.mismatches).sum();
     let on_record = e.mismatches.saturating_sub(counted);
     let differing = shown

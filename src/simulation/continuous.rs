@@ -3,11 +3,12 @@
 use super::{Progress, Run};
 use crate::circuit::engine::ArithmeticKind;
 use crate::cosim::path::Path;
-use crate::cosim::readings::{Averager, Mean, Taken, in_parallel};
+use crate::cosim::readings::{Averager, Mean, Taken};
 use crate::cosim::rest::rows_per_s;
 use crate::cosim::surroundings::{Moment, World};
 use crate::design::Design;
 use crate::error::{InputError, Result};
+use crate::job::firmware::both;
 use crate::plant::noise::Noise;
 use crate::plant::profile::{Profile, Reading};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -38,20 +39,20 @@ pub fn run(design: &Design, seconds: f64, threads: usize, progress: Progress) ->
     }
     let records = (seconds.floor() as u64).max(10);
     let rows_per_record = (seconds * rows_per_s(design) / records as f64).floor() as u64;
-    let kinds = [ArithmeticKind::Fixed, ArithmeticKind::Float];
     let done = AtomicU64::new(0);
     let total = 2 * records;
     let said = || {
         let done = done.fetch_add(1, Ordering::Relaxed) + 1;
         progress("seconds of both paths", done, total);
     };
-    let quiet = |_: usize| ();
-    let mut paths = in_parallel(&kinds, threads, &quiet, |kind| {
-        one_path(design, *kind, records, rows_per_record, &said)
-    })
-    .into_iter();
-    let (Some(fixed), Some(float)) = (paths.next(), paths.next()) else {
-        unreachable!("two kinds give two paths");
+    let path = |kind| one_path(design, kind, records, rows_per_record, &said);
+    let (fixed, float) = if threads > 1 {
+        both(
+            || path(ArithmeticKind::Fixed),
+            || path(ArithmeticKind::Float),
+        )
+    } else {
+        (path(ArithmeticKind::Fixed), path(ArithmeticKind::Float))
     };
     let taken = fixed?.into_iter().zip(float?).enumerate();
     let taken = taken

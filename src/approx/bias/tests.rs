@@ -2,38 +2,30 @@
 
 use super::certainty::{bounds, certainty, sentences};
 use super::{Evaluation, coefficients};
+use crate::approx::draws::Draws;
 use crate::design::{Design, Fitted, Outside, reader};
 use crate::numeric::format::{Format, Rounding};
-
-/// Evenly spread over 0 .. 1 (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", 2014).
-fn uniform(k: u64) -> f64 {
-    let mut z = (k + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-}
 
 /// A compensation of a random order in formats between 10 and 34 bits, calibrated on a random part of 2^16 words.
 fn random(seed: u64) -> Design {
     let mut design = reader::read(None).expect("the default");
-    let draw = |k: u64| uniform(seed * 1000 + k);
-    let whole = |k: u64, from: i64, to: i64| from + (draw(k) * (to - from + 1) as f64) as i64;
+    let draws = Draws::new(seed);
     design.circuit.cordic.angle_bits = 16;
     let c = design.compensation.as_mut().expect("a compensation");
-    let order = whole(0, 1, 4) as usize;
-    let fraction_bits = whole(1, 2, 20) as u32;
+    let order = draws.whole(0, 1, 4) as usize;
+    let fraction_bits = draws.whole(1, 2, 20) as u32;
     c.coefficient_format = Format::q(12, fraction_bits);
-    c.accumulator.format = Format::q(15, fraction_bits + whole(2, 0, 8) as u32);
-    c.accumulator.rounding = Rounding::ALL[whole(3, 0, 5) as usize];
-    c.output.format = Format::q(15, whole(4, 2, 16) as u32);
-    c.output.rounding = Rounding::ALL[whole(5, 0, 5) as usize];
+    c.accumulator.format = Format::q(15, fraction_bits + draws.whole(2, 0, 8) as u32);
+    c.accumulator.rounding = Rounding::ALL[draws.whole(3, 0, 5) as usize];
+    c.output.format = Format::q(15, draws.whole(4, 2, 16) as u32);
+    c.output.rounding = Rounding::ALL[draws.whole(5, 0, 5) as usize];
     let fitted: Vec<f64> = (0..=order as u64)
-        .map(|k| 800.0 * (draw(10 + k) - 0.5))
+        .map(|k| 800.0 * (draws.uniform(10 + k) - 0.5))
         .collect();
     let lsb = c.coefficient_format.lsb();
     c.coefficients_raw = fitted.iter().map(|v| (v / lsb).round() as i128).collect();
-    let low = whole(6, -32768, 20000);
-    c.clamp_raw = Some((low.into(), whole(7, low + 100, 32767).into()));
+    let low = draws.whole(6, -32768, 20000);
+    c.clamp_raw = Some((low.into(), draws.whole(7, low + 100, 32767).into()));
     c.fitted = Some(Fitted {
         coefficients_dps: fitted,
         std_max_dps: 0.0,

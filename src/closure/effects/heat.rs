@@ -6,7 +6,9 @@ use super::{
 };
 use crate::closure::channels::{Channels, lag, slope};
 use crate::closure::firmware::{Words, knots};
-use crate::correction::{MOST_SLOPE_ROWS, Term};
+use crate::closure::likelihood::linear::{add_scaled, dot};
+use crate::correction::Term;
+use std::collections::BTreeMap;
 
 /// All of this file.
 pub fn all() -> Vec<Box<dyn Candidate>> {
@@ -170,32 +172,9 @@ impl Candidate for TemperatureRate {
         if e.point.form >= SLOPES.len() {
             return None;
         }
-        // Firmware has no readings to come, only differences to past ones: those that come nearest to the
-        // model's slope. Twice the difference over k readings less that over 2 k is late in second order
-        // only, and noisier.
-        let gain = e.beta.first()? * c.span_s();
-        let input = f.thermometer()?;
+        let gain_dps_s = e.beta.first()? * c.span_s();
         let wanted = slope(&c.time_s, &c.u, SLOPES[e.point.form]);
-        let mut best: Option<(f64, Vec<(f64, u32)>)> = None;
-        let finer = (c.period_s() / f.period_s).round().max(1.0) as u32;
-        for rows in PAST.map(|rows| rows * finer) {
-            for parts in [vec![(1.0, rows)], vec![(2.0, rows), (-1.0, 2 * rows)]] {
-                if parts.iter().any(|(_, rows)| *rows > MOST_SLOPE_ROWS) {
-                    continue;
-                }
-                let past = past_slope(c, f.period_s, &parts);
-                let off: f64 = past.iter().zip(&wanted).map(|(a, b)| (a - b).powi(2)).sum();
-                if best.as_ref().is_none_or(|b| off < b.0) {
-                    best = Some((off, parts));
-                }
-            }
-        }
-        let terms = best?.1.into_iter().map(|(share, rows)| Term::Slope {
-            gain_dps_s: share * gain,
-            input,
-            rows,
-        });
-        Some(terms.collect())
+        past_slopes(c, f, gain_dps_s, &map(&wanted, |s| gain_dps_s * s))
     }
 
     fn report(&self, c: &Channels, e: &Estimate) -> Reported {
@@ -209,31 +188,55 @@ impl Candidate for TemperatureRate {
 /// Rows that a difference of the firmware looks back.
 const PAST: [u32; 9] = [1, 2, 3, 4, 5, 7, 9, 12, 16];
 
-/// The slope of u, per s, as firmware computes it: differences to the past in nominal periods, each with
-/// its share.
-fn past_slope(c: &Channels, period_s: f64, parts: &[(f64, u32)]) -> Vec<f64> {
-    let mut out = vec![0.0; c.len()];
-    for (share_of, rows) in parts {
-        let span_s = f64::from(*rows) * period_s;
-        let mut next = 0;
-        for (now, slope) in out.iter_mut().enumerate() {
-            let at_s = c.time_s[now] - span_s;
-            while next < now && c.time_s[next] < at_s {
-                next += 1;
-            }
-            // On the line between two rows, as the firmware reads it between them.
-            let before = next.saturating_sub(1);
-            let width_s = c.time_s[next] - c.time_s[before];
-            let share = if width_s > 0.0 {
-                ((at_s - c.time_s[before]) / width_s).clamp(0.0, 1.0)
-            } else {
-                0.0
+/// The slopes that firmware can take and that come nearest to the wanted part of the output, deg/s.
+///
+/// Firmware has no readings to come, only differences to past ones. Twice the difference over k readings less that
+/// over 2 k is late in second order only, and noisier. What each makes of the record is the block's own doing.
+fn past_slopes(c: &Channels, f: &Words, gain_dps_s: f64, wanted: &[f64]) -> Option<Vec<Term>> {
+    let (input, trial) = (f.thermometer()?, f.trial(c)?);
+    let term = |share: f64, rows: u32| Term::Slope {
+        gain_dps_s: share * gain_dps_s,
+        input,
+        rows,
+    };
+    let mut taken: BTreeMap<u32, Option<Vec<f64>>> = BTreeMap::new();
+    let mut off = |parts: &[(f64, u32)]| -> Option<f64> {
+        let mut left = wanted.to_vec();
+        for (share, rows) in parts {
+            let values = taken.entry(*rows).or_insert_with(|| {
+                // As much as a jump of the thermometer over its range would make.
+                let most_dps = 6.0 * gain_dps_s.abs() / (f64::from(*rows) * f.period_s);
+                trial.taken_off(&[term(1.0, *rows)], most_dps.max(1e-3))
+            });
+            add_scaled(&mut left, -share, values.as_ref()?);
+        }
+        Some(dot(&left, &left))
+    };
+    let finer = (c.period_s() / f.period_s).round().max(1.0) as u32;
+    let mut best: Option<(f64, Vec<(f64, u32)>)> = None;
+    for combined in [false, true] {
+        // Noise falls with the distance, lateness grows: two that are worse than one before, and so are all
+        // beyond them.
+        let (mut least, mut worse) = (f64::INFINITY, 0);
+        for rows in PAST.map(|rows| rows * finer) {
+            let parts = match combined {
+                false => vec![(1.0, rows)],
+                true => vec![(2.0, rows), (-1.0, 2 * rows)],
             };
-            let then = c.u[before] + share * (c.u[next] - c.u[before]);
-            *slope += share_of * (c.u[now] - then) / span_s;
+            // Beyond `MOST_SLOPE_ROWS`.
+            let Some(off) = off(&parts) else { break };
+            worse = if off < least { 0 } else { worse + 1 };
+            least = least.min(off);
+            if best.as_ref().is_none_or(|b| off < b.0) {
+                best = Some((off, parts));
+            }
+            if worse == 2 {
+                break;
+            }
         }
     }
-    out
+    let (_, parts) = best?;
+    Some(parts.iter().map(|(share, k)| term(*share, *k)).collect())
 }
 
 /// Rows to each side of a slope.

@@ -1,13 +1,16 @@
-//! From found effects to the correction that firmware runs; `clock`: its steps beside the record's rows.
+//! From found effects to the correction that firmware runs; `clock`: its steps beside the record's rows; `trial`:
+//! terms tried before one is chosen; [`emitted`]: its C and Rust, built and compared.
 
 mod clock;
+pub mod emitted;
+mod trial;
 
 use super::channels::{Channels, scaled};
 use super::effects::{Bias, Estimate};
 use super::likelihood::linear::{Basis, dot};
 use super::search::Model;
 use super::verdict::FirmwareErrors;
-use crate::correction::{Correction, Formats, Input, Plan, Term, readings};
+use crate::correction::{Correction, Formats, Input, Plan, Reading, Term, readings};
 use crate::error::Result;
 use crate::record::{ThermalRecord, stats};
 
@@ -225,6 +228,19 @@ fn logged(record: &ThermalRecord, c: &Channels, plan: &Plan) -> ThermalRecord {
     out
 }
 
+/// What a plan's firmware reads of a record, and where the record's rows are among it.
+///
+/// # Errors
+/// An input that the record lacks.
+fn stream(plan: &Plan, record: &ThermalRecord, c: &Channels) -> Result<(Vec<Reading>, Vec<usize>)> {
+    let readings = readings(plan, &logged(record, c, plan))?;
+    if plan.terms.iter().any(Term::remembers) {
+        return Ok(clock::with_between(plan.period_s, &readings));
+    }
+    let places = (0..readings.len()).collect();
+    Ok((readings, places))
+}
+
 /// The correction of a plan, its words chosen for the record's noise, and its held-out errors, bit for bit.
 ///
 /// # Errors
@@ -239,13 +255,7 @@ pub fn judged(
     plan.check()?;
     let formats = Formats::choose(plan, noise_dps)?;
     let correction = Correction::new(plan, &formats)?;
-    let readings = readings(plan, &logged(record, c, plan))?;
-    let (all, places) = if plan.terms.iter().any(Term::remembers) {
-        clock::with_between(plan.period_s, &readings)
-    } else {
-        let places = (0..readings.len()).collect();
-        (readings, places)
-    };
+    let (all, places) = stream(plan, record, c)?;
     let corrected = correction.run(&all);
     let corrected: Vec<f64> = places.iter().map(|place| corrected[*place]).collect();
     let applied = record.column("rate_dps");

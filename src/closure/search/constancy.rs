@@ -43,10 +43,12 @@ impl Search<'_> {
         let mut rest = whitener.apply(&fit.problem.y);
         basis.project_off(&mut rest);
         let without = dot(&rest, &rest);
-        let mut projected = white.clone();
-        for column in &mut projected {
-            basis.project_off(column);
-        }
+        let off = |column: &Vec<f64>| {
+            let mut left = column.clone();
+            basis.project_off(&mut left);
+            left
+        };
+        let projected: Vec<Vec<f64>> = white.iter().map(off).collect();
         for column in &white {
             basis.push(column);
         }
@@ -60,14 +62,12 @@ impl Search<'_> {
                     .enumerate()
                     .map(|(i, v)| if stretch.contains(&i) { *v } else { 0.0 })
                     .collect();
-                let mut masked = whitener.apply(&masked);
-                let before = dot(&masked, &masked).sqrt();
-                let mut left = masked.clone();
+                let mut left = whitener.apply(&masked);
+                let before = dot(&left, &left).sqrt();
                 basis.project_off(&mut left);
                 if dot(&left, &left).sqrt() > 1e-3 * before {
-                    basis.push(&masked);
+                    basis.push(&left);
                 }
-                masked.clear();
             }
         }
         basis.project_off(&mut rest);
@@ -101,4 +101,138 @@ fn stretches(columns: &[Vec<f64>]) -> Vec<std::ops::Range<usize>> {
     }
     out.push(from..rows);
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::closure::channels::Channels;
+    use crate::closure::effects::{Candidate, Point};
+    use crate::closure::likelihood::blocks::{self, Split};
+    use crate::closure::search::Effort;
+    use crate::closure::synthetic::{Random, triangle};
+    use std::collections::BTreeMap;
+    use std::sync::Arc;
+
+    const ROWS: usize = 300;
+
+    /// Two heatings and a supply that steps; the output has the supply times `gain` of the share of the record
+    /// that is over, in units of the noise.
+    fn channels(seed: u64, unit_v: f64, gain: impl Fn(f64) -> f64) -> Channels {
+        let mut random = Random::new(seed);
+        let degc = [triangle(ROWS / 2), triangle(ROWS - ROWS / 2)].concat();
+        let supply = |k: usize| f64::from(u8::from(k / 11 % 3 == 1)) + 0.5 * (k as f64 / 7.0).sin();
+        let output = (0..ROWS).map(|k| {
+            let u = degc[k] / 35.0 - 1.0;
+            let effect = gain(k as f64 / ROWS as f64) * supply(k);
+            0.3 - 0.2 * u + 0.1 * u * u + 0.01 * (effect + random.normal())
+        });
+        let columns = BTreeMap::from([
+            ("rate_out_dps".to_owned(), output.collect()),
+            ("die_degc".to_owned(), degc.clone()),
+            (
+                "supply_v".to_owned(),
+                (0..ROWS).map(|k| unit_v * supply(k)).collect(),
+            ),
+        ]);
+        let time_s: Vec<f64> = (0..ROWS).map(|k| 10.0 * k as f64).collect();
+        Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap()
+    }
+
+    /// Of the named effect at its first point.
+    fn constancy(c: &Channels, effect: &str) -> Option<Constancy> {
+        let split: Split = blocks::split(&c.time_s, &c.u).unwrap();
+        let effort = Effort {
+            rows: ROWS,
+            ..Effort::default()
+        };
+        let search = Search::new(c, &split, effort, Vec::new());
+        let is_it = |candidate: &&Arc<dyn Candidate>| candidate.id() == effect;
+        let candidate = search.candidates().iter().find(is_it).unwrap().clone();
+        let point: Point = candidate.points(c).remove(0);
+        let term = Term {
+            candidate,
+            point,
+            p_value: 0.0,
+            rivals: Vec::new(),
+            gain: 0.0,
+        };
+        let model = search.model(std::slice::from_ref(&term)).unwrap();
+        search.constancy(&model, &term)
+    }
+
+    const SUPPLY: &str = "supply_sensitivity";
+
+    #[test]
+    fn a_law_passes_as_often_as_its_probability_says() {
+        let found: Vec<Constancy> = (0..60)
+            .filter_map(|seed| constancy(&channels(seed, 1.0, |_| 5.0), SUPPLY))
+            .collect();
+        assert_eq!(found.len(), 60);
+        let below = |p: f64| found.iter().filter(|f| f.p_value < p).count();
+        // 60 draws of a uniform number: 3 +- 1.7, 30 +- 3.9.
+        assert!(below(0.05) <= 9, "{} below 0.05", below(0.05));
+        assert!((18..=42).contains(&below(0.5)), "{} below 0.5", below(0.5));
+        assert!(below(1e-4) == 0 && found.iter().all(|f| (0.0..0.05).contains(&f.share)));
+    }
+
+    #[test]
+    fn a_gain_that_flips_or_comes_late_is_no_law() {
+        let courses: [fn(f64) -> f64; 3] = [
+            |x| if x < 0.5 { 5.0 } else { -2.0 },
+            |x| if x < 0.7 { 0.0 } else { 6.0 },
+            |x| 10.0 * (9.0 * x).cos() + 2.0,
+        ];
+        for (k, course) in courses.into_iter().enumerate() {
+            for seed in 0..6 {
+                let found = constancy(&channels(seed, 1.0, course), SUPPLY).unwrap();
+                assert!(found.p_value < 1e-8, "course {k}, {seed}: {found:?}");
+                assert!(found.share > 0.2, "course {k}, {seed}: {found:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_unit_of_a_channel_does_not_matter() {
+        let course = |x: f64| 3.0 + 2.0 * x;
+        let volts = constancy(&channels(3, 1.0, course), SUPPLY).unwrap();
+        let millivolts = constancy(&channels(3, 1000.0, course), SUPPLY).unwrap();
+        assert!((volts.p_value / millivolts.p_value).ln().abs() < 1e-6);
+        assert!((volts.share - millivolts.share).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_clip_has_no_gain_to_be_constant() {
+        assert_eq!(
+            constancy(&channels(1, 1.0, |_| 5.0), "output_saturation"),
+            None
+        );
+    }
+
+    #[test]
+    fn stretches_cover_the_rows_with_equal_information() {
+        let mut random = Random::new(9);
+        for columns in 1..4 {
+            let columns: Vec<Vec<f64>> = (0..columns)
+                .map(|_| {
+                    (0..500)
+                        .map(|k| random.normal() * (k as f64 / 90.0).exp())
+                        .collect()
+                })
+                .collect();
+            let square = |rows: std::ops::Range<usize>| -> f64 {
+                let own = |c: &Vec<f64>| dot(&c[rows.clone()], &c[rows.clone()]);
+                columns.iter().map(own).sum()
+            };
+            let found = stretches(&columns);
+            assert_eq!(found.len(), STRETCHES);
+            assert_eq!((found[0].start, found[STRETCHES - 1].end), (0, 500));
+            assert!(found.windows(2).all(|w| w[0].end == w[1].start));
+            let largest = (0..500).map(|k| square(k..k + 1)).fold(0.0, f64::max);
+            for rows in found {
+                let share = square(rows) - square(0..500) / STRETCHES as f64;
+                assert!(share.abs() <= largest);
+            }
+        }
+    }
 }

@@ -1,87 +1,204 @@
 //! Parameters of the terms with their standard deviations.
 
-use super::{Model, Search, declared};
-use crate::closure::effects::{Estimate, Point};
-use crate::closure::likelihood::linear::Basis;
+use super::{Model, Search, Term, declared};
+use crate::closure::channels::Channels;
+use crate::closure::effects::Estimate;
+use crate::closure::likelihood::linear::{Basis, add_scaled};
 use crate::closure::likelihood::whiten::Whitener;
+use nalgebra::DMatrix;
+use std::ops::Range;
 
 /// Step of a derivative, as a share of the points' distance in that parameter.
 const STEP: f64 = 0.05;
+
+/// A term of a model, linearised in all that is estimated of it.
+#[derive(Debug, Clone)]
+pub struct Tangent {
+    /// Places of its coefficients in [`Model::beta`].
+    pub own: Range<usize>,
+    /// Derivatives of the output by its coefficients, one value a row: its columns, or none where physics gives
+    /// the coefficients.
+    pub by_beta: Vec<Vec<f64>>,
+    /// Derivatives of the output by its non-linear parameters, deg/s per unit of each, one value a row.
+    pub by_theta: Vec<Vec<f64>>,
+    /// The steps that they were taken with.
+    pub steps: Vec<f64>,
+}
+
+impl Tangent {
+    /// All derivatives: by the coefficients, then by the non-linear parameters.
+    pub fn columns(&self) -> impl Iterator<Item = &Vec<f64>> {
+        self.by_beta.iter().chain(&self.by_theta)
+    }
+
+    fn of(c: &Channels, model: &Model, term: &Term, first: usize) -> Self {
+        let columns = term.candidate.columns(c, &model.bias, &term.point);
+        let own = first..first + columns.len();
+        let beta = model.beta.get(own.clone()).unwrap_or(&[]);
+        let moved = |parameter: usize, by: f64| {
+            let mut point = term.point.clone();
+            if let Some(theta) = point.theta.get_mut(parameter) {
+                *theta += by;
+            }
+            let mut sum = vec![0.0; c.len()];
+            let columns = term.candidate.columns(c, &model.bias, &point);
+            for (column, b) in columns.iter().zip(beta) {
+                add_scaled(&mut sum, *b, column);
+            }
+            sum
+        };
+        let spacing = term.candidate.spacing(c, &term.point);
+        let steps: Vec<f64> = spacing.iter().map(|s| STEP * s).collect();
+        let slope = |(k, step): (usize, &f64)| {
+            let pairs = moved(k, *step).into_iter().zip(moved(k, -step));
+            pairs.map(|(a, b)| (a - b) / (2.0 * step)).collect()
+        };
+        let by_theta = steps.iter().enumerate().map(slope).collect();
+        let whole = term.candidate.is_whole();
+        Tangent {
+            own,
+            by_beta: if whole { Vec::new() } else { columns },
+            by_theta,
+            steps,
+        }
+    }
+}
+
+/// The tangents of a model's terms, in their order.
+pub fn tangents(c: &Channels, model: &Model) -> Vec<Tangent> {
+    let mut first = declared(c).len();
+    let one = |term: &Term| {
+        let tangent = Tangent::of(c, model, term, first);
+        first = tangent.own.end;
+        tangent
+    };
+    model.terms.iter().map(one).collect()
+}
+
+/// Covariance by generalised least squares of the declared coefficients and, in the order of
+/// [`Tangent::columns`], of all that is estimated of each term.
+pub struct Covariance {
+    /// Over `white_variance`; 0 for what lies in the span of those before it.
+    pub inverse: DMatrix<f64>,
+    /// Variance of white noise of one row, (deg/s)^2.
+    pub white_variance: f64,
+    /// Where each term's part begins.
+    pub first: Vec<usize>,
+}
+
+impl Covariance {
+    /// Of a model with its [`tangents`].
+    pub fn new(c: &Channels, model: &Model, tangents: &[Tangent]) -> Self {
+        let free = model.columns.iter().take(declared(c).len());
+        let mut columns: Vec<Vec<f64>> = free.map(|c| model.fit.reduce(c)).collect();
+        let mut first = Vec::new();
+        for tangent in tangents {
+            first.push(columns.len());
+            columns.extend(tangent.columns().map(|c| model.fit.reduce(c)));
+        }
+        let whitener = Whitener::new(&model.fit.problem.line, model.fit.at.shape);
+        let basis = Basis::new(&whitener.apply_all(&columns));
+        Covariance {
+            inverse: basis.inverse_gram(),
+            white_variance: model.fit.at.white_variance(),
+            first,
+        }
+    }
+
+    /// Standard deviation of what stands at a place; 0 in the span of others, which has none of its own.
+    fn std(&self, place: usize) -> f64 {
+        let inverse = self.inverse.get((place, place)).copied().unwrap_or(0.0);
+        (self.white_variance * inverse).max(0.0).sqrt()
+    }
+}
 
 impl Search<'_> {
     /// An estimate for each term. Standard deviations are those of generalised least squares with the
     /// declared coefficients, all terms' coefficients and, linearised, all non-linear parameters in one
     /// covariance; a threshold between two readings gets the distance of the search's last step.
     pub fn estimates(&self, model: &Model) -> Vec<Estimate> {
-        let c = self.channels;
-        let order = declared(c).len();
-        let mut columns: Vec<Vec<f64>> = model.columns[..order]
-            .iter()
-            .map(|c| model.fit.reduce(c))
-            .collect();
-        let mut at = order;
-        // For each term the places of its coefficients and derivatives among `columns`.
-        let mut places = Vec::new();
-        for term in &model.terms {
-            let own = term.candidate.columns(c, &model.bias, &term.point);
-            let beta = model.beta[at..at + own.len()].to_vec();
-            at += own.len();
-            let mut linear = Vec::new();
-            if !term.candidate.is_whole() {
-                for column in &own {
-                    linear.push(Some(columns.len()));
-                    columns.push(model.fit.reduce(column));
-                }
-            } else {
-                linear.resize(own.len(), None);
-            }
-            let spacing = term.candidate.spacing(c, &term.point);
-            let mut derivatives = Vec::new();
-            for (k, step) in spacing.iter().map(|s| STEP * s).enumerate() {
-                let moved = |by: f64| -> Vec<f64> {
-                    let mut point: Point = term.point.clone();
-                    point.theta[k] += by;
-                    let columns = term.candidate.columns(c, &model.bias, &point);
-                    let mut sum = vec![0.0; c.len()];
-                    for (column, b) in columns.iter().zip(&beta) {
-                        crate::closure::likelihood::linear::add_scaled(&mut sum, *b, column);
-                    }
-                    sum
+        let tangents = tangents(self.channels, model);
+        let covariance = Covariance::new(self.channels, model, &tangents);
+        let terms = model.terms.iter().zip(tangents).zip(&covariance.first);
+        terms
+            .map(|((term, tangent), first)| {
+                let of_theta = first + tangent.by_beta.len();
+                let own = |k: usize| match tangent.by_beta.is_empty() {
+                    true => 0.0,
+                    false => covariance.std(first + k),
                 };
-                let (up, down) = (moved(step), moved(-step));
-                let pairs = up.iter().zip(&down);
-                let slope: Vec<f64> = pairs.map(|(a, b)| (a - b) / (2.0 * step)).collect();
-                derivatives.push((columns.len(), step));
-                columns.push(model.fit.reduce(&slope));
-            }
-            places.push((linear, derivatives, beta, term.point.clone()));
-        }
-        let whitener = Whitener::new(&model.fit.problem.line, model.fit.at.shape);
-        let basis = Basis::new(&whitener.apply_all(&columns));
-        let variance = model.fit.at.white_variance();
-        let inverse = basis.inverse_gram();
-        let std = |place: usize| {
-            // A column in the span of others has no own deviation.
-            if basis.kept.contains(&place) && place < inverse.nrows() {
-                (variance * inverse[(place, place)]).max(0.0).sqrt()
-            } else {
-                0.0
-            }
-        };
-        places
-            .into_iter()
-            .map(|(linear, derivatives, beta, point)| Estimate {
-                point,
-                beta_std: linear.iter().map(|p| p.map_or(0.0, std)).collect(),
-                beta,
-                theta_std: derivatives
-                    .iter()
-                    .map(|(place, step)| match std(*place) {
-                        s if s > 0.0 => s,
-                        _ => *step,
-                    })
-                    .collect(),
+                let steps = tangent.steps.iter().enumerate();
+                Estimate {
+                    point: term.point.clone(),
+                    beta_std: (0..tangent.own.len()).map(own).collect(),
+                    theta_std: steps
+                        .map(|(k, step)| match covariance.std(of_theta + k) {
+                            s if s > 0.0 => s,
+                            _ => *step,
+                        })
+                        .collect(),
+                    beta: model.beta.get(tangent.own).unwrap_or(&[]).to_vec(),
+                }
             })
             .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::closure::effects::Point;
+    use crate::closure::likelihood::blocks;
+    use crate::closure::search::Effort;
+    use crate::closure::synthetic::{Random, triangle};
+    use std::collections::BTreeMap;
+
+    #[test]
+    fn the_tangent_of_a_transient_is_its_derivative_and_a_clip_has_no_gain() {
+        let (rows, tau_s) = (300, 400.0);
+        let mut random = Random::new(4);
+        let time_s: Vec<f64> = (0..rows).map(|k| 10.0 * k as f64).collect();
+        let output = time_s
+            .iter()
+            .map(|t| 0.4 * (-t / tau_s).exp() + 0.01 * random.normal());
+        let columns = BTreeMap::from([
+            ("rate_out_dps".to_owned(), output.collect()),
+            ("die_degc".to_owned(), triangle(rows)),
+        ]);
+        let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+        let split = blocks::split(&c.time_s, &c.u).unwrap();
+        let search = Search::new(&c, &split, Effort::default(), Vec::new());
+        let term = |id: &str, point: Point| Term {
+            candidate: search
+                .candidates()
+                .iter()
+                .find(|c| c.id() == id)
+                .unwrap()
+                .clone(),
+            point,
+            p_value: 0.0,
+            rivals: Vec::new(),
+            gain: 0.0,
+        };
+        let terms = [
+            term("output_saturation", Point::at(1, &[10.0])),
+            term("warmup_transient", Point::at(0, &[f64::ln(tau_s)])),
+        ];
+        let model = search.model(&terms).unwrap();
+        let found = tangents(&c, &model);
+        assert_eq!((found[0].own.clone(), found[1].own.clone()), (3..4, 4..5));
+        assert!(found[0].by_beta.is_empty());
+        let amplitude_dps = model.beta[4];
+        assert!((amplitude_dps - 0.4).abs() < 0.02, "{amplitude_dps}");
+        for (i, t) in time_s.iter().enumerate() {
+            let decay = (-t / tau_s).exp();
+            assert!((found[1].by_beta[0][i] - decay).abs() < 1e-12);
+            // By the logarithm of the time constant; at most 0.37 of the amplitude.
+            let slope = amplitude_dps * t / tau_s * decay;
+            assert!(
+                (found[1].by_theta[0][i] - slope).abs() < 2e-3 * amplitude_dps,
+                "{i}"
+            );
+        }
     }
 }

@@ -172,7 +172,7 @@ pub enum SlotKind {
 }
 
 /// A function of the program.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Function {
     /// The block's name.
     pub name: String,

@@ -26,11 +26,12 @@ pub struct Trace {
 #[derive(Debug, Default)]
 struct Recorder {
     program: Program,
-    frames: Vec<Frame>,
+    /// The innermost function that is open; outermost, one that no program has.
+    frame: Frame,
 }
 
 /// A function under construction.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct Frame {
     function: Function,
     /// Interval of each node in the iteration at hand.
@@ -59,7 +60,7 @@ impl Trace {
         state: &B::State,
         ranges: [Interval; I],
     ) -> usize {
-        self.open(B::NAME, B::STATE, block.inputs(), ranges);
+        let outer = self.open(B::NAME, B::STATE, block.inputs(), ranges);
         let mut state = state.clone();
         block.visit(&mut state, &mut Loader { trace: self });
         let inputs = std::array::from_fn(|k| self.push(Op::Input(k), ranges[k]));
@@ -71,7 +72,7 @@ impl Trace {
                 slot: 0,
             },
         );
-        self.close(block.outputs(), outputs)
+        self.close(outer, block.outputs(), outputs)
     }
 
     /// What was recorded.
@@ -79,14 +80,15 @@ impl Trace {
         self.recorder.into_inner().program
     }
 
+    /// Begins a function inside the innermost one, which it gives back: what `close` goes on with.
     fn open<const I: usize>(
         &self,
         name: &str,
         state: &'static str,
         ports: [Port; I],
         ranges: [Interval; I],
-    ) {
-        self.recorder.borrow_mut().frames.push(Frame {
+    ) -> Frame {
+        let frame = Frame {
             function: Function {
                 name: name.to_owned(),
                 state,
@@ -99,19 +101,15 @@ impl Trace {
                 loops: Vec::new(),
                 calls: Vec::new(),
             },
-            current: Vec::new(),
-            earlier: Vec::new(),
-            cursor: 0,
-        });
+            ..Frame::default()
+        };
+        std::mem::replace(&mut self.recorder.borrow_mut().frame, frame)
     }
 
     /// Ends the innermost function; an equal one that exists already is used again.
-    fn close<const O: usize>(&self, ports: [Port; O], outputs: [Id; O]) -> usize {
+    fn close<const O: usize>(&self, outer: Frame, ports: [Port; O], outputs: [Id; O]) -> usize {
         let mut recorder = self.recorder.borrow_mut();
-        let Some(frame) = recorder.frames.pop() else {
-            unreachable!("close without open");
-        };
-        let mut function = frame.function;
+        let mut function = std::mem::replace(&mut recorder.frame, outer).function;
         function.outputs = ports.into_iter().zip(outputs).collect();
         let functions = &mut recorder.program.functions;
         let base = function.name.clone();
@@ -132,11 +130,7 @@ impl Trace {
     }
 
     fn with<T>(&self, f: impl FnOnce(&mut Frame) -> T) -> T {
-        let mut recorder = self.recorder.borrow_mut();
-        match recorder.frames.last_mut() {
-            Some(frame) => f(frame),
-            None => unreachable!("an operation outside any function"),
-        }
+        f(&mut self.recorder.borrow_mut().frame)
     }
 
     fn push(&self, op: Op, range: Interval) -> Id {

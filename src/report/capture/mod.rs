@@ -28,6 +28,7 @@ pub fn html(closed: &Closed, name: &str) -> Result<String> {
         lead: words::lead(&closed.closure),
         steps: words::steps(&closed.closure),
         figures: figures::all(&view),
+        emitted: None,
         last: None,
         provenance: words::provenance(closed),
     };

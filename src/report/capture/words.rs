@@ -3,7 +3,7 @@
 use crate::closure::capture::Closed;
 use crate::closure::capture::input::Part;
 use crate::closure::verdict::Closure;
-use crate::report::closure::tables::{TakenStep, probability, value, with_deviation};
+use crate::report::closure::tables::{TakenStep, next, probability, value, with_deviation};
 use crate::report::text::{fixed, grouped, significant};
 
 /// What happens, and the equation, of an effect of the contract.
@@ -81,16 +81,8 @@ pub fn lead(c: &Closure) -> String {
 
 /// What follows from the verdict.
 pub fn finding(c: &Closure) -> String {
-    let mut out = format!("The noise floor is {} LSB rms.", value(c.noise_floor_rms));
-    if let Some(channel) = &c.residual_structure.strongest_channel {
-        out += &format!(" What is left shows most in {channel}.");
-    }
-    for step in &c.steps {
-        if let Some(experiment) = &step.separating_experiment {
-            out += &format!(" To tell {} from its rivals: {experiment}.", step.effect);
-        }
-    }
-    out
+    let floor = value(c.noise_floor_rms);
+    format!("The noise floor is {floor} LSB rms.{}", next(c))
 }
 
 /// The steps in their order.

@@ -14,7 +14,10 @@ pub mod view;
 mod page_tests;
 
 use super::figures::Figure;
+use super::page::Equivalent;
+use super::text::grouped;
 use crate::closure::close::Closed;
+use crate::closure::firmware::emitted::Emitted;
 use crate::closure::verdict::{Closure, Verdict};
 use crate::error::{InputError, Result};
 use askama::Template;
@@ -49,10 +52,39 @@ pub struct Own {
     pub steps: Vec<TakenStep>,
     /// Residuals and steps.
     pub figures: Vec<Figure>,
+    /// After the figures.
+    pub emitted: Option<Comparison>,
     /// After the evidence.
     pub last: Option<Figure>,
     /// Name and value.
     pub provenance: Vec<[String; 2]>,
+}
+
+/// Emitted code against the model.
+#[derive(Debug)]
+pub struct Comparison {
+    /// What was compared.
+    lead: String,
+    /// A line each.
+    equivalence: Vec<Equivalent>,
+    /// Words and mismatches.
+    sum: [String; 2],
+    /// Without a mismatch.
+    holds: bool,
+}
+
+impl Comparison {
+    fn of(e: &Emitted) -> Self {
+        let (readings, [c, rust]) = (grouped(e.readings), &e.toolchains);
+        Comparison {
+            lead: format!(
+                "The whole record, {readings} readings, through the emitted C and Rust, built and run here, against the                  model's fixed-point block: the result and the fault of every call, with those for the readings between                  rows where the correction has a memory. Where nothing differs, the firmware's errors above are those of                  the emitted code. Built with {c}; {rust}.",
+            ),
+            equivalence: e.functions.iter().map(Equivalent::of).collect(),
+            sum: [grouped(e.words_compared), grouped(e.mismatches)],
+            holds: e.mismatches == 0,
+        }
+    }
 }
 
 /// The report as one HTML file; `name` is that of the record.
@@ -60,6 +92,14 @@ pub struct Own {
 /// # Errors
 /// A page that cannot be rendered, which would be a fault of this program.
 pub fn html(closed: &Closed, name: &str) -> Result<String> {
+    html_compared(closed, None, name)
+}
+
+/// The same with the comparison of emitted code and model, if there was one.
+///
+/// # Errors
+/// As [`html`].
+pub fn html_compared(closed: &Closed, compared: Option<&Emitted>, name: &str) -> Result<String> {
     let c = &closed.closure;
     let view = View::new(closed);
     let lead = format!(
@@ -74,6 +114,7 @@ pub fn html(closed: &Closed, name: &str) -> Result<String> {
         lead,
         steps: tables::steps(closed),
         figures: figures::all(&view),
+        emitted: compared.map(Comparison::of),
         last: Some(figures::allan_deviation(&view)),
         provenance: tables::provenance(closed),
     };

@@ -134,6 +134,13 @@ pub fn finding(view: &View) -> String {
             " What the held-out error has beyond it is due to a few readings that stand out."
         };
     }
+    out + &next(c)
+}
+
+/// Where to look next: the channel of what is left, and the experiments that tell steps from their rivals. Each
+/// sentence begins with a space.
+pub fn next(c: &Closure) -> String {
+    let mut out = String::new();
     if let Some(channel) = &c.residual_structure.strongest_channel {
         out += &format!(" What is left shows most in {channel}.");
     }

@@ -1,0 +1,72 @@
+//! The temperature behind a thermometer that is none.
+
+use super::channels::Channels;
+use super::intake::channels_of;
+use super::synthetic::record;
+use crate::design::{Design, reader};
+
+fn design() -> Design {
+    reader::parse("", None).unwrap()
+}
+
+/// A record whose resonance moves by the gyro's own law around `nominal_hz`, over 60 K; and the codes of the
+/// warnings.
+fn taken(nominal_hz: f64, more: Option<&str>) -> (Channels, Vec<&'static str>) {
+    let design = design();
+    let degc: Vec<f64> = (0..200)
+        .map(|k| -3.15 + 60.0 * f64::from(k) / 199.0)
+        .collect();
+    let slope = -0.5 * design.gyro.stiffness_tempco_per_k.abs() * nominal_hz;
+    let freq: Vec<f64> = degc
+        .iter()
+        .map(|t| nominal_hz + slope * (t - 26.85))
+        .collect();
+    let mut record = record("freq_hz", &freq, &vec![0.0; 200]);
+    record
+        .columns
+        .extend(more.map(|name| (name.to_owned(), degc.clone())));
+    let mut warnings = Vec::new();
+    let channels = channels_of(&record, &design, &mut warnings).unwrap();
+    assert_eq!(channels.thermometer, "freq_hz");
+    (channels, warnings.iter().map(|w| w.code).collect())
+}
+
+#[test]
+fn the_designs_own_frequency_tells_the_temperature() {
+    let own = design().gyro.drive_frequency_hz;
+    let (c, warnings) = taken(own, None);
+    assert!(warnings.is_empty(), "{warnings:?}");
+    assert!((c.middle_degc - 26.85).abs() < 0.01 && (c.kelvin_per_u + 30.0).abs() < 0.01);
+    // A unit whose resonance is 0.2 % off is 80 K off by the law, and still one that may be meant.
+    let (c, warnings) = taken(0.998 * own, None);
+    assert!(warnings.is_empty(), "{warnings:?}");
+    assert!((c.middle_degc - 26.85).abs() > 50.0, "{}", c.middle_degc);
+}
+
+#[test]
+fn a_foreign_frequency_keeps_differences_of_temperature_and_is_said_to_have_no_other() {
+    for times in [0.01, 0.3, 0.9, 1.1, 7.0, 200.0] {
+        let (c, warnings) = taken(times * design().gyro.drive_frequency_hz, None);
+        assert_eq!(warnings, ["temperature_unknown"], "{times}");
+        // Counted from the reference temperature, with the law's relative slope at the readings.
+        assert!(
+            (c.middle_degc - 26.85).abs() < 1e-6,
+            "{times}: {}",
+            c.middle_degc
+        );
+        assert!(
+            (c.kelvin_per_u + 30.0).abs() < 0.01,
+            "{times}: {}",
+            c.kelvin_per_u
+        );
+    }
+}
+
+#[test]
+fn a_column_in_degc_says_what_a_foreign_frequency_cannot() {
+    for name in ["die_degc", "chamber_degc"] {
+        let (c, warnings) = taken(5e4, Some(name));
+        assert!(warnings.is_empty(), "{warnings:?}");
+        assert!((c.middle_degc - 26.85).abs() < 1e-6 && (c.kelvin_per_u + 30.0).abs() < 1e-6);
+    }
+}
