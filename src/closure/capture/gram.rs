@@ -208,6 +208,19 @@ pub fn solve(sums: &[Vec<f64>; 2], combos: &[&Combo], ridge: &[f64], detail: Det
     back(&lower, &right, &used, detail)
 }
 
+/// Coefficients by channel and column out of combos.
+pub fn spread(combos: &[&Combo], solved: &Solved) -> [Vec<f64>; 2] {
+    let mut out = [vec![0.0; ALL], vec![0.0; ALL]];
+    for (combo, value) in combos.iter().zip(&solved.coefficients) {
+        for (channel, column, factor) in &combo.parts {
+            if let Some(v) = out[*channel].get_mut(*column) {
+                *v += factor * value;
+            }
+        }
+    }
+    out
+}
+
 /// Standard deviations of weighted sums of the coefficients that [`solve`] finds; `weights` are by combo.
 pub fn deviations(
     sums: &[Vec<f64>; 2],

@@ -3,8 +3,8 @@
 use super::candidates::{Effect, Known};
 use super::columns::{ALL, Model};
 use super::errors::{Judged, judge};
-use super::fit::{Fitted, spread};
-use super::gram::{Combo, Solved};
+use super::fit::Fitted;
+use super::gram::{Combo, Solved, spread};
 use super::input::Capture;
 use super::search::Search;
 use super::{bend, firmware, jitter, rivals, structure};
