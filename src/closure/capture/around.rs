@@ -9,6 +9,7 @@ use super::input::{Capture, Part};
 use super::spectrum::{self, Spectrum};
 use super::wander::{self, Series};
 use super::{mains, nonlinearity};
+use crate::closure::likelihood::tail::chi_square_surprise;
 
 /// Least variance of a channel's noise, codes squared: nearly that of an ideal quantiser's error, whose
 /// pattern is not white without noise.
@@ -141,6 +142,14 @@ pub fn add_lines(capture: &Capture, model: &mut Model, around: &Around) -> bool 
     model.lines.len() > before
 }
 
+/// Periods in the capture below which a line is slow: the spectrum's floor there is made of its own skirts.
+const SLOW_PERIODS: f64 = 12.0;
+
+/// Sine and cosine in both channels at one of two frequencies: less than one in a thousand by chance.
+fn is_sure(gain: f64) -> bool {
+    chi_square_surprise(4, 2.0 * gain) > 1000f64.ln() + 2f64.ln()
+}
+
 /// Adds the mains' own frequencies where they are too slow for the spectrum.
 pub fn add_slow_mains(
     capture: &Capture,
@@ -158,9 +167,9 @@ pub fn add_slow_mains(
             .lines
             .iter()
             .all(|t| (t - turns).abs() * rows as f64 > 0.7);
-        if (0.1..4.0).contains(&periods) && is_new {
+        if (0.1..SLOW_PERIODS).contains(&periods) && is_new {
             let gain = wander::slow_line_gain(series, rows, turns);
-            if gain > 15.0 && best.is_none_or(|b| gain > b.0) {
+            if is_sure(gain) && best.is_none_or(|b| gain > b.0) {
                 best = Some((gain, turns));
             }
         }

@@ -73,12 +73,16 @@ pub fn find(capture: &Capture, model: &Model, channel: usize) -> Option<Found> {
         limits = profile.levels(&tone, limits, 3.0 * sigma);
     }
     let (mut flat, rows) = profile.significant(&tone, limits, sigma);
-    let (piled, pile_gain) = pile(capture, channel, sigma);
-    if !flat.high.is_finite() {
-        flat.high = piled.high;
-    }
-    if !flat.low.is_finite() {
-        flat.low = piled.low;
+    let (piled, mut pile_gain) = pile(capture, channel, sigma);
+    let (cut, cut_gain) = profile.cut(capture, channel, &tone, sigma);
+    pile_gain = pile_gain.max(cut_gain);
+    for other in [piled, cut] {
+        if !flat.high.is_finite() {
+            flat.high = other.high;
+        }
+        if !flat.low.is_finite() {
+            flat.low = other.low;
+        }
     }
     // Where noise is limited too, the outermost code is the level itself.
     flat.any().then_some(Found {
@@ -87,6 +91,11 @@ pub fn find(capture: &Capture, model: &Model, channel: usize) -> Option<Found> {
         rows,
     })
 }
+
+/// Noise from which on rows are looked for beyond the outermost code, codes.
+const LEAST_NOISE: f64 = 0.1;
+/// Rows that have to be missed there: chance makes none of them in one of three million captures.
+const LEAST_CUT: f64 = 15.0;
 
 /// Phases that the mean is taken over.
 const BINS: usize = 1024;
@@ -170,6 +179,36 @@ impl Profile {
             low: mean(&|x| x < limits.low - 0.3 * margin, limits.low),
             high: mean(&|x| x > limits.high + 0.3 * margin, limits.high),
         }
+    }
+
+    /// The outermost codes, where noise should have put rows beyond them and there are none: noise is limited
+    /// with the signal. Four fifths of the noise, and a quarter of a code less of the tone, have to suffice.
+    fn cut(&self, capture: &Capture, channel: usize, tone: &[f64; 3], sigma: f64) -> (Limits, f64) {
+        let mut out = (Limits::NONE, 0.0);
+        let codes = || training(capture, channel).map(|(_, c)| c);
+        let (Some(high), Some(low)) = (codes().max(), codes().min()) else {
+            return out;
+        };
+        let noise = 0.8 * (sigma * sigma - 1.0 / 12.0).max(0.0).sqrt();
+        if noise < LEAST_NOISE {
+            return out;
+        }
+        for (level, sign) in [(high, 1.0), (low, -1.0)] {
+            let level = f64::from(level);
+            let beyond = |b: &[f64; 4]| {
+                let under = sign * (level - value(tone, b)) + 0.5 + 0.25;
+                b[0] * normal::below(-under / noise)
+            };
+            let expected: f64 = self.filled().map(beyond).sum();
+            if expected > LEAST_CUT {
+                out.1 += expected;
+                match sign > 0.0 {
+                    true => out.0.high = level,
+                    false => out.0.low = level,
+                }
+            }
+        }
+        out
     }
 
     /// The limits with a flat top: beyond them the mean is the level and not the tone.

@@ -7,6 +7,7 @@ use super::columns::{ALL, Model, Variance};
 use super::gram::{Combo, Detail, Gram, solve, spread};
 use super::input::Capture;
 use super::missing::{self, Missing};
+use super::own_steps::OwnSteps;
 use super::search::Search;
 use super::steps::{find_steps, is_sharp, settle};
 use super::tone::{Phases, Tone};
@@ -15,6 +16,8 @@ use super::{feedthrough, jitter, truncation};
 
 /// Rounds at most.
 const ROUNDS: usize = 6;
+/// The same after the first, where the quantiser's steps show: each is dear, and exact.
+const SHARP_ROUNDS: usize = 2;
 /// Gain that jitter has to make: one free parameter.
 const JITTER_COST: f64 = 9.0;
 
@@ -91,15 +94,18 @@ pub fn rounds(capture: &Capture, known: &Known, start: &Model) -> Fitted {
     let seen = around(capture, &mut model, &base, true);
     model.variance.base = seen.noise;
     let seen = placed(capture, &mut model, &base);
-    let mut fitted = round(capture, known, &base, model, seen).0;
+    let mut fitted = round(capture, known, &base, model, seen, true).0;
     for further in 1..ROUNDS {
         let mut model = fitted.model.clone();
+        if is_sharp(&model.neutral, &model) {
+            model.lines.clear();
+        }
         let seen = around(capture, &mut model, &base, false);
         model.variance.base = seen.noise;
-        let (next, sharp) = round(capture, known, &base, model, seen);
+        let (next, sharp) = round(capture, known, &base, model, seen, false);
         let same = (further > 1 || !sharp) && is_same(&fitted, &next);
         fitted = next;
-        if same {
+        if same || sharp && further >= SHARP_ROUNDS {
             break;
         }
     }
@@ -125,22 +131,39 @@ fn round(
     base: &[Combo],
     mut model: Model,
     mut seen: Around,
+    first: bool,
 ) -> (Fitted, bool) {
-    let series = follow_lines(capture, known, base, &mut model, &mut seen);
+    let sharp = is_sharp(&model.neutral, &model);
+    // Lines that misplaced steps make must not be found: first the steps, then, each time anew, the lines.
+    let series = match sharp && first {
+        true => block_series(&model, &seen),
+        false => follow_lines(capture, known, base, &mut model, &mut seen),
+    };
     let (jitter, jitter_taken) = follow_jitter(capture, &mut model, &seen);
-    let gram = Gram::of(capture, &model);
+    let mut gram = Gram::of(capture, &model);
     let nuisance = slow_noise(capture, &model, &seen, &series);
     let [drive, sense] = &seen.residuals;
     let coupled = feedthrough::is_coupled(capture, &model, [drive, sense]);
     let variants = variants(known, &model, seen.free, capture.rows(), coupled);
-    let mut search = Search::new(gram.all(), base, &nuisance, &variants);
-    let (set, objective) = search.best();
-    let (combos, solved) = search.solution(&set);
-    model.coefficients = spread(&combos, &solved);
+    let (set, objective) = match sharp {
+        true => {
+            let mut search = OwnSteps::new(capture, &model, base, &nuisance, &variants);
+            let (set, own) = search.best();
+            model.coefficients = own.coefficients;
+            (set, own.objective)
+        }
+        false => {
+            let mut search = Search::new(gram.all(), base, &nuisance, &variants);
+            let (set, objective) = search.best();
+            let (combos, solved) = search.solution(&set);
+            model.coefficients = spread(&combos, &solved);
+            (set, objective)
+        }
+    };
     model.neutral.clone_from(&model.coefficients);
-    let sharp = is_sharp(&model.coefficients, &model);
     if sharp {
         settle(capture, &mut model, base, &nuisance, &variants, &set);
+        gram = Gram::of(capture, &model);
     }
     let fitted = Fitted {
         model,
@@ -174,17 +197,19 @@ fn follow_lines(
         }
         *seen = around(capture, model, base, false);
     }
-    let series = |model: &Model, seen: &Around| {
-        [0, 1].map(|c: usize| wander::series(&seen.residuals[c], seen.noise[c], &model.tone))
-    };
-    let before = series(model, seen);
+    let before = block_series(model, seen);
     let lines = model.lines.len();
     add_slow_mains(capture, known, model, &before);
     if model.lines.len() == lines {
         return before;
     }
     *seen = around(capture, model, base, false);
-    series(model, seen)
+    block_series(model, seen)
+}
+
+/// Constant and tone of what is left, block by block.
+fn block_series(model: &Model, seen: &Around) -> [Option<Series>; 2] {
+    [0, 1].map(|c: usize| wander::series(&seen.residuals[c], seen.noise[c], &model.tone))
 }
 
 /// Sets the model's variance, with jitter where it earns its place; what was found of it, and whether it did.

@@ -11,7 +11,8 @@
 //! [`search`] chooses. Outside of the linear part are [`clipping`], [`missing`] (the histogram), [`jitter`] (the
 //! variance). [`spectrum`] gives noise and lines, [`wander`] the slow noise that must not pass for an
 //! effect. [`around`] is the fit with every freedom, [`steps`] where the quantiser's
-//! steps are, [`fit`] runs all in rounds; [`report`] judges on held-out rows, with [`errors`], [`rivals`],
+//! steps are, [`own_steps`] the search where they show,
+//! [`fit`] runs all in rounds; [`report`] judges on held-out rows, with [`errors`], [`rivals`],
 //! [`structure`] and [`firmware`]; [`bend`] is for the page, which is made in `report::capture`.
 
 pub mod around;
@@ -34,6 +35,7 @@ pub mod missing;
 pub mod nonlinearity;
 pub mod normal;
 pub mod offset;
+pub mod own_steps;
 pub mod report;
 pub mod rivals;
 pub mod search;

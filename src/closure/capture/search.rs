@@ -96,7 +96,7 @@ impl<'a> Search<'a> {
     }
 
     /// The variants of effects that are not in the set.
-    fn others(&self, set: &[usize]) -> Vec<usize> {
+    pub fn others(&self, set: &[usize]) -> Vec<usize> {
         let taken: Vec<_> = set.iter().map(|k| self.effect(*k)).collect();
         (0..self.variants.len())
             .filter(|k| !taken.contains(&self.effect(*k)))
@@ -124,6 +124,12 @@ impl<'a> Search<'a> {
                     offer(self, exchanged);
                 }
                 offer(self, fewer);
+            }
+            if set.len() > 2 {
+                // One effect for all: a bend for offset, gain and harmonics.
+                for other in 0..self.variants.len() {
+                    offer(self, vec![other]);
+                }
             }
             for other in self.others(&set) {
                 let mut more = set.clone();

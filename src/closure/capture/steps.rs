@@ -2,17 +2,27 @@
 
 use super::around::{TABLES, generous};
 use super::candidates::{Variant, base_ridge};
-use super::columns::{Model, SAW};
+use super::columns::{Model, SAW, WAVE};
 use super::gram::{Combo, Detail, Gram, solve, spread};
 use super::input::Capture;
 use super::search::Search;
 
+/// Share of the quantiser's own error from which on it shows.
+const LEAST_SAW: f64 = 0.3;
+/// The same of its smoothed wave, codes: what 0.3 codes of noise leave of it.
+const LEAST_WAVE: f64 = 0.05;
+
 /// Whether the quantiser's error shows undithered in a channel: the place of the steps then matters.
 pub fn is_sharp(coefficients: &[Vec<f64>; 2], model: &Model) -> bool {
-    coefficients
-        .iter()
-        .zip(model.variance.base)
-        .any(|(c, v)| v < 16.0 && c.get(SAW).copied().unwrap_or(0.0).abs() > 0.3)
+    coefficients.iter().zip(model.variance.base).any(|(c, v)| {
+        let at = |k: usize| c.get(k).copied().unwrap_or(0.0).abs();
+        v < 16.0 && (at(SAW) > LEAST_SAW || at(WAVE) > LEAST_WAVE)
+    })
+}
+
+/// Whether a channel's noise was added after rounding, as far as these coefficients tell.
+pub fn is_undithered(coefficients: &[f64]) -> bool {
+    coefficients.get(SAW).is_some_and(|b| b.abs() > LEAST_SAW)
 }
 
 /// Finds where the codes are before anything is chosen, where the quantiser's error shows undithered: of
