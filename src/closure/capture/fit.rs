@@ -17,7 +17,7 @@ use super::{feedthrough, jitter, truncation};
 /// Rounds at most.
 const ROUNDS: usize = 6;
 /// The same after the first, where the quantiser's steps show: each is dear, and exact.
-const SHARP_ROUNDS: usize = 2;
+const SHARP_ROUNDS: usize = 1;
 /// Gain that jitter has to make: one free parameter.
 const JITTER_COST: f64 = 9.0;
 
@@ -149,8 +149,17 @@ fn round(
         true => {
             let mut search = OwnSteps::new(capture, &model, base, &nuisance, &variants);
             let (set, own) = search.best();
+            let wants_all_rows = search.wants_all_rows();
             model.coefficients = own.coefficients;
-            (set, own.objective)
+            match wants_all_rows {
+                true => {
+                    // The steps are placed by now: what is small is left to the sums of all rows.
+                    model.neutral.clone_from(&model.coefficients);
+                    gram = Gram::of(capture, &model);
+                    Search::new(gram.all(), base, &nuisance, &variants).best_from(set)
+                }
+                false => (set, own.objective),
+            }
         }
         false => {
             let mut search = Search::new(gram.all(), base, &nuisance, &variants);

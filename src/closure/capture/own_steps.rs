@@ -10,19 +10,19 @@
 //! own, the variance of which is fitted to every set (a random effect, as in an analysis of variance): what goes with
 //! the phase is judged by the number of phases, not of rows.
 
-use super::candidates::{Variant, base_ridge};
+use super::candidates::Variant;
 use super::columns::{Model, Rows, chunks};
 use super::gram::{Combo, Detail, Gram, Summed, solve, spread};
 use super::input::{Capture, Part};
-use super::search::Search;
+use super::search::{Search, combos_of};
 use std::collections::BTreeMap;
 
 /// Training rows that are looked at, at most (about).
-const ROWS: usize = 30_000;
+const ROWS: usize = 24_000;
 /// Fits of a set until its steps are its own.
-const FITS: usize = 4;
+const FITS: usize = 3;
 /// Proposals a step that are fitted.
-const PROPOSALS: usize = 8;
+const PROPOSALS: usize = 6;
 /// Variants of an effect among them.
 const VARIANTS: usize = 3;
 /// A proposal may be this much worse than what it is to replace, by the sums.
@@ -78,17 +78,13 @@ impl<'a> OwnSteps<'a> {
         }
     }
 
+    /// Whether small effects need more rows than were looked at, and the rows are not a few phases again and again.
+    pub fn wants_all_rows(&self) -> bool {
+        self.stride > 1 && self.phases.is_none()
+    }
+
     fn combos(&self, set: &[usize]) -> (Vec<&'a Combo>, Vec<f64>) {
-        let mut combos: Vec<&Combo> = self.base.iter().collect();
-        let mut ridge = base_ridge(self.base);
-        for (combo, variance) in self.nuisance {
-            combos.push(combo);
-            ridge.push(1.0 / variance);
-        }
-        let chosen = set.iter().filter_map(|k| self.variants.get(*k));
-        combos.extend(chosen.flat_map(|v| &v.combos));
-        ridge.resize(combos.len(), 0.0);
-        (combos, ridge)
+        combos_of(self.base, self.nuisance, self.variants, set)
     }
 
     /// Fits a set from the steps of another one.
@@ -205,7 +201,27 @@ impl<'a> OwnSteps<'a> {
                 None => break,
             }
         }
-        (set, own)
+        (self.cheaper(set), own)
+    }
+
+    /// The same columns by the effect that costs least.
+    fn cheaper(&self, mut set: Vec<usize>) -> Vec<usize> {
+        for at in 0..set.len() {
+            let others: Vec<_> = set.iter().filter_map(|k| self.variants.get(*k)).collect();
+            let Some(own) = others.get(at) else { continue };
+            let is_free =
+                |v: &Variant| v.effect == own.effect || others.iter().all(|o| o.effect != v.effect);
+            let parts = |v: &Variant| -> Vec<Vec<(usize, usize, f64)>> {
+                v.combos.iter().map(|c| c.parts.clone()).collect()
+            };
+            let same = self.variants.iter().enumerate();
+            let same = same.filter(|(_, v)| is_free(v) && parts(v) == parts(own));
+            let least = same.min_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
+            if let (Some((k, _)), Some(place)) = (least, set.get_mut(at)) {
+                *place = k;
+            }
+        }
+        set
     }
 
     /// Sets that differ by an effect, added, removed or exchanged, the likeliest by the sums at a set's own steps.

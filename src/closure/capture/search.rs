@@ -43,16 +43,7 @@ impl<'a> Search<'a> {
 
     /// Combos of a set, the base and the nuisance first, and their ridges.
     fn combos(&self, set: &[usize]) -> (Vec<&'a Combo>, Vec<f64>) {
-        let mut combos: Vec<&Combo> = self.base.iter().collect();
-        let mut ridge = super::candidates::base_ridge(self.base);
-        for (combo, variance) in self.nuisance {
-            combos.push(combo);
-            ridge.push(1.0 / variance);
-        }
-        let variants = set.iter().filter_map(|k| self.variants.get(*k));
-        combos.extend(variants.flat_map(|v| &v.combos));
-        ridge.resize(combos.len(), 0.0);
-        (combos, ridge)
+        combos_of(self.base, self.nuisance, self.variants, set)
     }
 
     /// The full solution of a set, with its combos.
@@ -105,7 +96,11 @@ impl<'a> Search<'a> {
 
     /// The best set that the moves find, and its objective.
     pub fn best(&mut self) -> (Vec<usize>, f64) {
-        let mut set: Vec<usize> = Vec::new();
+        self.best_from(Vec::new())
+    }
+
+    /// The same from a set that is there.
+    pub fn best_from(&mut self, mut set: Vec<usize>) -> (Vec<usize>, f64) {
         let mut score = self.objective(&set);
         for _ in 0..40 {
             let mut better: Option<(Vec<usize>, f64)> = None;
@@ -167,4 +162,23 @@ impl<'a> Search<'a> {
         out.sort_by(|a, b| b.1.total_cmp(&a.1));
         out
     }
+}
+
+/// Combos of a set, the base and the nuisance first, and their ridges.
+pub fn combos_of<'a>(
+    base: &'a [Combo],
+    nuisance: &'a [(Combo, f64)],
+    variants: &'a [Variant],
+    set: &[usize],
+) -> (Vec<&'a Combo>, Vec<f64>) {
+    let mut combos: Vec<&Combo> = base.iter().collect();
+    let mut ridge = super::candidates::base_ridge(base);
+    for (combo, variance) in nuisance {
+        combos.push(combo);
+        ridge.push(1.0 / variance);
+    }
+    let chosen = set.iter().filter_map(|k| variants.get(*k));
+    combos.extend(chosen.flat_map(|v| &v.combos));
+    ridge.resize(combos.len(), 0.0);
+    (combos, ridge)
 }

@@ -3,10 +3,12 @@
 use super::around::{TABLES, generous};
 use super::candidates::{Variant, base_ridge};
 use super::columns::{Model, SAW, WAVE};
-use super::gram::{Combo, Detail, Gram, solve, spread};
+use super::gram::{Combo, Detail, Gram, Summed, solve, spread};
 use super::input::Capture;
-use super::search::Search;
+use super::search::combos_of;
 
+/// Training rows from which the steps' places are found, at most (about).
+const ROWS: usize = 100_000;
 /// Share of the quantiser's own error from which on it shows.
 const LEAST_SAW: f64 = 0.3;
 /// The same of its smoothed wave, codes: what 0.3 codes of noise leave of it.
@@ -32,17 +34,19 @@ pub fn find_steps(capture: &Capture, model: &mut Model, base: &[Combo]) {
         return;
     }
     let all = generous(base, model);
+    let stride = capture.training_rows().div_ceil(ROWS).max(1);
     let ridge = base_ridge(base);
     let mut best: Option<(f64, [Vec<f64>; 2])> = None;
     for count in [base.len(), all.len().saturating_sub(TABLES), all.len()] {
         let combos: Vec<&Combo> = all.iter().take(count).collect();
+        let summed = Summed::of(&combos, stride);
         let mut ridge = ridge.clone();
         ridge.resize(combos.len(), 0.0);
         let mut trial = model.clone();
         trial.neutral.clone_from(&model.coefficients);
         let mut gain = 0.0;
         for _ in 0..4 {
-            let gram = Gram::of(capture, &trial);
+            let gram = Gram::over(capture, &trial, &summed);
             let solved = solve(gram.all(), &combos, &ridge, Detail::All);
             trial.neutral = spread(&combos, &solved);
             gain = solved.gain - 2.0 * solved.rank as f64;
@@ -66,9 +70,9 @@ pub fn settle(
     set: &[usize],
 ) {
     for _ in 0..2 {
-        let gram = Gram::of(capture, model);
-        let search = Search::new(gram.all(), base, nuisance, variants);
-        let (combos, solved) = search.solution(set);
+        let (combos, ridge) = combos_of(base, nuisance, variants, set);
+        let gram = Gram::over(capture, model, &Summed::of(&combos, 1));
+        let solved = solve(gram.all(), &combos, &ridge, Detail::All);
         model.coefficients = spread(&combos, &solved);
         model.neutral.clone_from(&model.coefficients);
     }
