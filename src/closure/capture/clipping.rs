@@ -221,6 +221,10 @@ fn value(tone: &[f64; 3], bin: &[f64; 4]) -> f64 {
 /// bend may stand for the limit) give, have to suffice.
 fn cut(capture: &Capture, model: &Model, channel: usize, tone: &[f64; 3]) -> (Limits, f64) {
     let mut out = (Limits::NONE, 0.0);
+    // Beside jitter the noise at the peaks is hardly known.
+    if model.variance.jitter > 0.0 {
+        return out;
+    }
     let codes = || training(capture, channel).map(|(_, c)| c);
     let (Some(high), Some(low)) = (codes().max(), codes().min()) else {
         return out;

@@ -126,6 +126,9 @@ impl<'a> Search<'a> {
                     offer(self, vec![other]);
                 }
             }
+            for straight in self.straightened(&set) {
+                offer(self, straight);
+            }
             for other in self.others(&set) {
                 let mut more = set.clone();
                 more.push(other);
@@ -137,6 +140,23 @@ impl<'a> Search<'a> {
             }
         }
         (set, score)
+    }
+
+    /// Sets with an offset and a gain error in the place of a bend, which a step forward may have taken for both.
+    fn straightened(&self, set: &[usize]) -> Vec<Vec<usize>> {
+        let is = |k: &usize, effect: Effect| self.effect(*k) == Some(effect);
+        if !set.iter().any(|k| is(k, Effect::Nonlinearity)) {
+            return Vec::new();
+        }
+        let line = [Effect::Nonlinearity, Effect::Offset, Effect::Gain];
+        let rest = set.iter().filter(|k| !line.iter().any(|e| is(k, *e)));
+        let rest: Vec<usize> = rest.copied().collect();
+        let of = |effect: Effect| (0..self.variants.len()).filter(move |k| is(k, effect));
+        let with = |a: usize, b: usize| rest.iter().copied().chain([a, b]).collect();
+        of(Effect::Offset)
+            .flat_map(|a| of(Effect::Gain).map(move |b| (a, b)))
+            .map(|(a, b)| with(a, b))
+            .collect()
     }
 
     /// The effects that do nearly as well in the place of one of a set: best variant, and its
