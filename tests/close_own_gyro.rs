@@ -27,7 +27,9 @@ fn profile() -> String {
 /// The default design without effects, other keys changed.
 fn design(changes: &[(&str, &str)]) -> String {
     let default = reader::read(None).unwrap().source.text.clone();
-    let effect = default.find("# A parasitic mode crosses the drive").unwrap();
+    let effect = default
+        .find("# A parasitic mode crosses the drive")
+        .unwrap();
     let next = default.find("# ---- The thermal run").unwrap();
     let mut text = format!("{}{}", &default[..effect], &default[next..]);
     for (from, to) in changes {
@@ -46,7 +48,11 @@ fn closed(folder: &Path, text: &str) -> Value {
     for command in [simulate, close] {
         let arguments: Vec<&str> = command.split(' ').collect();
         let out = gyrogen_in(folder, &arguments, &[]);
-        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        assert!(
+            out.status.success(),
+            "{}",
+            String::from_utf8_lossy(&out.stderr)
+        );
     }
     let text = fs::read_to_string(folder.join("closed/closure.json")).unwrap();
     serde_json::from_str(&text).unwrap()
@@ -69,9 +75,15 @@ fn noise_that_two_channels_share_has_no_name() {
 fn steps_of_the_phase_word_are_taken_out_and_not_named() {
     let quiet = [
         ("adc_noise_lsb = 1.0", "adc_noise_lsb = 0.1"),
-        ("rate_noise_dps_rthz = 0.0073", "rate_noise_dps_rthz = 0.0001"),
+        (
+            "rate_noise_dps_rthz = 0.0073",
+            "rate_noise_dps_rthz = 0.0001",
+        ),
         ("flicker_dph = 30.0", "flicker_dph = 0.1"),
-        ("rate_random_walk_dph_rth = 10.0", "rate_random_walk_dph_rth = 0.02"),
+        (
+            "rate_random_walk_dph_rth = 10.0",
+            "rate_random_walk_dph_rth = 0.02",
+        ),
         ("angle_bits = 24", "angle_bits = 12"),
         ("iterations = 20", "iterations = 10"),
     ];
@@ -80,7 +92,12 @@ fn steps_of_the_phase_word_are_taken_out_and_not_named() {
     assert_eq!(closure["steps"], serde_json::json!([]));
     let warning = &closure["warnings"][0];
     assert_eq!(warning["code"], "thermometer_quantised");
-    assert!(warning["message"].as_str().unwrap().contains("as the design's circuit predicts"));
+    assert!(
+        warning["message"]
+            .as_str()
+            .unwrap()
+            .contains("as the design's circuit predicts")
+    );
     let after = closure["after"]["heldout_rms"].as_f64().unwrap();
     let firmware = closure["firmware"]["heldout_rms"].as_f64().unwrap();
     assert!(after < 0.04 && firmware > 0.3, "{after} {firmware}");

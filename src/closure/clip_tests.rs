@@ -47,6 +47,7 @@ fn term(search: &Search, point: Point) -> Term {
         p_value: 0.0,
         rivals: Vec::new(),
         gain: 0.0,
+        beside: Vec::new(),
     }
 }
 

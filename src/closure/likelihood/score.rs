@@ -311,7 +311,10 @@ fn finish(
             .map(|p| (p, surprise_of(p, 0)))
             .reduce(|a, b| if b.1 > a.1 { b } else { a });
         best.push(chosen.map(|c| c.0));
-        let p_fast = profile.mixture(&weights, tail, |k| profile.held[k][g]);
+        // Nothing excited is no evidence.
+        let p_fast = chosen.map_or(1.0, |_| {
+            profile.mixture(&weights, tail, |k| profile.held[k][g])
+        });
         let mut score = GroupScore {
             point: chosen.map(|c| c.0 - points.start),
             degrees: 0,

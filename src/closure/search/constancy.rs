@@ -156,6 +156,7 @@ mod tests {
             p_value: 0.0,
             rivals: Vec::new(),
             gain: 0.0,
+            beside: Vec::new(),
         };
         let model = search.model(std::slice::from_ref(&term)).unwrap();
         search.constancy(&model, &term)

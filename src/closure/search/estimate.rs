@@ -179,6 +179,7 @@ mod tests {
             p_value: 0.0,
             rivals: Vec::new(),
             gain: 0.0,
+            beside: Vec::new(),
         };
         let terms = [
             term("output_saturation", Point::at(1, &[10.0])),

@@ -20,7 +20,7 @@ const WORTH: f64 = 20.0;
 const WORTH_WHOLE: f64 = 5.0;
 
 /// How far the held-out error with the steps may lie above the one without.
-const ABOVE: f64 = 1.01;
+const ABOVE: f64 = 1.015;
 
 /// Names that are looked at for spikes; what a quick look may be short of a thorough one.
 const LOOKED: usize = 5;

@@ -180,7 +180,9 @@ impl Search<'_> {
                 }
                 _ => start.clone(),
             };
+            // At one noise; the null hypothesis may choose the one that suits it best.
             let whole = candidate.is_whole().then(|| gain(&point)).flatten();
+            let whole = whole.map(|g| g + fit.problem.evaluate(shape).loglik - fit.at.loglik);
             starts.push((candidate.clone(), point, p_value));
             wholes.push(whole);
         }
