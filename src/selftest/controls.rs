@@ -78,8 +78,13 @@ pub struct Negative {
     pub fakes: Vec<FakeSeen>,
     /// How many of them are steps.
     pub named: usize,
-    /// The least of all their probabilities.
+    /// How many are listed by a step as indistinguishable: a record that is so regular that a column of the same
+    /// spectrum follows what moves it.
+    pub listed: usize,
+    /// The least of their probabilities before any step.
     pub least_p_value: Option<f64>,
+    /// The same beside the steps.
+    pub least_p_value_beside_steps: Option<f64>,
 }
 
 /// An effect that was planted in what the closing left.
@@ -209,16 +214,15 @@ pub fn negative(closed: &Closed, record: &ThermalRecord, look: Look<'_>) -> Resu
     }
     let seen = look(&record)?;
     let fakes: Vec<FakeSeen> = fakes.into_iter().map(|fake| of_fake(fake, &seen)).collect();
-    let p_values = fakes
-        .iter()
-        .flat_map(|f| [f.p_value, f.p_value_beside_steps])
-        .flatten();
+    let least = |p: fn(&FakeSeen) -> Option<f64>| fakes.iter().filter_map(p).reduce(f64::min);
     let steps = closed.closure.steps.iter();
     Ok(Negative {
         steps: steps.map(|s| (s.effect.clone(), s.p_value)).collect(),
         steps_with_fakes: seen.names.iter().map(|n| n.effect.clone()).collect(),
         named: fakes.iter().filter(|f| f.is_named).count(),
-        least_p_value: p_values.reduce(f64::min),
+        listed: fakes.iter().filter(|f| f.is_listed).count(),
+        least_p_value: least(|f| f.p_value),
+        least_p_value_beside_steps: least(|f| f.p_value_beside_steps),
         fakes,
     })
 }

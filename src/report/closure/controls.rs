@@ -35,18 +35,28 @@ impl Shown {
 pub fn negative(c: &Controls) -> String {
     let n = &c.negative;
     let (named, count) = (n.named, n.fakes.len());
-    let least = n.least_p_value.map_or(String::new(), |p| {
-        format!("; least p among them {}", probability(p))
-    });
+    let listed = match n.listed {
+        0 => String::new(),
+        listed => format!(
+            ", {listed} listed as indistinguishable (so regular is this record that its spectrum alone nearly makes \
+             the effect)"
+        ),
+    };
+    let p = |p: Option<f64>| p.map_or("–".to_owned(), probability);
+    let least = p(n.least_p_value);
     let steps: Vec<String> = n
         .steps
         .iter()
         .map(|(effect, p)| format!("{effect} {}", probability(*p)))
         .collect();
     let beside = if steps.is_empty() {
-        String::new()
+        format!("; least p among them {least}")
     } else {
-        format!(", of the steps {}", steps.join(", "))
+        format!(
+            "; least p among them {} beside the steps, {least} before any; of the steps {}",
+            p(n.least_p_value_beside_steps),
+            steps.join(", ")
+        )
     };
     let own: Vec<&String> = n.steps.iter().map(|s| &s.0).collect();
     let with: Vec<&String> = n.steps_with_fakes.iter().collect();
@@ -60,7 +70,7 @@ pub fn negative(c: &Controls) -> String {
             n.steps_with_fakes.join(", ")
         )
     };
-    format!("{named} of {count} columns without meaning named{least}{beside}{changed}.")
+    format!("{named} of {count} columns without meaning named{listed}{beside}{changed}.")
 }
 
 /// What the planted effects say, in a sentence or two.
@@ -161,7 +171,9 @@ mod tests {
                 steps: vec![("thermal_lag".to_owned(), 1e-5)],
                 steps_with_fakes,
                 named: usize::from(named),
+                listed: 0,
                 least_p_value: Some(0.2),
+                least_p_value_beside_steps: None,
                 fakes: vec![fake],
             },
             positive: vec![Planted {
