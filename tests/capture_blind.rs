@@ -105,9 +105,9 @@ fn single_effects_are_named() {
         "{} singles: first {first:.3}, with more {extra:.3}",
         marks.len()
     );
-    // What stands today (0.89 of 57), so that it does not fall unseen. To reach: 0.98. Other seeds (sets 3 and 4,
-    // 142 and 110 captures): first 0.92 and 0.90, with more 0.08 and 0.10.
-    assert!(first >= 0.85 && extra <= 0.06, "{first} {extra}");
+    // What stands today (0.96 of 53), so that it does not fall unseen. To reach: 0.98. Other seeds that were looked
+    // at once (set 91, 70 captures): first 0.91, with more 0.014.
+    assert!(first >= 0.93 && extra <= 0.03, "{first} {extra}");
 }
 
 #[test]
@@ -143,6 +143,6 @@ fn pairs_are_named_in_full() {
     let first = share(&marks, |m| m.first);
     let all = share(&marks, |m| m.all);
     println!("{} pairs: first {first:.3}, both {all:.3}", marks.len());
-    // What stands today, so that it does not fall unseen. To reach: 0.95 of all.
-    assert!(first >= 0.8 && all >= 0.6, "{first} {all}");
+    // What stands today (0.95 and 0.86 of 22), so that it does not fall unseen. To reach: 0.95 of all.
+    assert!(first >= 0.85 && all >= 0.75, "{first} {all}");
 }

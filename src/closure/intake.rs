@@ -116,7 +116,7 @@ pub fn channels_of(
         made.map_err(|missing| refused(record, format!("column {missing} holds no measured value")))
     };
     let channels = seen(&columns)?;
-    let Some(course) = quantised::course(&channels) else {
+    let Some(course) = quantised::course(&channels, design) else {
         return Ok(channels);
     };
     warnings.push(rounding(design, &name, &course));
@@ -127,7 +127,7 @@ pub fn channels_of(
 /// What is said of a thermometer that is read in coarse steps.
 fn rounding(design: &Design, thermometer: &str, course: &Course) -> Warning {
     let of_circuit = match quantised::predicted(design, thermometer) {
-        Some(step) if (0.5..2.0).contains(&(course.step / step)) => {
+        Some(step) if quantised::LIKE.contains(&(course.step / step)) => {
             format!(", as the design's circuit predicts ({step:.3e})")
         }
         _ => String::new(),

@@ -8,6 +8,7 @@
 
 use super::channels::Channels;
 use super::likelihood::linear::{Basis, dot};
+use super::staircase::Staircase;
 use crate::design::Design;
 use crate::record::stats;
 use std::f64::consts::TAU;
@@ -33,14 +34,17 @@ const ON_GRID: f64 = 0.8;
 /// Rounding matters from this share of the output's noise on: below, it adds two percent of it or less.
 const MATTERS: f64 = 0.2;
 
+/// A step over the predicted one that is the same.
+pub const LIKE: std::ops::Range<f64> = 0.4..2.5;
+
 /// Turns of the alternation between smooth and within the cells.
 const TURNS: usize = 150;
 
 /// The course of a record's thermometer, if rounding matters there.
-pub fn course(c: &Channels) -> Option<Course> {
+pub fn course(c: &Channels, design: &Design) -> Option<Course> {
     let raw: Vec<f64> = c.u.iter().map(|u| c.centre + c.half * u).collect();
     let step = step_of(&raw)?;
-    let reading = smoothest(&raw, 0.5 * step);
+    let reading = smoothest(&raw, &cells(c, design, &raw, step));
     let u: Vec<f64> = reading.iter().map(|r| (r - c.centre) / c.half).collect();
     let measured: Vec<usize> = (0..c.len())
         .filter(|i| c.error_dps[*i].is_finite())
@@ -73,6 +77,24 @@ pub fn predicted(design: &Design, thermometer: &str) -> Option<f64> {
     Some(lsb.max(last))
 }
 
+/// What each reading may stand for: of a phase that the design's circuit reads in such steps, what its CORDIC makes
+/// the same word of; else half a step to each side.
+fn cells(c: &Channels, design: &Design, raw: &[f64], step: f64) -> Vec<(f64, f64)> {
+    let circuit_s = predicted(design, &c.thermometer).filter(|p| LIKE.contains(&(step / p)));
+    let stairs = circuit_s.and_then(|_| {
+        let (low, high) = (
+            c.centre - c.half - 2.0 * step,
+            c.centre + c.half + 2.0 * step,
+        );
+        Staircase::new(design, low, high, step)
+    });
+    let cell = |r: &f64| {
+        let own = stairs.as_ref().and_then(|s| s.cell(*r));
+        own.unwrap_or((r - 0.5 * step, r + 0.5 * step))
+    };
+    raw.iter().map(cell).collect()
+}
+
 /// Least squares of 1, u, u^2 over some rows: coefficients and residuals.
 fn residual(c: &Channels, u: &[f64], rows: &[usize]) -> (Vec<f64>, Vec<f64>) {
     let power = |k: i32| rows.iter().map(|i| u[*i].powi(k)).collect::<Vec<f64>>();
@@ -102,9 +124,9 @@ fn step_of(readings: &[f64]) -> Option<f64> {
     (step > 0.0 && on_grid as f64 >= ON_GRID * gaps.len() as f64).then_some(step)
 }
 
-/// The course with the least sum of squared second differences within `half` of every reading, by alternating
+/// The course with the least sum of squared second differences within the cell of every reading, by alternating
 /// directions (Boyd et al. 2011, 5.2): a quadratic's minimum, and the nearest values within the cells, by turns.
-fn smoothest(readings: &[f64], half: f64) -> Vec<f64> {
+fn smoothest(readings: &[f64], cells: &[(f64, f64)]) -> Vec<f64> {
     let n = readings.len();
     let moves = readings.windows(2).filter(|w| w[0] != w[1]).count();
     // A quadratic with this weight follows what lasts longer than two steps.
@@ -119,7 +141,7 @@ fn smoothest(readings: &[f64], half: f64) -> Vec<f64> {
         course = factor.solve(target.collect());
         for i in 0..n {
             let free = course[i] + lag[i];
-            within[i] = free.clamp(readings[i] - half, readings[i] + half);
+            within[i] = free.max(cells[i].0).min(cells[i].1);
             lag[i] = free - within[i];
         }
     }
@@ -241,7 +263,8 @@ mod tests {
                 .collect();
             let rounded: Vec<f64> = truth.iter().map(|t| t.round()).collect();
             assert_eq!(step_of(&rounded), Some(1.0));
-            let found = smoothest(&rounded, 0.5);
+            let cells: Vec<(f64, f64)> = rounded.iter().map(|r| (r - 0.5, r + 0.5)).collect();
+            let found = smoothest(&rounded, &cells);
             let error = |of: &[f64]| {
                 let pairs = of.iter().zip(&truth);
                 stats::rms(&pairs.map(|(a, b)| a - b).collect::<Vec<_>>())

@@ -227,28 +227,45 @@ impl Bench {
         }
         let (with, without) = (self.signals(faults), self.signals(&Faults::none()));
         let full = self.full_scale();
-        let mut chi = 0.0;
+        let mut chi = [0.0f64; 2];
         for channel in 0..2 {
             let bend = |x: &f64| faults.bend(channel, *x, full);
-            let change: Vec<f64> = with[channel]
-                .iter()
-                .zip(&without[channel])
-                .map(|(a, b)| bend(a) - b)
-                .collect();
-            let mut free: Vec<Vec<f64>> = Vec::new();
-            if channel == 1 {
-                let part = |quarter: f64| -> Vec<f64> {
-                    let at = |r| TAU * self.turns(r) + self.sense_phase + quarter;
-                    (0..self.rows).map(|r| at(r).sin()).collect()
-                };
-                free.push(part(TAU / 4.0));
-                if !self.rate_known {
-                    free.push(part(0.0));
-                }
+            let pairs = with[channel].iter().zip(&without[channel]);
+            let change: Vec<f64> = pairs.clone().map(|(a, b)| bend(a) - b).collect();
+            let free = self.free(channel, faults.is_bend_alone());
+            chi[0] += rest(&change, &free) / self.variance(channel);
+            if self.noise_after {
+                // Noise added to the rounded code does not dither: where no code changes nothing is seen.
+                let code = |x: f64| (x + 0.5).floor();
+                let change: Vec<f64> = pairs.map(|(a, b)| code(bend(a)) - code(*b)).collect();
+                chi[1] += rest(&change, &free) / self.variance(channel);
+            } else {
+                chi[1] = f64::INFINITY;
             }
-            chi += rest(&change, &free) / self.variance(channel);
         }
-        chi.sqrt()
+        chi[0].min(chi[1]).sqrt()
+    }
+
+    /// What the fit of a channel is free to take, so that a fault does not show in it: of the sense channel the
+    /// tone, its quadrature alone where the rate is known. Integral nonlinearity is what is left of a
+    /// converter's curve after the best straight line (IEEE Std 1241): offset and gain are no part of it, and a bow
+    /// that is only a constant over the codes in use is an offset.
+    fn free(&self, channel: usize, is_bend: bool) -> Vec<Vec<f64>> {
+        let part = |quarter: f64| -> Vec<f64> {
+            let at = |r| TAU * self.turns(r) + self.sense_phase + quarter;
+            (0..self.rows).map(|r| at(r).sin()).collect()
+        };
+        let mut free: Vec<Vec<f64>> = Vec::new();
+        if channel == 1 || is_bend {
+            free.push(part(TAU / 4.0));
+        }
+        if is_bend || channel == 1 && !self.rate_known {
+            free.push(part(0.0));
+        }
+        if is_bend {
+            free.push(vec![1.0; self.rows]);
+        }
+        free
     }
 
     fn visible_jitter(&self, jitter: f64) -> f64 {

@@ -77,6 +77,15 @@ impl Fault {
         }
     }
 
+    /// Whether this code never appears.
+    fn is_gone(&self, code: i64) -> bool {
+        match self {
+            Fault::MissingEvery(n, k) => code.rem_euclid(*n) == *k,
+            Fault::MissingSome(codes) => codes.contains(&code),
+            _ => false,
+        }
+    }
+
     /// The same, times a factor; those without a size stay.
     pub fn scaled(&self, f: f64) -> Fault {
         match self.clone() {
@@ -175,13 +184,20 @@ fn missing(bench: &Bench, z: f64, d: &mut Dice) -> Option<Fault> {
     }
     let wanted = (0.5 * z * z).max(40.0);
     let train = 0.75 * 2.0 * bench.rows as f64;
+    // A code that the tone never reaches, or that a coherent tone's few phases never hit, is not missed.
+    let missed = |fault: Fault| {
+        let whole = bench.codes(&Faults::none()).codes;
+        let gone = |code: &&i32| fault.is_gone(i64::from(**code));
+        let rows = whole.iter().flatten().filter(gone).count();
+        (0.75 * rows as f64 >= wanted).then_some(fault)
+    };
     if d.odds(0.6) {
         let longest = (train / wanted).min(4096.0) as i64;
         if longest < 16 {
             return None;
         }
         let spacing = 16 + d.below((longest - 15) as usize) as i64;
-        return Some(Fault::MissingEvery(
+        return missed(Fault::MissingEvery(
             spacing,
             d.below(spacing as usize) as i64,
         ));
@@ -192,7 +208,7 @@ fn missing(bench: &Bench, z: f64, d: &mut Dice) -> Option<Fault> {
     }
     let reach = (0.8 * bench.amplitude) as usize;
     let count = 1 + d.below(4);
-    Some(Fault::MissingSome(
+    missed(Fault::MissingSome(
         (0..count)
             .map(|_| d.below(2 * reach) as i64 - reach as i64)
             .collect(),
@@ -242,6 +258,11 @@ impl Faults {
 
     pub fn is_common(&self) -> bool {
         self.0.iter().any(|f| matches!(f, Fault::Jitter(_, true)))
+    }
+
+    /// A nonlinearity and nothing else.
+    pub fn is_bend_alone(&self) -> bool {
+        matches!(self.0.as_slice(), [Fault::Inl(..)])
     }
 
     pub fn only_jitter(&self) -> Option<f64> {
@@ -346,16 +367,9 @@ impl Faults {
     /// The code.
     pub fn convert(&self, channel: usize, x: f64, full: f64) -> i64 {
         let code = (self.bend(channel, x, full) + 0.5).floor() as i64;
-        for fault in &self.0 {
-            let gone = match fault {
-                Fault::MissingEvery(n, k) => code.rem_euclid(*n) == *k,
-                Fault::MissingSome(codes) => codes.contains(&code),
-                _ => false,
-            };
-            if gone {
-                return code - 1;
-            }
+        match self.0.iter().any(|f| f.is_gone(code)) {
+            true => code - 1,
+            false => code,
         }
-        code
     }
 }

@@ -154,7 +154,7 @@ impl Known {
 
 /// Columns that are always in the fit: the free tones, the quantiser's own error.
 pub fn base(known: &Known) -> Vec<Combo> {
-    use super::columns::{SAW, WAVE};
+    use super::columns::{SAW, WAVE, WAVES};
     let mut out = Vec::new();
     if !known.phase {
         out.push(Combo::one("drive_sin", 0, SIN));
@@ -174,7 +174,7 @@ pub fn base(known: &Known) -> Vec<Combo> {
     }
     for channel in 0..2 {
         out.push(Combo::one("saw", channel, SAW));
-        out.push(Combo::one("wave", channel, WAVE));
+        out.extend((0..WAVES).map(|k| Combo::one("wave", channel, WAVE + k)));
     }
     out
 }
@@ -182,10 +182,12 @@ pub fn base(known: &Known) -> Vec<Combo> {
 /// One over the prior variances of the base: the quantiser's error is no larger than itself, and must
 /// not stand for other effects where few phases make all columns alike.
 pub fn base_ridge(base: &[Combo]) -> Vec<f64> {
+    use super::columns::WAVE;
     base.iter()
-        .map(|c| match c.name.as_str() {
-            "saw" => 1.0,
-            "wave" => 10.0,
+        .map(|c| match (c.name.as_str(), c.parts.as_slice()) {
+            ("saw", _) => 1.0,
+            // Wave k is 1 / (pi k) at most.
+            ("wave", [(_, column, _)]) => 10.0 * ((column - WAVE + 1) as f64).powi(2),
             _ => 0.0,
         })
         .collect()

@@ -4,7 +4,7 @@
 //! noise is limited with the signal, the outermost code is far more frequent than those next to it.
 //! What is limited is left out of all other fits.
 
-use super::columns::Model;
+use super::columns::{COS, Model, Rows, SIN, chunks};
 use super::input::{Capture, Part};
 use super::normal;
 
@@ -73,12 +73,16 @@ pub fn find(capture: &Capture, model: &Model, channel: usize) -> Option<Found> {
         limits = profile.levels(&tone, limits, 3.0 * sigma);
     }
     let (mut flat, rows) = profile.significant(&tone, limits, sigma);
-    let (piled, pile_gain) = pile(capture, channel, sigma);
-    if !flat.high.is_finite() {
-        flat.high = piled.high;
-    }
-    if !flat.low.is_finite() {
-        flat.low = piled.low;
+    let (piled, mut pile_gain) = pile(capture, channel, sigma);
+    let (cut, cut_gain) = cut(capture, model, channel, &tone);
+    pile_gain = pile_gain.max(cut_gain);
+    for other in [piled, cut] {
+        if !flat.high.is_finite() {
+            flat.high = other.high;
+        }
+        if !flat.low.is_finite() {
+            flat.low = other.low;
+        }
     }
     // Where noise is limited too, the outermost code is the level itself.
     flat.any().then_some(Found {
@@ -87,6 +91,11 @@ pub fn find(capture: &Capture, model: &Model, channel: usize) -> Option<Found> {
         rows,
     })
 }
+
+/// Noise from which on rows are looked for beyond the outermost code, codes.
+const LEAST_NOISE: f64 = 0.1;
+/// Rows that have to be missed there: chance makes none of them in one of three million captures.
+const LEAST_CUT: f64 = 15.0;
 
 /// Phases that the mean is taken over.
 const BINS: usize = 1024;
@@ -205,6 +214,56 @@ impl Profile {
 
 fn value(tone: &[f64; 3], bin: &[f64; 4]) -> f64 {
     tone[0] + tone[1] * bin[2] + tone[2] * bin[3]
+}
+
+/// The outermost codes, where noise should have put rows beyond them and there are none: noise is limited
+/// with the signal. Four fifths of the noise, and a quarter of a code less than both the tone and the model (whose
+/// bend may stand for the limit) give, have to suffice.
+fn cut(capture: &Capture, model: &Model, channel: usize, tone: &[f64; 3]) -> (Limits, f64) {
+    let mut out = (Limits::NONE, 0.0);
+    // Beside jitter the noise at the peaks is hardly known.
+    if model.variance.jitter > 0.0 {
+        return out;
+    }
+    let codes = || training(capture, channel).map(|(_, c)| c);
+    let (Some(high), Some(low)) = (codes().max(), codes().min()) else {
+        return out;
+    };
+    let noise = 0.8 * (model.variance.base[channel] - 1.0 / 12.0).max(0.0).sqrt();
+    if noise < LEAST_NOISE {
+        return out;
+    }
+    let sides = [(f64::from(high), 1.0), (f64::from(low), -1.0)];
+    let mut expected = [0.0; 2];
+    let mut rows = Rows::new();
+    for segment in capture.segments.iter().filter(|s| s.part != Part::HeldOut) {
+        for chunk in chunks(segment.rows.clone()) {
+            let n = chunk.len();
+            rows.fill(capture, model, chunk);
+            for i in 0..n {
+                let at = |k: usize| rows.dense[channel][k][i];
+                let tone = tone[0] + tone[1] * at(SIN) + tone[2] * at(COS);
+                let signal = rows.signal[channel][i];
+                for ((level, sign), expected) in sides.iter().zip(&mut expected) {
+                    let nearest = (sign * tone).min(sign * signal);
+                    let under = sign * level - nearest + 0.5 + 0.25;
+                    if under < 6.0 * noise {
+                        *expected += normal::below(-under / noise);
+                    }
+                }
+            }
+        }
+    }
+    for ((level, sign), expected) in sides.into_iter().zip(expected) {
+        if expected > LEAST_CUT {
+            out.1 += expected;
+            match sign > 0.0 {
+                true => out.0.high = level,
+                false => out.0.low = level,
+            }
+        }
+    }
+    out
 }
 
 /// Row and code of the training rows.

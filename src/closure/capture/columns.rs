@@ -26,12 +26,15 @@ pub const POWER: usize = 11;
 pub const POWERS: usize = 5;
 /// Quantisation error of a code that is rounded before noise is added: round(x) - x.
 pub const SAW: usize = 16;
-/// sin(2 pi x): what is left of it where noise before rounding smoothes it.
+/// sin(2 pi k x), k = 1 and on: what is left of it where noise before rounding smoothes it. Noise of sigma codes
+/// leaves exp(-2 (pi k sigma)^2) of wave k (Widrow and Kollar 2008).
 pub const WAVE: usize = 17;
+/// Waves: with 0.15 codes of noise the fourth is below a thousandth of a code.
+pub const WAVES: usize = 3;
 /// The drive channel's residual, in the sense channel only.
-pub const OTHER: usize = 18;
+pub const OTHER: usize = WAVE + WAVES;
 /// First line: sine and cosine for each.
-pub const LINE: usize = 19;
+pub const LINE: usize = OTHER + 1;
 /// Lines at most.
 pub const LINES: usize = 6;
 /// Sine and cosine of the truncated phase, less those of the phase.
@@ -223,9 +226,9 @@ impl Rows {
         let coefficients = &model.coefficients[channel];
         let [sin, cos] = model.declared[channel];
         let at = |k: usize| coefficients.get(k).copied().unwrap_or(0.0);
-        let straight = straight_terms(coefficients);
+        let straight = terms(coefficients, POWER);
         let neutral = &model.neutral[channel];
-        let neutral_straight = straight_terms(neutral);
+        let neutral_terms = terms(neutral, SAW);
         let neutral_hat = |k: usize| neutral.get(HAT + k).copied().unwrap_or(0.0);
         // Noise of one code leaves nothing of the wave.
         let with_wave = model.variance.base[channel] < 1.0;
@@ -258,15 +261,19 @@ impl Rows {
             };
             let signal = x + bend;
             let (k, part) = self.hats[channel][i];
-            let there: f64 = neutral_straight.iter().map(|(k, b)| b * dense[*k][i]).sum();
+            let there: f64 = neutral_terms.iter().map(|(k, b)| b * dense[*k][i]).sum();
             let there =
                 declared + there + neutral_hat(k) * (1.0 - part) + neutral_hat(k + 1) * part;
             dense[SAW][i] = (there + 0.5).floor() - there;
-            dense[WAVE][i] = if with_wave {
-                (TAU * there.fract()).sin()
-            } else {
-                0.0
+            let (wave, turn) = match with_wave {
+                true => (TAU * there.fract()).sin_cos(),
+                false => (0.0, 0.0),
             };
+            // sin(2 a) and sin(3 a).
+            let waves = [wave, 2.0 * wave * turn, wave * (4.0 * turn * turn - 1.0)];
+            for (k, wave) in waves.into_iter().enumerate() {
+                dense[WAVE + k][i] = wave;
+            }
             dense[OTHER][i] = 0.0;
             let slope = angle * (sin_all * dense[COS][i] - cos_all * dense[SIN][i]);
             let code = f64::from(capture.codes[channel].get(row).copied().unwrap_or(0));
@@ -283,19 +290,19 @@ impl Rows {
 
     /// The drive's residual as a column of the sense channel.
     fn coupled(&mut self, model: &Model) {
-        let saw = model.coefficients[0].get(SAW).copied().unwrap_or(0.0);
-        let wave = model.coefficients[0].get(WAVE).copied().unwrap_or(0.0);
+        let own = |k: usize| model.coefficients[0].get(k).copied().unwrap_or(0.0);
+        let own: Vec<(usize, f64)> = (SAW..OTHER).map(|k| (k, own(k))).collect();
         for i in 0..self.rows.len() {
-            let quantised = saw * self.dense[0][SAW][i] + wave * self.dense[0][WAVE][i];
+            let quantised: f64 = own.iter().map(|(k, b)| b * self.dense[0][*k][i]).sum();
             let rest = self.code[0][i] - self.signal[0][i] - quantised;
             self.dense[1][OTHER][i] = if self.weight[0][i] > 0.0 { rest } else { 0.0 };
         }
     }
 }
 
-/// The columns that do not depend on the signal, with coefficients that are not 0.
-fn straight_terms(coefficients: &[f64]) -> Vec<(usize, f64)> {
-    (ONE..POWER)
+/// The columns below `end` and those of lines and truncation, with coefficients that are not 0.
+fn terms(coefficients: &[f64], end: usize) -> Vec<(usize, f64)> {
+    (ONE..end)
         .chain(LINE..HAT)
         .filter_map(|k| Some((k, *coefficients.get(k)?)))
         .filter(|(_, b)| *b != 0.0)

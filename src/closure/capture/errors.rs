@@ -1,4 +1,4 @@
-//! Errors of a model over the rows, and what its steps change of them.
+//! Errors of a model over the rows, row by row and in figures, and what its steps change of them.
 
 use super::columns::{Model, Rows, chunks};
 use super::input::{Capture, Part};
@@ -48,5 +48,34 @@ pub fn judge(capture: &Capture, model: &Model) -> Judged {
     let rms = |[n, sum]: [f64; 2]| (sum / n.max(1.0)).sqrt();
     out.errors.train_rms = rms(sums[0]);
     out.errors.heldout_rms = rms(sums[1]);
+    out
+}
+
+/// Residuals at coefficients, 0 where limited; of all rows, or of the training rows alone.
+pub fn residuals(
+    capture: &Capture,
+    model: &Model,
+    coefficients: &[Vec<f64>; 2],
+    all: bool,
+) -> [Vec<f64>; 2] {
+    let n = capture.rows();
+    let mut out = [vec![0.0; n], vec![0.0; n]];
+    let mut rows = Rows::new();
+    let wanted = |p: Part| all || p != Part::HeldOut;
+    for segment in capture.segments.iter().filter(|s| wanted(s.part)) {
+        for chunk in chunks(segment.rows.clone()) {
+            let start = chunk.start;
+            let count = chunk.len();
+            rows.fill(capture, model, chunk);
+            for (channel, out) in out.iter_mut().enumerate() {
+                for (i, out) in out.iter_mut().skip(start).take(count).enumerate() {
+                    if rows.weight[channel][i] > 0.0 {
+                        let value = rows.value(channel, i, &coefficients[channel]);
+                        *out = rows.target[channel][i] - value;
+                    }
+                }
+            }
+        }
+    }
     out
 }

@@ -4,7 +4,7 @@
 //! code), latency and feedthrough from the oscillator's phase. What the correction leaves is held
 //! against the declared model.
 
-use super::columns::{ALL, HAT, HATS, Model, ONE, OTHER, POWER, POWERS, Rows, SAW, WAVE, chunks};
+use super::columns::{ALL, HAT, HATS, Model, ONE, OTHER, POWER, POWERS, Rows, chunks};
 use super::input::{Capture, Part};
 use crate::closure::verdict::FirmwareErrors;
 
@@ -65,8 +65,7 @@ fn bend(model: &Model, coefficients: &[f64], code: f64) -> f64 {
 
 /// Constant and tone by the phase.
 fn phased(rows: &Rows, channel: usize, i: usize, coefficients: &[f64]) -> f64 {
-    let columns =
-        (ONE..ALL).filter(|k| *k < POWER || (*k > WAVE && *k < HAT && *k != SAW) || *k == OTHER);
+    let columns = (ONE..ALL).filter(|k| *k < POWER || (OTHER..HAT).contains(k));
     let at = |k: usize| coefficients.get(k).copied().unwrap_or(0.0);
     columns
         .filter(|k| at(*k) != 0.0)

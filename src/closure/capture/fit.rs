@@ -1,22 +1,23 @@
 //! The rounds of the fit: noise, lines and nonlinear parts around the model, then the set of effects.
 
+use super::around::{Around, LEAST_VARIANCE, add_lines, add_slow_mains, around};
 use super::candidates::{Effect, Known, Variant, base, base_ridge, variants};
 use super::clipping::{self, Limits};
-use super::columns::{ALL, COS, Model, ONE, Rows, SIN, TRUNCATED, Variance, chunks, harmonic};
-use super::gram::{Combo, Detail, Gram, Solved, solve};
-use super::input::{Capture, Part};
+use super::columns::{ALL, Model, Variance};
+use super::gram::{Combo, Detail, Gram, solve, spread};
+use super::input::Capture;
 use super::missing::{self, Missing};
+use super::own_steps::OwnSteps;
 use super::search::Search;
-use super::spectrum::{self, Spectrum};
+use super::steps::{find_steps, is_sharp, settle};
 use super::tone::{Phases, Tone};
 use super::wander::{self, Series};
-use super::{feedthrough, jitter, mains, nonlinearity, truncation};
+use super::{feedthrough, jitter, truncation};
 
-/// Least variance of a channel's noise, codes squared: nearly that of an ideal quantiser's error, whose
-/// pattern is not white without noise.
-pub const LEAST_VARIANCE: f64 = 0.07;
 /// Rounds at most.
 const ROUNDS: usize = 6;
+/// The same after the first, where the quantiser's steps show: each is dear, and exact.
+const SHARP_ROUNDS: usize = 1;
 /// Gain that jitter has to make: one free parameter.
 const JITTER_COST: f64 = 9.0;
 
@@ -80,197 +81,6 @@ pub fn declared(capture: &Capture, known: &Known, tone: Tone) -> Model {
     }
 }
 
-/// Residuals at coefficients, 0 where limited; of all rows, or of the training rows alone.
-pub fn residuals(
-    capture: &Capture,
-    model: &Model,
-    coefficients: &[Vec<f64>; 2],
-    all: bool,
-) -> [Vec<f64>; 2] {
-    let n = capture.rows();
-    let mut out = [vec![0.0; n], vec![0.0; n]];
-    let mut rows = Rows::new();
-    let wanted = |p: Part| all || p != Part::HeldOut;
-    for segment in capture.segments.iter().filter(|s| wanted(s.part)) {
-        for chunk in chunks(segment.rows.clone()) {
-            let start = chunk.start;
-            let count = chunk.len();
-            rows.fill(capture, model, chunk);
-            for (channel, out) in out.iter_mut().enumerate() {
-                for (i, out) in out.iter_mut().skip(start).take(count).enumerate() {
-                    if rows.weight[channel][i] > 0.0 {
-                        let value = rows.value(channel, i, &coefficients[channel]);
-                        *out = rows.target[channel][i] - value;
-                    }
-                }
-            }
-        }
-    }
-    out
-}
-
-/// Coefficients by channel and column out of combos.
-pub fn spread(combos: &[&Combo], solved: &Solved) -> [Vec<f64>; 2] {
-    let mut out = [vec![0.0; ALL], vec![0.0; ALL]];
-    for (combo, value) in combos.iter().zip(&solved.coefficients) {
-        for (channel, column, factor) in &combo.parts {
-            if let Some(v) = out[*channel].get_mut(*column) {
-                *v += factor * value;
-            }
-        }
-    }
-    out
-}
-
-/// A generous description of all that goes with the phase, and of the lines known so far; tables of both
-/// channels come last, [`TABLES`] columns.
-fn generous(base: &[Combo], model: &Model) -> Vec<Combo> {
-    let mut out = base.to_vec();
-    for channel in 0..2 {
-        let mut one = |k: usize| out.push(Combo::one("", channel, k));
-        [ONE, SIN, COS].into_iter().for_each(&mut one);
-        for k in 2..=super::columns::HARMONICS {
-            let (sin, cos) = harmonic(k);
-            one(sin);
-            one(cos);
-        }
-        for i in 0..model.lines.len() {
-            let (sin, cos) = super::columns::line(i);
-            one(sin);
-            one(cos);
-        }
-        if model.truncation.is_some() {
-            one(TRUNCATED);
-            one(TRUNCATED + 1);
-        }
-    }
-    for channel in 0..2 {
-        out.extend(nonlinearity::table(model, 4, &[channel]));
-    }
-    out
-}
-
-/// Columns of the tables in a generous description.
-const TABLES: usize = 66;
-
-/// What is known of the noise and of the tones, around a model.
-struct Around {
-    residuals: [Vec<f64>; 2],
-    training: [Vec<f64>; 2],
-    free: [[f64; 2]; 2],
-    noise: [f64; 2],
-}
-
-fn around(capture: &Capture, model: &mut Model, base: &[Combo], neutral: bool) -> Around {
-    let gram = Gram::of(capture, model);
-    let combos = generous(base, model);
-    let combos: Vec<&Combo> = combos.iter().collect();
-    let mut ridge = base_ridge(base);
-    ridge.resize(combos.len(), 0.0);
-    let solved = solve(gram.all(), &combos, &ridge, Detail::All);
-    let coefficients = spread(&combos, &solved);
-    // Tables contain the tone: what it is comes from the fit without them.
-    let few = combos.len().saturating_sub(TABLES);
-    let (fewer, less) = (combos.get(..few), ridge.get(..few));
-    let fewer = fewer.unwrap_or_default();
-    let without = solve(gram.all(), fewer, less.unwrap_or_default(), Detail::All);
-    let plain = spread(fewer, &without);
-    let mut free = model.declared;
-    for (free, coefficients) in free.iter_mut().zip(&plain) {
-        for (value, column) in free.iter_mut().zip([SIN, COS]) {
-            *value += coefficients.get(column).copied().unwrap_or(0.0);
-        }
-    }
-    let residuals = residuals(capture, model, &coefficients, true);
-    if neutral {
-        // Without the tables, unless they are needed: where the codes are is then known better.
-        let needed = solved.gain - without.gain > 2.0 * TABLES as f64;
-        model.neutral = if needed { coefficients } else { plain };
-    }
-    let mut training = residuals.clone();
-    for segment in capture.segments.iter().filter(|s| s.part == Part::HeldOut) {
-        for channel in &mut training {
-            if let Some(rows) = channel.get_mut(segment.rows.clone()) {
-                rows.fill(0.0);
-            }
-        }
-    }
-    let spectrum = spectrum_of(capture, &training);
-    let noise = [0, 1].map(|c: usize| spectrum.variance(c).max(LEAST_VARIANCE));
-    Around {
-        residuals,
-        training,
-        free,
-        noise,
-    }
-}
-
-fn spectrum_of(capture: &Capture, training: &[Vec<f64>; 2]) -> Spectrum {
-    let [drive, sense] = training;
-    Spectrum::of([drive, sense], capture.training_rows())
-}
-
-/// Looks for new lines; true if any was added. Besides the strongest, those are taken that are no sidelobe
-/// of a stronger one.
-fn add_lines(capture: &Capture, model: &mut Model, around: &Around) -> bool {
-    let rows = capture.rows() as f64;
-    let spectrum = spectrum_of(capture, &around.training);
-    let [drive, sense] = &around.training;
-    let before = model.lines.len();
-    let mut stronger: Vec<spectrum::Line> = Vec::new();
-    for line in spectrum.lines(&model.tone, 12, 3.0, [LEAST_VARIANCE; 2]) {
-        if model.lines.len() >= super::columns::LINES {
-            break;
-        }
-        // A line that is known is not found again: its rest is the frequency's error.
-        let known = model
-            .lines
-            .iter()
-            .any(|t| (t - line.turns).abs() * rows < 1.0);
-        let sidelobe = stronger.iter().any(|s| {
-            let apart = (s.turns - line.turns) * rows;
-            apart.abs() < 8.0 || line.surprise * apart * apart < 4.0 * s.surprise
-        });
-        if !known && !sidelobe {
-            let turns = spectrum::refine([drive, sense], around.noise, line.turns);
-            model.lines.push(turns);
-            stronger.push(line);
-        }
-    }
-    model.lines.len() > before
-}
-
-/// Adds the mains' own frequencies where they are too slow for the spectrum.
-fn add_slow_mains(
-    capture: &Capture,
-    known: &Known,
-    model: &mut Model,
-    series: &[Option<Series>; 2],
-) {
-    let Some(fs) = known.fs_hz else { return };
-    let rows = capture.rows();
-    let mut best: Option<(f64, f64)> = None;
-    for hz in mains::MAINS_HZ {
-        let turns = hz / fs;
-        let periods = turns * rows as f64;
-        let is_new = model
-            .lines
-            .iter()
-            .all(|t| (t - turns).abs() * rows as f64 > 0.7);
-        if (0.1..4.0).contains(&periods) && is_new {
-            let gain = wander::slow_line_gain(series, rows, turns);
-            if gain > 15.0 && best.is_none_or(|b| gain > b.0) {
-                best = Some((gain, turns));
-            }
-        }
-    }
-    if let Some((_, turns)) = best
-        && model.lines.len() < super::columns::LINES
-    {
-        model.lines.push(turns);
-    }
-}
-
 /// All rounds from a model with its limits and missing codes.
 pub fn rounds(capture: &Capture, known: &Known, start: &Model) -> Fitted {
     let mut model = start.clone();
@@ -280,196 +90,196 @@ pub fn rounds(capture: &Capture, known: &Known, start: &Model) -> Fitted {
     let solved = solve(first.all(), &combos, &base_ridge(&base), Detail::All);
     model.coefficients = spread(&combos, &solved);
     model.neutral = model.coefficients.clone();
-    let mut last: Option<Fitted> = None;
-    for round in 0..ROUNDS {
-        let mut seen = around(capture, &mut model, &base, round == 0);
+
+    let seen = around(capture, &mut model, &base, true);
+    model.variance.base = seen.noise;
+    let seen = placed(capture, &mut model, &base);
+    let mut fitted = round(capture, known, &base, model, seen, true).0;
+    for further in 1..ROUNDS {
+        let mut model = fitted.model.clone();
+        if is_sharp(&model.neutral, &model) {
+            model.lines.clear();
+        }
+        let seen = around(capture, &mut model, &base, false);
         model.variance.base = seen.noise;
-        if round == 0 {
-            find_steps(capture, &mut model, &base);
-            // Again, now that it is known where the codes are.
-            let sharp = is_sharp(&model.neutral, &model);
-            seen = around(capture, &mut model, &base, !sharp);
-            let spectrum = spectrum_of(capture, &seen.training);
-            let [drive, sense] = &seen.training;
-            model.truncation = truncation::best(capture, &model, [drive, sense], &spectrum);
-            seen = around(capture, &mut model, &base, false);
-        }
-        for _ in 0..3 {
-            if !add_lines(capture, &mut model, &seen) {
-                break;
-            }
-            seen = around(capture, &mut model, &base, false);
-        }
-        let series =
-            [0, 1].map(|c: usize| wander::series(&seen.residuals[c], seen.noise[c], &model.tone));
-        let lines = model.lines.len();
-        add_slow_mains(capture, known, &mut model, &series);
-        if model.lines.len() > lines {
-            seen = around(capture, &mut model, &base, false);
-        }
-        let series =
-            [0, 1].map(|c: usize| wander::series(&seen.residuals[c], seen.noise[c], &model.tone));
-        let squares = jitter::Squares::of(
-            capture,
-            &model,
-            [&seen.residuals[0], &seen.residuals[1]],
-            false,
-        );
-        let found = squares.fit(seen.noise);
-        let jitter_taken = found.is_some_and(|f| f.gain > JITTER_COST);
-        model.variance = Variance {
-            base: seen.noise,
-            jitter: 0.0,
-        };
-        if let Some(found) = found.filter(|_| jitter_taken) {
-            let base = squares.base(found.jitter);
-            model.variance = Variance {
-                base: base.map(|b| b.max(LEAST_VARIANCE)),
-                jitter: found.jitter,
-            };
-            // The random instant takes a part of the tone itself.
-            let less = 1.0 - 0.5 * model.tone.angle().powi(2) * found.jitter;
-            let amplitude = capture.meta.drive_amplitude_codes.unwrap_or(0.0);
-            model.declared[0] = [0.0, -amplitude * less.max(0.0)];
-        }
-        let gram = Gram::of(capture, &model);
-        let mut nuisance = wander::nuisance(&series);
-        let spectrum = spectrum_of(capture, &seen.training);
-        let rows = capture.training_rows();
-        nuisance.extend(wander::of_harmonics(
-            &spectrum,
-            &model.tone,
-            seen.noise,
-            rows,
-        ));
-        let [drive, sense] = &seen.residuals;
-        let coupled = feedthrough::is_coupled(capture, &model, [drive, sense]);
-        let variants = variants(known, &model, seen.free, capture.rows(), coupled);
-        let mut search = Search::new(gram.all(), &base, &nuisance, &variants);
-        let (set, objective) = search.best();
-        let (combos, solved) = search.solution(&set);
-        let coefficients = spread(&combos, &solved);
-        let sharp = is_sharp(&coefficients, &model);
-        let same = (round > 1 || !sharp)
-            && last
-                .as_ref()
-                .is_some_and(|l| is_same(l, &variants, &set, &model, jitter_taken));
-        model.neutral.clone_from(&coefficients);
-        model.coefficients = coefficients;
-        if sharp {
-            settle(capture, &mut model, &base, &nuisance, &variants, &set);
-        }
-        last = Some(Fitted {
-            model: model.clone(),
-            gram,
-            base: base.clone(),
-            nuisance,
-            variants,
-            set,
-            objective,
-            clipping: None,
-            missing: None,
-            jitter: found,
-            jitter_taken,
-            residuals: seen.residuals,
-            noise: seen.noise,
-        });
-        if same {
+        let (next, sharp) = round(capture, known, &base, model, seen, false);
+        let same = (further > 1 || !sharp) && is_same(&fitted, &next);
+        fitted = next;
+        if same || sharp && further >= SHARP_ROUNDS {
             break;
         }
     }
-    last.unwrap_or_else(|| Fitted {
-        gram: first,
-        nuisance: Vec::new(),
-        variants: Vec::new(),
-        set: Vec::new(),
-        objective: 0.0,
+    fitted
+}
+
+/// Finds the quantiser's steps and a truncated oscillator; what is known around the model then.
+fn placed(capture: &Capture, model: &mut Model, base: &[Combo]) -> Around {
+    find_steps(capture, model, base);
+    // Again, now that it is known where the codes are.
+    let sharp = is_sharp(&model.neutral, model);
+    let seen = around(capture, model, base, !sharp);
+    let [drive, sense] = &seen.training;
+    let spectrum = seen.spectrum(capture);
+    model.truncation = truncation::best(capture, model, [drive, sense], &spectrum);
+    around(capture, model, base, false)
+}
+
+/// One round: lines, jitter, the set of effects; and whether the quantiser's steps show.
+fn round(
+    capture: &Capture,
+    known: &Known,
+    base: &[Combo],
+    mut model: Model,
+    mut seen: Around,
+    first: bool,
+) -> (Fitted, bool) {
+    let sharp = is_sharp(&model.neutral, &model);
+    // Lines that misplaced steps make must not be found: first the steps, then, each time anew, the lines.
+    let series = match sharp && first {
+        true => block_series(&model, &seen),
+        false => follow_lines(capture, known, base, &mut model, &mut seen),
+    };
+    let (jitter, jitter_taken) = follow_jitter(capture, &mut model, &seen);
+    let mut gram = Gram::of(capture, &model);
+    let nuisance = slow_noise(capture, &model, &seen, &series);
+    let [drive, sense] = &seen.residuals;
+    let coupled = feedthrough::is_coupled(capture, &model, [drive, sense]);
+    let variants = variants(known, &model, seen.free, capture.rows(), coupled);
+    let (set, objective) = match sharp {
+        true => {
+            let mut search = OwnSteps::new(capture, &model, base, &nuisance, &variants);
+            let (set, own) = search.best();
+            let wants_all_rows = search.wants_all_rows();
+            model.coefficients = own.coefficients;
+            match wants_all_rows {
+                true => {
+                    // The steps are placed by now: what is small is left to the sums of all rows.
+                    model.neutral.clone_from(&model.coefficients);
+                    gram = Gram::of(capture, &model);
+                    Search::new(gram.all(), base, &nuisance, &variants).best_from(set)
+                }
+                false => (set, own.objective),
+            }
+        }
+        false => {
+            let mut search = Search::new(gram.all(), base, &nuisance, &variants);
+            let (set, objective) = search.best();
+            let (combos, solved) = search.solution(&set);
+            model.coefficients = spread(&combos, &solved);
+            (set, objective)
+        }
+    };
+    model.neutral.clone_from(&model.coefficients);
+    if sharp {
+        settle(capture, &mut model, base, &nuisance, &variants, &set);
+        gram = Gram::of(capture, &model);
+    }
+    let fitted = Fitted {
+        model,
+        gram,
+        base: base.to_vec(),
+        nuisance,
+        variants,
+        set,
+        objective,
         clipping: None,
         missing: None,
-        jitter: None,
-        jitter_taken: false,
-        residuals: [Vec::new(), Vec::new()],
-        noise: model.variance.base,
-        base,
-        model,
-    })
+        jitter,
+        jitter_taken,
+        residuals: seen.residuals,
+        noise: seen.noise,
+    };
+    (fitted, sharp)
 }
 
-/// Whether the quantiser's error shows undithered in a channel: the place of the steps then matters.
-fn is_sharp(coefficients: &[Vec<f64>; 2], model: &Model) -> bool {
-    coefficients
-        .iter()
-        .zip(model.variance.base)
-        .any(|(c, v)| v < 16.0 && c.get(super::columns::SAW).copied().unwrap_or(0.0).abs() > 0.3)
-}
-
-/// Finds where the codes are before anything is chosen, where the quantiser's error shows undithered: of
-/// descriptions of growing freedom, each with the steps at its own signal, the one that gains most.
-fn find_steps(capture: &Capture, model: &mut Model, base: &[Combo]) {
-    if !is_sharp(&model.neutral, model) && !is_sharp(&model.coefficients, model) {
-        return;
-    }
-    let all = generous(base, model);
-    let ridge = base_ridge(base);
-    let mut best: Option<(f64, [Vec<f64>; 2])> = None;
-    for count in [base.len(), all.len().saturating_sub(TABLES), all.len()] {
-        let combos: Vec<&Combo> = all.iter().take(count).collect();
-        let mut ridge = ridge.clone();
-        ridge.resize(combos.len(), 0.0);
-        let mut trial = model.clone();
-        trial.neutral.clone_from(&model.coefficients);
-        let mut gain = 0.0;
-        for _ in 0..4 {
-            let gram = Gram::of(capture, &trial);
-            let solved = solve(gram.all(), &combos, &ridge, Detail::All);
-            trial.neutral = spread(&combos, &solved);
-            gain = solved.gain - 2.0 * solved.rank as f64;
+/// Adds lines to the model until no new one stands out; the block series of what is left.
+fn follow_lines(
+    capture: &Capture,
+    known: &Known,
+    base: &[Combo],
+    model: &mut Model,
+    seen: &mut Around,
+) -> [Option<Series>; 2] {
+    for _ in 0..3 {
+        if !add_lines(capture, model, seen) {
+            break;
         }
-        if best.as_ref().is_none_or(|b| gain > b.0) {
-            best = Some((gain, trial.neutral));
-        }
+        *seen = around(capture, model, base, false);
     }
-    if let Some((_, neutral)) = best {
-        model.neutral = neutral;
+    let before = block_series(model, seen);
+    let lines = model.lines.len();
+    add_slow_mains(capture, known, model, &before);
+    if model.lines.len() == lines {
+        return before;
     }
+    *seen = around(capture, model, base, false);
+    block_series(model, seen)
 }
 
-/// Fits a set again until the quantiser's steps are where its own signal puts them.
-fn settle(
+/// Constant and tone of what is left, block by block.
+fn block_series(model: &Model, seen: &Around) -> [Option<Series>; 2] {
+    [0, 1].map(|c: usize| wander::series(&seen.residuals[c], seen.noise[c], &model.tone))
+}
+
+/// Sets the model's variance, with jitter where it earns its place; what was found of it, and whether it did.
+fn follow_jitter(
     capture: &Capture,
     model: &mut Model,
-    base: &[Combo],
-    nuisance: &[(Combo, f64)],
-    variants: &[Variant],
-    set: &[usize],
-) {
-    for _ in 0..2 {
-        let gram = Gram::of(capture, model);
-        let search = Search::new(gram.all(), base, nuisance, variants);
-        let (combos, solved) = search.solution(set);
-        model.coefficients = spread(&combos, &solved);
-        model.neutral.clone_from(&model.coefficients);
+    seen: &Around,
+) -> (Option<jitter::Found>, bool) {
+    let [drive, sense] = &seen.residuals;
+    let squares = jitter::Squares::of(capture, model, [drive, sense], false);
+    let found = squares.fit(seen.noise);
+    let taken = found.filter(|f| f.gain > JITTER_COST);
+    model.variance = Variance {
+        base: seen.noise,
+        jitter: 0.0,
+    };
+    if let Some(found) = taken {
+        let base = squares.base(found.jitter);
+        model.variance = Variance {
+            base: base.map(|b| b.max(LEAST_VARIANCE)),
+            jitter: found.jitter,
+        };
+        // The random instant takes a part of the tone itself.
+        let less = 1.0 - 0.5 * model.tone.angle().powi(2) * found.jitter;
+        let amplitude = capture.meta.drive_amplitude_codes.unwrap_or(0.0);
+        model.declared[0] = [0.0, -amplitude * less.max(0.0)];
     }
+    (found, taken.is_some())
+}
+
+/// Columns that stand for slow noise of the means and of the harmonics.
+fn slow_noise(
+    capture: &Capture,
+    model: &Model,
+    seen: &Around,
+    series: &[Option<Series>; 2],
+) -> Vec<(Combo, f64)> {
+    let mut nuisance = wander::nuisance(series);
+    let spectrum = seen.spectrum(capture);
+    let rows = capture.training_rows();
+    nuisance.extend(wander::of_harmonics(
+        &spectrum,
+        &model.tone,
+        seen.noise,
+        rows,
+    ));
+    nuisance
 }
 
 /// Whether a round changed nothing of the choice and little of the tones.
-fn is_same(
-    last: &Fitted,
-    variants: &[Variant],
-    set: &[usize],
-    model: &Model,
-    jitter: bool,
-) -> bool {
-    let names = |variants: &[Variant], set: &[usize]| -> Vec<(Effect, usize)> {
-        let chosen = set.iter().filter_map(|k| variants.get(*k));
+fn is_same(last: &Fitted, next: &Fitted) -> bool {
+    let names = |fit: &Fitted| -> Vec<(Effect, usize)> {
+        let chosen = fit.set.iter().filter_map(|k| fit.variants.get(*k));
         chosen.map(|v| (v.effect, v.combos.len())).collect()
     };
-    names(&last.variants, &last.set) == names(variants, set)
-        && last.model.lines.len() == model.lines.len()
-        && last.jitter_taken == jitter
+    names(last) == names(next)
+        && last.model.lines.len() == next.model.lines.len()
+        && last.jitter_taken == next.jitter_taken
         && (0..2).all(|c| {
-            let change = last.noise[c] / model.variance.base[c];
-            jitter || (0.99..1.01).contains(&change)
+            let change = last.noise[c] / next.model.variance.base[c];
+            next.jitter_taken || (0.99..1.01).contains(&change)
         })
 }
 

@@ -42,6 +42,41 @@ pub struct Gram {
 
 const SIDE: usize = ALL + 1;
 
+/// What is summed: all columns or some, of all training rows or of every `stride`-th chunk.
+#[derive(Debug, Clone)]
+pub struct Summed {
+    /// By channel, ascending; the hat functions are not among them.
+    columns: [Vec<usize>; 2],
+    hats: bool,
+    stride: usize,
+}
+
+impl Summed {
+    /// All columns that are not identically zero.
+    pub fn all(model: &Model, stride: usize) -> Self {
+        Summed {
+            columns: [active(model, 0), active(model, 1)],
+            hats: true,
+            stride,
+        }
+    }
+
+    /// Those of these combos.
+    pub fn of(combos: &[&Combo], stride: usize) -> Self {
+        let parts = || combos.iter().flat_map(|c| &c.parts);
+        let columns = [0, 1].map(|channel: usize| {
+            let own = parts().filter(|p| p.0 == channel && p.1 < HAT);
+            let columns: std::collections::BTreeSet<usize> = own.map(|p| p.1).collect();
+            columns.into_iter().collect()
+        });
+        Summed {
+            columns,
+            hats: parts().any(|p| p.1 >= HAT),
+            stride,
+        }
+    }
+}
+
 /// The columns that are not identically zero.
 fn active(model: &Model, channel: usize) -> Vec<usize> {
     (0..HAT)
@@ -57,12 +92,17 @@ fn active(model: &Model, channel: usize) -> Vec<usize> {
 impl Gram {
     /// One pass over the training rows.
     pub fn of(capture: &Capture, model: &Model) -> Gram {
+        Gram::over(capture, model, &Summed::all(model, 1))
+    }
+
+    /// The same of some columns or rows.
+    pub fn over(capture: &Capture, model: &Model, summed: &Summed) -> Gram {
         let zero = || [vec![0.0; SIDE * SIDE], vec![0.0; SIDE * SIDE]];
         // One thread a group, each with its own sums: the bits do not depend on their number.
         let mut sums: Vec<[Vec<f64>; 2]> = (0..GROUPS).map(|_| zero()).collect();
         std::thread::scope(|scope| {
             for (group, sums) in sums.iter_mut().enumerate() {
-                scope.spawn(move || add_group(capture, model, group, sums));
+                scope.spawn(move || add_group(capture, model, group, summed, sums));
             }
         });
         let mut total = zero();
@@ -96,21 +136,26 @@ impl Gram {
     }
 }
 
-fn add_group(capture: &Capture, model: &Model, group: usize, sums: &mut [Vec<f64>; 2]) {
+fn add_group(
+    capture: &Capture,
+    model: &Model,
+    group: usize,
+    summed: &Summed,
+    sums: &mut [Vec<f64>; 2],
+) {
     let mut rows = Rows::new();
     let mut weighted = vec![0.0; super::columns::CHUNK];
-    let columns = [active(model, 0), active(model, 1)];
     for segment in capture
         .segments
         .iter()
         .filter(|s| s.part == Part::Train(group))
     {
-        for chunk in chunks(segment.rows.clone()) {
+        for chunk in chunks(segment.rows.clone()).step_by(summed.stride) {
             let n = chunk.len();
             rows.fill(capture, model, chunk);
-            for (channel, used) in columns.iter().enumerate() {
+            for (channel, used) in summed.columns.iter().enumerate() {
                 let sum = &mut sums[channel];
-                add_chunk(&rows, channel, used, n, &mut weighted, sum);
+                add_chunk(&rows, channel, used, summed.hats, n, &mut weighted, sum);
             }
         }
     }
@@ -120,6 +165,7 @@ fn add_chunk(
     rows: &Rows,
     channel: usize,
     used: &[usize],
+    with_hats: bool,
     n: usize,
     weighted: &mut [f64],
     sum: &mut [f64],
@@ -138,6 +184,9 @@ fn add_chunk(
             sum[a * SIDE + b] += dot(weighted, &dense[*b][..n]);
         }
         sum[a * SIDE + ALL] += dot(weighted, target);
+        if !with_hats {
+            continue;
+        }
         for (value, (k, part)) in weighted.iter().zip(hats) {
             let at = a * SIDE + HAT + k;
             sum[at] += value * (1.0 - part);
@@ -145,13 +194,16 @@ fn add_chunk(
         }
     }
     for ((w, y), (k, part)) in weight.iter().zip(target).zip(hats) {
+        sum[ALL * SIDE + ALL] += w * y * y;
+        if !with_hats {
+            continue;
+        }
         let (k, first) = (HAT + k, 1.0 - part);
         sum[k * SIDE + k] += w * first * first;
         sum[k * SIDE + k + 1] += w * first * part;
         sum[(k + 1) * SIDE + k + 1] += w * part * part;
         sum[k * SIDE + ALL] += w * first * y;
         sum[(k + 1) * SIDE + ALL] += w * part * y;
-        sum[ALL * SIDE + ALL] += w * y * y;
     }
 }
 
@@ -206,6 +258,19 @@ pub fn solve(sums: &[Vec<f64>; 2], combos: &[&Combo], ridge: &[f64], detail: Det
     let right: Vec<f64> = combos.iter().map(target).collect();
     let (lower, used) = factor(sums, combos, ridge);
     back(&lower, &right, &used, detail)
+}
+
+/// Coefficients by channel and column out of combos.
+pub fn spread(combos: &[&Combo], solved: &Solved) -> [Vec<f64>; 2] {
+    let mut out = [vec![0.0; ALL], vec![0.0; ALL]];
+    for (combo, value) in combos.iter().zip(&solved.coefficients) {
+        for (channel, column, factor) in &combo.parts {
+            if let Some(v) = out[*channel].get_mut(*column) {
+                *v += factor * value;
+            }
+        }
+    }
+    out
 }
 
 /// Standard deviations of weighted sums of the coefficients that [`solve`] finds; `weights` are by combo.

@@ -7,7 +7,7 @@
 
 use super::columns::{Model, Rows, chunks};
 use super::input::{Capture, Part};
-use super::normal;
+use super::{normal, steps};
 
 /// Missing codes of one channel.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -24,7 +24,9 @@ impl Missing {
         if self.codes.is_empty() {
             return 0.0;
         }
-        // A little noise is always there; a wide one is looked at in its middle only.
+        // The quantiser's own variance is no part of the noise before it. A little noise is always there; a wide
+        // one is looked at in its middle only.
+        let sigma = (sigma * sigma - 1.0 / 12.0).max(0.0).sqrt();
         let sigma = sigma.clamp(0.05, 1e4);
         let reach = 4.0 * sigma + 1.0;
         let first = self
@@ -135,10 +137,12 @@ impl Histogram {
                 least.min(around(&counts, k))
             })
             .collect();
+        let repeats = repeats(capture, model, channel);
+        let per_phase = |cells: Vec<f64>| cells.into_iter().map(|n| n / repeats).collect();
         Some(Histogram {
             first,
-            counts,
-            expected,
+            counts: per_phase(counts),
+            expected: per_phase(expected),
         })
     }
 
@@ -159,6 +163,20 @@ impl Histogram {
             })
             .collect()
     }
+}
+
+/// Training rows that fall on the same phase and so on the same code, where noise was added after rounding: they
+/// count once, as all of them miss a code if the tone is a little off.
+fn repeats(capture: &Capture, model: &Model, channel: usize) -> f64 {
+    if !steps::is_undithered(&model.neutral[channel]) {
+        return 1.0;
+    }
+    let Some(word) = model.tone.word else {
+        return 1.0;
+    };
+    let bits = 32 - word.trailing_zeros().min(31);
+    let bits = model.truncation.unwrap_or(32).min(bits);
+    (capture.training_rows() as f64 / f64::powi(2.0, bits as i32)).max(1.0)
 }
 
 /// The smaller of the mean counts of the codes below and above `k`, its neighbours left out: where a

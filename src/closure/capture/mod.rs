@@ -10,9 +10,12 @@
 //! [`harmonics`], [`mains`], [`spur`] with [`truncation`]); [`gram`] their sums and least squares;
 //! [`search`] chooses. Outside of the linear part are [`clipping`], [`missing`] (the histogram), [`jitter`] (the
 //! variance). [`spectrum`] gives noise and lines, [`wander`] the slow noise that must not pass for an
-//! effect. [`fit`] runs them in rounds; [`report`] judges on held-out rows, with [`errors`], [`rivals`],
+//! effect. [`around`] is the fit with every freedom, [`steps`] where the quantiser's
+//! steps are, [`own_steps`] the search where they show,
+//! [`fit`] runs all in rounds; [`report`] judges on held-out rows, with [`errors`], [`rivals`],
 //! [`structure`] and [`firmware`]; [`bend`] is for the page, which is made in `report::capture`.
 
+pub mod around;
 pub mod bend;
 pub mod candidates;
 pub mod clipping;
@@ -32,11 +35,13 @@ pub mod missing;
 pub mod nonlinearity;
 pub mod normal;
 pub mod offset;
+pub mod own_steps;
 pub mod report;
 pub mod rivals;
 pub mod search;
 pub mod spectrum;
 pub mod spur;
+pub mod steps;
 pub mod structure;
 pub mod tone;
 pub mod truncation;
@@ -192,7 +197,7 @@ fn baseline(capture: &Capture, known: &Known, tone: Tone) -> Model {
             &candidates::base_ridge(&base),
             Detail::All,
         );
-        model.coefficients = fit::spread(&combos, &solved);
+        model.coefficients = gram::spread(&combos, &solved);
         model.neutral = model.coefficients.clone();
     }
     model

@@ -3,8 +3,8 @@
 use super::candidates::{Effect, Known};
 use super::columns::{ALL, Model};
 use super::errors::{Judged, judge};
-use super::fit::{Fitted, spread};
-use super::gram::{Combo, Solved};
+use super::fit::Fitted;
+use super::gram::{Combo, Solved, spread};
 use super::input::Capture;
 use super::search::Search;
 use super::{bend, firmware, jitter, rivals, structure};
@@ -40,6 +40,9 @@ pub struct Findings {
     pub lines: Vec<(f64, Effect)>,
 }
 
+/// Largest p-value of a step.
+const LARGEST_P: f64 = 0.001;
+
 /// A step that is taken in its turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Turn {
@@ -64,13 +67,11 @@ pub fn findings(capture: &Capture, known: &Known, plain: &Model, fitted: &Fitted
         let order = turns(fitted, &mut search, &set);
         let judged = prefixes(capture, fitted, &search, &order);
         let mut last = weighted(capture, plain, fitted);
-        let mut failed = None;
+        let mut failed = unsure(fitted, &mut search, &set);
         for (turn, j) in order.iter().zip(&judged) {
             match turn {
-                Turn::Linear(k) if j.heldout_chi >= last => {
-                    failed = Some(*k);
-                    break;
-                }
+                _ if failed.is_some() => break,
+                Turn::Linear(k) if j.heldout_chi >= last => failed = Some(*k),
                 Turn::Linear(_) | Turn::Clipping => last = j.heldout_chi,
                 _ => {}
             }
@@ -147,6 +148,27 @@ pub fn findings(capture: &Capture, known: &Known, plain: &Model, fitted: &Fitted
         lines: taken_lines(fitted, &set),
         models: [plain.clone(), last],
     }
+}
+
+/// The member of a set that is least sure, if it is not sure enough.
+fn unsure(fitted: &Fitted, search: &mut Search, set: &[usize]) -> Option<usize> {
+    let p = |search: &mut Search, k: usize| Some((p_value(fitted, search, set, k)?, k));
+    let all: Vec<_> = set.iter().filter_map(|k| p(search, *k)).collect();
+    let worst = all.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (worst.0 > LARGEST_P).then_some(worst.1)
+}
+
+/// The chance that a member of a set gains what it does beyond the others, the search among variants and
+/// frequencies counted.
+fn p_value(fitted: &Fitted, search: &mut Search, set: &[usize], member: usize) -> Option<f64> {
+    let variant = fitted.variants.get(member)?;
+    let fewer: Vec<usize> = set.iter().copied().filter(|k| *k != member).collect();
+    let gain = search.gain(set) - search.gain(&fewer);
+    let columns = variant.combos.len();
+    let search_cost = variant.cost - 7.0 - 2.0 * columns as f64;
+    let surprise = chi_square_surprise(columns, 2.0 * gain.max(0.0));
+    let tried = (fitted.variants.len() as f64).ln() + search_cost.max(0.0);
+    Some((tried - surprise).exp().min(1.0))
 }
 
 fn effect(fitted: &Fitted, turn: Turn) -> Option<Effect> {
@@ -252,12 +274,7 @@ fn linear_step(
     };
     let mut step = empty(variant.effect);
     let fewer: Vec<usize> = set.iter().copied().filter(|k| *k != member).collect();
-    let gain = search.gain(set) - search.gain(&fewer);
-    let columns = variant.combos.len();
-    let search_cost = variant.cost - 7.0 - 2.0 * columns as f64;
-    let surprise = chi_square_surprise(columns, 2.0 * gain.max(0.0));
-    let tried = (fitted.variants.len() as f64).ln() + search_cost.max(0.0);
-    step.p_value = (tried - surprise).exp().min(1.0);
+    step.p_value = p_value(fitted, search, set, member).unwrap_or(1.0);
     let own = own_combos(fitted, set, member);
     parameters(&mut step, combos, solved, own);
     let names: Vec<String> = step.parameters.keys().cloned().collect();

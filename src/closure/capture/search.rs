@@ -43,16 +43,7 @@ impl<'a> Search<'a> {
 
     /// Combos of a set, the base and the nuisance first, and their ridges.
     fn combos(&self, set: &[usize]) -> (Vec<&'a Combo>, Vec<f64>) {
-        let mut combos: Vec<&Combo> = self.base.iter().collect();
-        let mut ridge = super::candidates::base_ridge(self.base);
-        for (combo, variance) in self.nuisance {
-            combos.push(combo);
-            ridge.push(1.0 / variance);
-        }
-        let variants = set.iter().filter_map(|k| self.variants.get(*k));
-        combos.extend(variants.flat_map(|v| &v.combos));
-        ridge.resize(combos.len(), 0.0);
-        (combos, ridge)
+        combos_of(self.base, self.nuisance, self.variants, set)
     }
 
     /// The full solution of a set, with its combos.
@@ -96,7 +87,7 @@ impl<'a> Search<'a> {
     }
 
     /// The variants of effects that are not in the set.
-    fn others(&self, set: &[usize]) -> Vec<usize> {
+    pub fn others(&self, set: &[usize]) -> Vec<usize> {
         let taken: Vec<_> = set.iter().map(|k| self.effect(*k)).collect();
         (0..self.variants.len())
             .filter(|k| !taken.contains(&self.effect(*k)))
@@ -105,7 +96,11 @@ impl<'a> Search<'a> {
 
     /// The best set that the moves find, and its objective.
     pub fn best(&mut self) -> (Vec<usize>, f64) {
-        let mut set: Vec<usize> = Vec::new();
+        self.best_from(Vec::new())
+    }
+
+    /// The same from a set that is there.
+    pub fn best_from(&mut self, mut set: Vec<usize>) -> (Vec<usize>, f64) {
         let mut score = self.objective(&set);
         for _ in 0..40 {
             let mut better: Option<(Vec<usize>, f64)> = None;
@@ -125,6 +120,15 @@ impl<'a> Search<'a> {
                 }
                 offer(self, fewer);
             }
+            if set.len() > 2 {
+                // One effect for all: a bend for offset, gain and harmonics.
+                for other in 0..self.variants.len() {
+                    offer(self, vec![other]);
+                }
+            }
+            for straight in self.straightened(&set) {
+                offer(self, straight);
+            }
             for other in self.others(&set) {
                 let mut more = set.clone();
                 more.push(other);
@@ -136,6 +140,23 @@ impl<'a> Search<'a> {
             }
         }
         (set, score)
+    }
+
+    /// Sets with an offset and a gain error in the place of a bend, which a step forward may have taken for both.
+    fn straightened(&self, set: &[usize]) -> Vec<Vec<usize>> {
+        let is = |k: &usize, effect: Effect| self.effect(*k) == Some(effect);
+        if !set.iter().any(|k| is(k, Effect::Nonlinearity)) {
+            return Vec::new();
+        }
+        let line = [Effect::Nonlinearity, Effect::Offset, Effect::Gain];
+        let rest = set.iter().filter(|k| !line.iter().any(|e| is(k, *e)));
+        let rest: Vec<usize> = rest.copied().collect();
+        let of = |effect: Effect| (0..self.variants.len()).filter(move |k| is(k, effect));
+        let with = |a: usize, b: usize| rest.iter().copied().chain([a, b]).collect();
+        of(Effect::Offset)
+            .flat_map(|a| of(Effect::Gain).map(move |b| (a, b)))
+            .map(|(a, b)| with(a, b))
+            .collect()
     }
 
     /// The effects that do nearly as well in the place of one of a set: best variant, and its
@@ -161,4 +182,23 @@ impl<'a> Search<'a> {
         out.sort_by(|a, b| b.1.total_cmp(&a.1));
         out
     }
+}
+
+/// Combos of a set, the base and the nuisance first, and their ridges.
+pub fn combos_of<'a>(
+    base: &'a [Combo],
+    nuisance: &'a [(Combo, f64)],
+    variants: &'a [Variant],
+    set: &[usize],
+) -> (Vec<&'a Combo>, Vec<f64>) {
+    let mut combos: Vec<&Combo> = base.iter().collect();
+    let mut ridge = super::candidates::base_ridge(base);
+    for (combo, variance) in nuisance {
+        combos.push(combo);
+        ridge.push(1.0 / variance);
+    }
+    let chosen = set.iter().filter_map(|k| variants.get(*k));
+    combos.extend(chosen.flat_map(|v| &v.combos));
+    ridge.resize(combos.len(), 0.0);
+    (combos, ridge)
 }

@@ -6,10 +6,11 @@
 //! equal distances from the tone, is a spur too.
 
 use super::candidates::{Effect, Known, Variant};
-use super::columns::{Model, TRUNCATED};
+use super::columns::{COS, Model, SIN, TRUNCATED};
 use super::gram::Combo;
 use super::mains;
 use super::tone::{Tone, fold};
+use std::f64::consts::TAU;
 
 /// Address bits that an oscillator may have.
 pub const ADDRESS_BITS: std::ops::RangeInclusive<u32> = 3..=16;
@@ -61,20 +62,48 @@ pub fn is_spur(known: &Known, model: &Model, i: usize, rows: usize) -> bool {
     at || pair
 }
 
-/// The truncated tone, or lines at the places of spurs.
+/// What truncation makes of the tone itself, beyond 1: sin(p - d) is (1 + a) sin p + b cos p in the mean over the
+/// error d of the phase, which is 0 and all multiples of the phase's own step below that of the address.
+fn of_the_tone(tone: &Tone, bits: u32) -> [f64; 2] {
+    let word = tone.word.unwrap_or(1);
+    let lost = (32 - bits.min(32)).saturating_sub(word.trailing_zeros());
+    let count = f64::powi(2.0, lost as i32);
+    let step = TAU / f64::powi(2.0, bits as i32) / count;
+    // Sum of exp(-i d): a geometric series, by its closed form.
+    let half = 0.5 * step;
+    let size = (count * half).sin() / (count * half.sin());
+    let middle = (count - 1.0) * half;
+    [size * middle.cos() - 1.0, -size * middle.sin()]
+}
+
+/// The truncated tone with or without what truncation does to the tone itself, or lines at the places of spurs.
 pub fn variants(known: &Known, model: &Model, rows: usize) -> Vec<Variant> {
     let mut out = Vec::new();
     if let Some(bits) = model.truncation {
+        let [along, across] = of_the_tone(&model.tone, bits);
         for channels in [&[0usize][..], &[1], &[0, 1]] {
-            let mut combos = Vec::new();
-            for channel in channels {
-                let name = if *channel == 0 { "drive" } else { "sense" };
-                for (k, part) in ["sin", "cos"].iter().enumerate() {
-                    let name = format!("{name}_{part}_of_{bits}_bit_address_codes");
-                    combos.push(Combo::one(&name, *channel, TRUNCATED + k));
+            for with_tone in [true, false] {
+                let mut combos = Vec::new();
+                for channel in channels {
+                    let name = if *channel == 0 { "drive" } else { "sense" };
+                    let [along, across] = match with_tone {
+                        true => [0.0; 2],
+                        false => [along, across],
+                    };
+                    let parts = [
+                        ("sin", [(SIN, -along), (COS, -across)]),
+                        ("cos", [(COS, -along), (SIN, across)]),
+                    ];
+                    for (k, (part, tone)) in parts.into_iter().enumerate() {
+                        let name = format!("{name}_{part}_of_{bits}_bit_address_codes");
+                        let mut parts = vec![(*channel, TRUNCATED + k, 1.0)];
+                        let tone = tone.into_iter().filter(|p| p.1 != 0.0);
+                        parts.extend(tone.map(|(column, factor)| (*channel, column, factor)));
+                        combos.push(Combo::new(&name, 1.0, &parts));
+                    }
                 }
+                out.push(Variant::new(Effect::Spur, combos, 2.6));
             }
-            out.push(Variant::new(Effect::Spur, combos, 2.6));
         }
     }
     let own: Vec<usize> = (0..model.lines.len())

@@ -1,7 +1,7 @@
 //! What is left after the last step: lines, and a mean that goes with the phase or with the code.
 
 use super::columns::{CHUNK, Model, Rows, chunks};
-use super::fit::residuals;
+use super::errors::residuals;
 use super::input::Capture;
 use super::spectrum::Spectrum;
 use crate::closure::likelihood::tail::chi_square_surprise;

@@ -1,7 +1,7 @@
 //! How many phase bits the oscillator's table is addressed with, if truncation shows in the codes.
 
+use super::around::LEAST_VARIANCE;
 use super::columns::Model;
-use super::fit::LEAST_VARIANCE;
 use super::input::Capture;
 use super::spectrum::Spectrum;
 use super::spur::ADDRESS_BITS;

@@ -89,15 +89,38 @@ pub fn strength(modes: &[f64], white: f64) -> (f64, f64) {
     best
 }
 
+/// Gain from which on a wander is seen: less than one in a thousand in white noise (half of chi-square with one
+/// degree of freedom, as the strength is not below 0).
+const SEEN: f64 = 4.8;
+
+/// The strength to be expected of a wander that is not seen, the modes given: none at all is as likely as some, and of
+/// that every order of magnitude from a tenth of the white noise up as likely as the others. The likeliest strength
+/// instead would be as large as the white noise in every third capture without a wander.
+fn expected_strength(modes: &[f64], white: f64) -> f64 {
+    let none = likelihood(modes, white, 0.0);
+    const STEPS: i32 = 27;
+    let (mut sum, mut all) = (0.0, 1.0);
+    for k in 0..STEPS {
+        let slow = white * f64::powf(10.0, -1.0 + 0.15 * f64::from(k));
+        let odds = (likelihood(modes, white, slow) - none).exp() / f64::from(STEPS);
+        sum += odds * slow;
+        all += odds;
+    }
+    sum / all
+}
+
 /// Variance of the mean coefficient from a wander. A 1/f noise that began a hundred records ago has 4 h in
 /// mode 0; a wander that is seen gets four times that, as few modes tell its strength.
 pub fn of_mean(series: &Series, column: usize) -> f64 {
     let (Some(values), Some(white)) = (series.values.get(column), series.white.get(column)) else {
         return 0.0;
     };
-    let (slow, gain) = strength(&modes(values), *white);
-    let factor = if gain > 3.0 { 16.0 } else { 4.0 };
-    factor * slow / values.len() as f64
+    let modes = modes(values);
+    let variance = match strength(&modes, *white) {
+        (slow, gain) if gain > SEEN => 16.0 * slow,
+        _ => 4.0 * expected_strength(&modes, *white),
+    };
+    variance / values.len() as f64
 }
 
 /// Columns with prior variances that stand for the wander of both channels' means.

@@ -112,9 +112,16 @@ pub fn chi_square_surprise(degrees: usize, x: f64) -> f64 {
     half - sum.ln()
 }
 
-/// exp(x^2) erfc(x) for x >= 0: the rational approximation of Numerical Recipes (relative error
-/// below 1.2e-7), whose exponent loses the -x^2.
+/// exp(x^2) erfc(x) for x >= 0.
 fn scaled_erfc(x: f64) -> f64 {
+    let (t, exponent) = erfc_parts(x);
+    t * exponent.exp()
+}
+
+/// Factor t and exponent e of erfc(x) = t exp(e - x^2) for x >= 0: the rational approximation of Numerical
+/// Recipes (relative error below 1.2e-7). Apart, as what follows differs in the last bits by where -x^2 is
+/// added.
+pub fn erfc_parts(x: f64) -> (f64, f64) {
     let t = 1.0 / (1.0 + 0.5 * x);
     let poly = [
         -1.265_512_23,
@@ -128,8 +135,7 @@ fn scaled_erfc(x: f64) -> f64 {
         -0.822_152_23,
         0.170_872_77,
     ];
-    let exponent = poly.iter().rev().fold(0.0, |s, c| s * t + c);
-    t * exponent.exp()
+    (t, poly.iter().rev().fold(0.0, |s, c| s * t + c))
 }
 
 #[cfg(test)]

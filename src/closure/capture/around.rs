@@ -1,0 +1,182 @@
+//! What is known of a capture around a model, whatever effects it has: a fit with every freedom that goes with
+//! the phase or the code, its residuals and their noise, the tones as they are; and the lines in these residuals.
+
+use super::candidates::{Known, base_ridge};
+use super::columns::{COS, HARMONICS, LINES, Model, ONE, SIN, TRUNCATED, harmonic, line};
+use super::errors::residuals;
+use super::gram::{Combo, Detail, Gram, solve, spread};
+use super::input::{Capture, Part};
+use super::spectrum::{self, Spectrum};
+use super::wander::{self, Series};
+use super::{mains, nonlinearity};
+use crate::closure::likelihood::tail::chi_square_surprise;
+
+/// Least variance of a channel's noise, codes squared: nearly that of an ideal quantiser's error, whose
+/// pattern is not white without noise.
+pub const LEAST_VARIANCE: f64 = 0.07;
+
+/// A generous description of all that goes with the phase, and of the lines known so far; tables of both
+/// channels come last, [`TABLES`] columns.
+pub fn generous(base: &[Combo], model: &Model) -> Vec<Combo> {
+    let mut out = base.to_vec();
+    for channel in 0..2 {
+        let mut one = |k: usize| out.push(Combo::one("", channel, k));
+        [ONE, SIN, COS].into_iter().for_each(&mut one);
+        for k in 2..=HARMONICS {
+            let (sin, cos) = harmonic(k);
+            one(sin);
+            one(cos);
+        }
+        for i in 0..model.lines.len() {
+            let (sin, cos) = line(i);
+            one(sin);
+            one(cos);
+        }
+        if model.truncation.is_some() {
+            one(TRUNCATED);
+            one(TRUNCATED + 1);
+        }
+    }
+    for channel in 0..2 {
+        out.extend(nonlinearity::table(model, 4, &[channel]));
+    }
+    out
+}
+
+/// Columns of the tables in a generous description.
+pub const TABLES: usize = 66;
+
+/// What is known of the noise and of the tones, around a model.
+pub struct Around {
+    /// Of the generous fit, all rows.
+    pub residuals: [Vec<f64>; 2],
+    /// The same, 0 in held-out rows.
+    pub training: [Vec<f64>; 2],
+    /// Sine and cosine of both tones as they are in the codes.
+    pub free: [[f64; 2]; 2],
+    /// Variances of both channels' white noise, codes squared.
+    pub noise: [f64; 2],
+}
+
+impl Around {
+    /// Of the training rows' residuals.
+    pub fn spectrum(&self, capture: &Capture) -> Spectrum {
+        let [drive, sense] = &self.training;
+        Spectrum::of([drive, sense], capture.training_rows())
+    }
+}
+
+/// Fits the generous description; with `neutral` the quantiser's steps go to where it puts the signal.
+pub fn around(capture: &Capture, model: &mut Model, base: &[Combo], neutral: bool) -> Around {
+    let gram = Gram::of(capture, model);
+    let combos = generous(base, model);
+    let combos: Vec<&Combo> = combos.iter().collect();
+    let mut ridge = base_ridge(base);
+    ridge.resize(combos.len(), 0.0);
+    let solved = solve(gram.all(), &combos, &ridge, Detail::All);
+    let coefficients = spread(&combos, &solved);
+    // Tables contain the tone: what it is comes from the fit without them.
+    let few = combos.len().saturating_sub(TABLES);
+    let (fewer, less) = (combos.get(..few), ridge.get(..few));
+    let fewer = fewer.unwrap_or_default();
+    let without = solve(gram.all(), fewer, less.unwrap_or_default(), Detail::All);
+    let plain = spread(fewer, &without);
+    let mut free = model.declared;
+    for (free, coefficients) in free.iter_mut().zip(&plain) {
+        for (value, column) in free.iter_mut().zip([SIN, COS]) {
+            *value += coefficients.get(column).copied().unwrap_or(0.0);
+        }
+    }
+    let residuals = residuals(capture, model, &coefficients, true);
+    if neutral {
+        // Without the tables, unless they are needed: where the codes are is then known better.
+        let needed = solved.gain - without.gain > 2.0 * TABLES as f64;
+        model.neutral = if needed { coefficients } else { plain };
+    }
+    let mut training = residuals.clone();
+    for segment in capture.segments.iter().filter(|s| s.part == Part::HeldOut) {
+        for channel in &mut training {
+            if let Some(rows) = channel.get_mut(segment.rows.clone()) {
+                rows.fill(0.0);
+            }
+        }
+    }
+    let mut seen = Around {
+        residuals,
+        training,
+        free,
+        noise: [0.0; 2],
+    };
+    let spectrum = seen.spectrum(capture);
+    seen.noise = [0, 1].map(|c: usize| spectrum.variance(c).max(LEAST_VARIANCE));
+    seen
+}
+
+/// Looks for new lines; true if any was added. Besides the strongest, those are taken that are no sidelobe
+/// of a stronger one.
+pub fn add_lines(capture: &Capture, model: &mut Model, around: &Around) -> bool {
+    let rows = capture.rows() as f64;
+    let spectrum = around.spectrum(capture);
+    let [drive, sense] = &around.training;
+    let before = model.lines.len();
+    let mut stronger: Vec<spectrum::Line> = Vec::new();
+    for line in spectrum.lines(&model.tone, 12, 3.0, [LEAST_VARIANCE; 2]) {
+        if model.lines.len() >= LINES {
+            break;
+        }
+        // A line that is known is not found again: its rest is the frequency's error.
+        let known = model
+            .lines
+            .iter()
+            .any(|t| (t - line.turns).abs() * rows < 1.0);
+        let sidelobe = stronger.iter().any(|s| {
+            let apart = (s.turns - line.turns) * rows;
+            apart.abs() < 8.0 || line.surprise * apart * apart < 4.0 * s.surprise
+        });
+        if !known && !sidelobe {
+            let turns = spectrum::refine([drive, sense], around.noise, line.turns);
+            model.lines.push(turns);
+            stronger.push(line);
+        }
+    }
+    model.lines.len() > before
+}
+
+/// Periods in the capture below which a line is slow: the spectrum's floor there is made of its own skirts.
+const SLOW_PERIODS: f64 = 12.0;
+
+/// Sine and cosine in both channels at one of two frequencies: less than one in a thousand by chance.
+fn is_sure(gain: f64) -> bool {
+    chi_square_surprise(4, 2.0 * gain) > 1000f64.ln() + 2f64.ln()
+}
+
+/// Adds the mains' own frequencies where they are too slow for the spectrum.
+pub fn add_slow_mains(
+    capture: &Capture,
+    known: &Known,
+    model: &mut Model,
+    series: &[Option<Series>; 2],
+) {
+    let Some(fs) = known.fs_hz else { return };
+    let rows = capture.rows();
+    let mut best: Option<(f64, f64)> = None;
+    for hz in mains::MAINS_HZ {
+        let turns = hz / fs;
+        let periods = turns * rows as f64;
+        let is_new = model
+            .lines
+            .iter()
+            .all(|t| (t - turns).abs() * rows as f64 > 0.7);
+        if (0.1..SLOW_PERIODS).contains(&periods) && is_new {
+            let gain = wander::slow_line_gain(series, rows, turns);
+            if is_sure(gain) && best.is_none_or(|b| gain > b.0) {
+                best = Some((gain, turns));
+            }
+        }
+    }
+    if let Some((_, turns)) = best
+        && model.lines.len() < LINES
+    {
+        model.lines.push(turns);
+    }
+}

@@ -1,0 +1,79 @@
+//! Where the quantiser's steps are, for a channel whose noise was added after rounding, or is too small to hide them.
+
+use super::around::{TABLES, generous};
+use super::candidates::{Variant, base_ridge};
+use super::columns::{Model, SAW, WAVE};
+use super::gram::{Combo, Detail, Gram, Summed, solve, spread};
+use super::input::Capture;
+use super::search::combos_of;
+
+/// Training rows from which the steps' places are found, at most (about).
+const ROWS: usize = 100_000;
+/// Share of the quantiser's own error from which on it shows.
+const LEAST_SAW: f64 = 0.3;
+/// The same of its smoothed wave, codes: what 0.3 codes of noise leave of it.
+const LEAST_WAVE: f64 = 0.05;
+
+/// Whether the quantiser's error shows undithered in a channel: the place of the steps then matters.
+pub fn is_sharp(coefficients: &[Vec<f64>; 2], model: &Model) -> bool {
+    coefficients.iter().zip(model.variance.base).any(|(c, v)| {
+        let at = |k: usize| c.get(k).copied().unwrap_or(0.0).abs();
+        v < 16.0 && (at(SAW) > LEAST_SAW || at(WAVE) > LEAST_WAVE)
+    })
+}
+
+/// Whether a channel's noise was added after rounding, as far as these coefficients tell.
+pub fn is_undithered(coefficients: &[f64]) -> bool {
+    coefficients.get(SAW).is_some_and(|b| b.abs() > LEAST_SAW)
+}
+
+/// Finds where the codes are before anything is chosen, where the quantiser's error shows undithered: of
+/// descriptions of growing freedom, each with the steps at its own signal, the one that gains most.
+pub fn find_steps(capture: &Capture, model: &mut Model, base: &[Combo]) {
+    if !is_sharp(&model.neutral, model) && !is_sharp(&model.coefficients, model) {
+        return;
+    }
+    let all = generous(base, model);
+    let stride = capture.training_rows().div_ceil(ROWS).max(1);
+    let ridge = base_ridge(base);
+    let mut best: Option<(f64, [Vec<f64>; 2])> = None;
+    for count in [base.len(), all.len().saturating_sub(TABLES), all.len()] {
+        let combos: Vec<&Combo> = all.iter().take(count).collect();
+        let summed = Summed::of(&combos, stride);
+        let mut ridge = ridge.clone();
+        ridge.resize(combos.len(), 0.0);
+        let mut trial = model.clone();
+        trial.neutral.clone_from(&model.coefficients);
+        let mut gain = 0.0;
+        for _ in 0..4 {
+            let gram = Gram::over(capture, &trial, &summed);
+            let solved = solve(gram.all(), &combos, &ridge, Detail::All);
+            trial.neutral = spread(&combos, &solved);
+            gain = solved.gain - 2.0 * solved.rank as f64;
+        }
+        if best.as_ref().is_none_or(|b| gain > b.0) {
+            best = Some((gain, trial.neutral));
+        }
+    }
+    if let Some((_, neutral)) = best {
+        model.neutral = neutral;
+    }
+}
+
+/// Fits a set again until the quantiser's steps are where its own signal puts them.
+pub fn settle(
+    capture: &Capture,
+    model: &mut Model,
+    base: &[Combo],
+    nuisance: &[(Combo, f64)],
+    variants: &[Variant],
+    set: &[usize],
+) {
+    for _ in 0..2 {
+        let (combos, ridge) = combos_of(base, nuisance, variants, set);
+        let gram = Gram::over(capture, model, &Summed::of(&combos, 1));
+        let solved = solve(gram.all(), &combos, &ridge, Detail::All);
+        model.coefficients = spread(&combos, &solved);
+        model.neutral.clone_from(&model.coefficients);
+    }
+}
