@@ -137,7 +137,7 @@ impl Controls {
             .collect();
         (!named.is_empty()).then(|| {
             format!(
-                "negative control: {} of {} columns without meaning get a name, {}: a name is no evidence in this record",
+                "negative control: {} of {} columns without meaning get a name, {}: chance does that in about one record of 100; otherwise a name is no evidence in this one",
                 named.len(),
                 self.negative.fakes.len(),
                 named.join(", ")
