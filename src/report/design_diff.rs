@@ -7,8 +7,8 @@ use similar::{DiffOp, TextDiff};
 const CONTEXT: usize = 3;
 
 /// From how many lines on a run of added ones is folded on a page, and how many of each end it shows.
-const LONG: usize = 14;
-const SHOWN: usize = 4;
+const LONG: usize = 40;
+const SHOWN: usize = 10;
 
 /// Characters of a line that a page shows.
 const WIDEST: usize = 160;
@@ -158,14 +158,14 @@ mod tests {
 
     #[test]
     fn long_runs_and_long_lines_are_folded_on_the_page_alone() {
-        let run: String = (0..20).map(|k| format!("{k}\n")).collect();
+        let run: String = (0..60).map(|k| format!("{k}\n")).collect();
         let wide = "x".repeat(500);
         let d = DesignDiff::between("x", "a\n", &format!("a\n{run}b {wide}\n"));
-        assert_eq!(d.added, 21);
+        assert_eq!(d.added, 61);
         assert!(d.unified.contains("+10\n") && d.unified.contains(&wide));
         let lines = d.lines();
         let texts: Vec<&str> = lines.iter().map(|l| l.text.as_str()).collect();
-        assert!(texts.contains(&"… 13 lines") && texts.contains(&"+3") && !texts.contains(&"+4"));
+        assert!(texts.contains(&"… 41 lines") && texts.contains(&"+9") && !texts.contains(&"+10"));
         assert_eq!(
             lines.iter().filter(|l| l.class == "added").count(),
             2 * SHOWN
