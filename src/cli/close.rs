@@ -13,6 +13,9 @@ use crate::emit::files::EmittedFile;
 use crate::emit::views::Language;
 use crate::error::{Error, Result};
 use crate::record::{ThermalRecord, Warning};
+use crate::report::closure::Beside;
+use crate::report::design_diff::DesignDiff;
+use crate::selftest::controls::Controls;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
@@ -33,6 +36,10 @@ pub struct Arguments {
     /// compares every word with the model.
     #[arg(long, conflicts_with_all = ["capture", "self_test"])]
     verify: bool,
+    /// Closes the record again with columns that mean nothing, and with effects planted in what is left: which of
+    /// them get a name.
+    #[arg(long, conflicts_with_all = ["capture", "self_test"])]
+    controls: bool,
     /// Design file; the embedded default if left out.
     #[arg(long)]
     pub(super) design: Option<PathBuf>,
@@ -53,8 +60,8 @@ const FOLDER: &str = "gyrogen-close";
 /// Runs the command.
 ///
 /// # Errors
-/// An unusable design or record; with `--verify` no compiler (exit 2); emitted code that differs from the model
-/// (exit 1).
+/// An unusable design or record; with `--verify` no compiler (exit 2); emitted code that differs from the model,
+/// and with `--controls` a name for a column without meaning (exit 1).
 pub fn run(arguments: &Arguments) -> Result<()> {
     let design = super::design(arguments.design.as_deref())?;
     if arguments.self_test {
@@ -72,12 +79,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         command
     };
     let out = arguments.out.as_deref().unwrap_or(Path::new(FOLDER));
-    let (closure, compared) = if let Some(path) = &arguments.capture {
+    let (closure, compared, controls) = if let Some(path) = &arguments.capture {
         let closed = capture::close(path, &design, &called("capture", path))?;
         let page = crate::report::capture::html(&closed, &file_name(path))?;
         super::make_folder(out)?;
         crate::output::write_whole(&out.join("report.html"), page.as_bytes())?;
-        (closed.closure, None)
+        (closed.closure, None, None)
     } else if let Some(path) = &arguments.record {
         let command = called("record", path);
         let (record, warnings) = crate::record::read_any(path, &design.record)?;
@@ -88,31 +95,58 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         } else {
             None
         };
-        write(&closed, path, &design, &sources, compared.as_ref(), out)?;
-        (closed.closure, compared)
+        let controls = if arguments.controls {
+            Some(super::controls::run(&closed, &record, &design)?)
+        } else {
+            None
+        };
+        let beside = Beside {
+            emitted: compared.as_ref(),
+            controls: controls.as_ref(),
+            diff: None,
+        };
+        write(&closed, path, &design, &sources, beside, out)?;
+        (closed.closure, compared, controls)
     } else {
         return Ok(());
     };
-    let json = super::json(&Told {
-        closure: &closure,
-        emitted: compared.as_ref(),
+    let json = super::json(&All {
+        told: Told {
+            closure: &closure,
+            emitted: compared.as_ref(),
+        },
+        controls: controls.as_ref(),
     });
     crate::output::write_whole(&out.join("closure.json"), json.as_bytes())?;
     match arguments.format {
         OutputFormat::Json => say!("{}", json.trim_end()),
-        OutputFormat::Text => print(&closure, compared.as_ref(), out),
+        OutputFormat::Text => print(&closure, compared.as_ref(), controls.as_ref(), out),
     }
     for warning in &closure.warnings {
         eprintln!("warning: {} [{}]", warning.message, warning.code);
     }
     let differences = compared.map_or(Vec::new(), |c| c.differences());
-    if differences.is_empty() {
+    let mut failures = Vec::new();
+    if !differences.is_empty() {
+        failures.push(format!(
+            "the emitted code is not the model: {}",
+            differences.join("; ")
+        ));
+    }
+    failures.extend(controls.and_then(|c| c.failure()));
+    if failures.is_empty() {
         return Ok(());
     }
-    Err(Error::Check(format!(
-        "the emitted code is not the model: {}",
-        differences.join("; ")
-    )))
+    Err(Error::Check(failures.join("; ")))
+}
+
+/// `closure.json` with what was asked for beside it.
+#[derive(serde::Serialize)]
+struct All<'a> {
+    #[serde(flatten)]
+    told: Told<'a>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    controls: Option<&'a Controls>,
 }
 
 fn file_name(path: &Path) -> std::borrow::Cow<'_, str> {
@@ -154,24 +188,32 @@ fn compared(
     Ok(None)
 }
 
-/// The report, and the correction's sources where there is one.
+/// The report, and where there is a correction its sources and the design with it, beside what that changes.
 fn write(
     closed: &Closed,
     path: &Path,
     design: &Design,
     sources: &Option<[Vec<EmittedFile>; 2]>,
-    compared: Option<&Emitted>,
+    beside: Beside<'_>,
     out: &Path,
 ) -> Result<()> {
-    let page = crate::report::closure::html_compared(closed, compared, &file_name(path))?;
-    super::make_folder(out)?;
-    if let Some(correction) = &closed.correction {
+    let augmented = closed.correction.as_ref().map(|correction| {
         let planned = Planned {
             plan: correction.plan.clone(),
             noise_dps: correction.formats.noise_dps,
         };
         let text = crate::job::fitted_design::with_correction(design, &planned);
+        (DesignDiff::of(design, &text), text)
+    });
+    let beside = Beside {
+        diff: augmented.as_ref().map(|(diff, _)| diff),
+        ..beside
+    };
+    let page = crate::report::closure::html_beside(closed, &beside, &file_name(path))?;
+    super::make_folder(out)?;
+    if let Some((diff, text)) = &augmented {
         crate::output::write_whole(&out.join("design.toml"), text.as_bytes())?;
+        crate::output::write_whole(&out.join("design.diff"), diff.unified.as_bytes())?;
     }
     for (files, folder) in sources
         .iter()
@@ -180,10 +222,16 @@ fn write(
     {
         crate::emit::files::write(files, &out.join(folder))?;
     }
-    crate::output::write_whole(&out.join("report.html"), page.as_bytes())
+    crate::output::write_whole(&out.join("report.html"), page.as_bytes())?;
+    if let Some((diff, _)) = &augmented
+        && std::io::stderr().is_terminal()
+    {
+        eprintln!("{}", diff.sentence());
+    }
+    Ok(())
 }
 
-fn print(c: &Closure, compared: Option<&Emitted>, out: &Path) {
+fn print(c: &Closure, compared: Option<&Emitted>, controls: Option<&Controls>, out: &Path) {
     if !c.steps.is_empty() {
         let mut table = super::table(&["step", "parameters", "held-out rms", "p", "like it"]);
         for s in &c.steps {
@@ -225,6 +273,9 @@ fn print(c: &Closure, compared: Option<&Emitted>, out: &Path) {
     if let Some(compared) = compared {
         say!("{}", super::comparison_table(&compared.functions));
         say!("emitted C and Rust: {}", compared.sentence());
+    }
+    if let Some(controls) = controls {
+        super::controls::print(controls);
     }
     say!("wrote {} ({:.1} s)", out.display(), c.seconds);
 }

@@ -15,6 +15,7 @@ macro_rules! say {
 mod alternatives;
 mod approx;
 mod close;
+mod controls;
 mod emit;
 mod equiv;
 mod init;

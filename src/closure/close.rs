@@ -33,7 +33,7 @@ pub struct Closed {
 }
 
 /// The effects that the design's user suspects, for a record.
-fn own_candidates(
+pub(crate) fn own_candidates(
     design: &Design,
     channels: &Channels,
     warnings: &mut Vec<Warning>,

@@ -2,11 +2,12 @@
 //!
 //! [`page`] and [`tables`] turn an outcome into what the template prints, [`figures`] draws it on
 //! what [`scene`] prepares, [`svg`] with [`axis`] is the plot writer under the figures, [`text`]
-//! formats numbers; [`simulation`] is the page of `simulate`, [`closure`] that of `close`, [`capture`] that of `close --capture`, [`selftest`] that of its self-test. Colours and layout are in `templates/report/`.
+//! formats numbers; [`simulation`] is the page of `simulate`, [`closure`] that of `close`, [`capture`] that of `close --capture`, [`design_diff`] what a closure changes in the design, [`selftest`] that of its self-test. Colours and layout are in `templates/report/`.
 
 pub mod axis;
 pub mod capture;
 pub mod closure;
+pub mod design_diff;
 pub mod figures;
 pub mod page;
 pub mod scene;

@@ -3,9 +3,11 @@
 //! Effects of several sizes are planted in records, by the physics of [`crate::plant`], and closed like any other
 //! record. The experiments are simulated ([`programs`]) or those of the user's own record ([`from_record`]); what is
 //! planted is in [`planted`], how rows come about in [`scene`], one record in [`trial`], what the counts say in
-//! [`statistics`] and `score`, the result in [`outcome`]. Beside the command line this is the only place, with `cosim` and
+//! [`statistics`] and `score`, the result in [`outcome`]. [`controls`] (with [`fakes`]) are those of one closing. Beside the command line this is the only place, with `cosim` and
 //! `simulation`, that knows both the plant and what is under test.
 
+pub mod controls;
+pub mod fakes;
 pub mod from_record;
 pub mod outcome;
 pub mod planted;

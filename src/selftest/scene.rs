@@ -4,7 +4,9 @@ use crate::closure::likelihood::noise::NoiseModel;
 use crate::design::Effects;
 use crate::plant::effects::{self, Instant, StressJump};
 use crate::plant::resonator::{Resonator, Response};
+use crate::record::ThermalRecord;
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 /// An experiment without any undeclared effect and without noise.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,6 +71,17 @@ impl Scene {
         match (self.time_s.first(), self.time_s.last()) {
             (Some(a), Some(b)) => b - a,
             _ => 0.0,
+        }
+    }
+
+    /// A record of the experiment's times with these columns.
+    pub fn record(&self, columns: BTreeMap<String, Vec<f64>>) -> ThermalRecord {
+        ThermalRecord {
+            source: PathBuf::from("self-test"),
+            time_s: self.time_s.clone(),
+            columns,
+            lines: (2..self.len() + 2).collect(),
+            renamed: Default::default(),
         }
     }
 

@@ -94,7 +94,7 @@ fn by_size(times_noise: f64, marks: &[Mark]) -> BySize {
 }
 
 /// Wrong names with how often they came, the most frequent first.
-fn counted(marks: &[Mark]) -> Vec<(String, usize)> {
+pub(super) fn counted(marks: &[Mark]) -> Vec<(String, usize)> {
     let mut counts: BTreeMap<&String, usize> = BTreeMap::new();
     for mark in marks {
         if let Mark::Closed { wrong, .. } = mark {

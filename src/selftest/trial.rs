@@ -8,7 +8,6 @@ use crate::error::Result;
 use crate::plant::noise::Noise;
 use crate::plant::slow_noise::SlowNoise;
 use crate::record::ThermalRecord;
-use std::path::PathBuf;
 
 /// What gives a record its names.
 pub type Answer<'a> = &'a (dyn Fn(&ThermalRecord) -> Result<Vec<Named>> + Sync);
@@ -93,6 +92,24 @@ pub enum Mark {
     },
 }
 
+impl Mark {
+    /// Of the names that a record got in which `id` is planted with a size (`None`: nothing is).
+    pub fn of(id: Option<String>, names: &[Named], size: f64) -> Mark {
+        let is = |name: &String| id.as_ref() == Some(name);
+        let lists = |n: &Named| n.rivals.iter().any(is);
+        Mark::Closed {
+            is_named: names.iter().any(|n| is(&n.effect)),
+            is_listed: names.iter().any(lists),
+            wrong: names
+                .iter()
+                .filter(|n| !is(&n.effect) && !lists(n))
+                .map(|n| n.effect.clone())
+                .collect(),
+            size,
+        }
+    }
+}
+
 impl Trial<'_> {
     /// Makes the record and closes it.
     ///
@@ -111,19 +128,7 @@ impl Trial<'_> {
             }
         };
         let names = answer(&self.record(&plant, seed))?;
-        let id = self.planted.map(|p| p.0.id());
-        let is = |name: &String| id.as_ref() == Some(name);
-        let lists = |n: &Named| n.rivals.iter().any(is);
-        Ok(Mark::Closed {
-            is_named: names.iter().any(|n| is(&n.effect)),
-            is_listed: names.iter().any(lists),
-            wrong: names
-                .iter()
-                .filter(|n| !is(&n.effect) && !lists(n))
-                .map(|n| n.effect.clone())
-                .collect(),
-            size,
-        })
+        Ok(Mark::of(self.planted.map(|p| p.0.id()), &names, size))
     }
 
     /// The rows with the plant and with noise.
@@ -152,19 +157,14 @@ impl Trial<'_> {
             })
             .collect();
         columns.insert("rate_out_dps".to_owned(), output);
+        let mut record = scene.record(columns);
         if scene.reading_rms > 0.0
-            && let Some(reading) = columns.get_mut(&scene.thermometer)
+            && let Some(reading) = record.columns.get_mut(&scene.thermometer)
         {
             for (k, v) in (rows..).zip(reading) {
                 *v += scene.reading_rms * own.normal(k);
             }
         }
-        ThermalRecord {
-            source: PathBuf::from("self-test"),
-            time_s: scene.time_s.clone(),
-            columns,
-            lines: (2..scene.len() + 2).collect(),
-            renamed: Default::default(),
-        }
+        record
     }
 }

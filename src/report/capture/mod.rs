@@ -29,6 +29,8 @@ pub fn html(closed: &Closed, name: &str) -> Result<String> {
         steps: words::steps(&closed.closure),
         figures: figures::all(&view),
         emitted: None,
+        diff: None,
+        controls: None,
         last: None,
         provenance: words::provenance(closed),
     };

@@ -1,10 +1,12 @@
 //! The page of a closure: verdict, steps, residuals, evidence.
 //!
 //! [`tables`] puts the closure into words, [`figures`] draws on what [`view`] prepares: residuals, and each step's
-//! [`contribution`] against the channel that [`curve`] chooses; [`allan`] is the Allan deviation.
+//! [`contribution`] against the channel that [`curve`] chooses; [`allan`] is the Allan deviation,
+//! [`controls`] are those of `--controls` in words.
 
 pub mod allan;
 pub mod contribution;
+pub mod controls;
 pub mod curve;
 pub mod figures;
 pub mod tables;
@@ -13,6 +15,7 @@ pub mod view;
 #[cfg(test)]
 mod page_tests;
 
+use super::design_diff::{DesignDiff, Line};
 use super::figures::Figure;
 use super::page::Equivalent;
 use super::text::grouped;
@@ -20,6 +23,7 @@ use crate::closure::close::Closed;
 use crate::closure::firmware::emitted::Emitted;
 use crate::closure::verdict::{Closure, Verdict};
 use crate::error::{InputError, Result};
+use crate::selftest::controls::Controls;
 use askama::Template;
 use tables::{TakenStep, Told};
 use view::View;
@@ -54,10 +58,34 @@ pub struct Own {
     pub figures: Vec<Figure>,
     /// After the figures.
     pub emitted: Option<Comparison>,
+    /// What the closure changes in the design.
+    pub diff: Option<Changes>,
+    /// What names and silence are worth.
+    pub controls: Option<controls::Shown>,
     /// After the evidence.
     pub last: Option<Figure>,
     /// Name and value.
     pub provenance: Vec<[String; 2]>,
+}
+
+/// What was asked for beside the closure.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Beside<'a> {
+    /// Emitted code against the model.
+    pub emitted: Option<&'a Emitted>,
+    /// Controls.
+    pub controls: Option<&'a Controls>,
+    /// The design with the correction beside that without.
+    pub diff: Option<&'a DesignDiff>,
+}
+
+/// What the closure changes in the design.
+#[derive(Debug)]
+pub struct Changes {
+    /// How much.
+    sentence: String,
+    /// The diff.
+    lines: Vec<Line>,
 }
 
 /// Emitted code against the model.
@@ -92,14 +120,14 @@ impl Comparison {
 /// # Errors
 /// A page that cannot be rendered, which would be a fault of this program.
 pub fn html(closed: &Closed, name: &str) -> Result<String> {
-    html_compared(closed, None, name)
+    html_beside(closed, &Beside::default(), name)
 }
 
-/// The same with the comparison of emitted code and model, if there was one.
+/// The same with what was asked for beside.
 ///
 /// # Errors
 /// As [`html`].
-pub fn html_compared(closed: &Closed, compared: Option<&Emitted>, name: &str) -> Result<String> {
+pub fn html_beside(closed: &Closed, beside: &Beside<'_>, name: &str) -> Result<String> {
     let c = &closed.closure;
     let view = View::new(closed);
     let lead = format!(
@@ -114,7 +142,12 @@ pub fn html_compared(closed: &Closed, compared: Option<&Emitted>, name: &str) ->
         lead,
         steps: tables::steps(closed),
         figures: figures::all(&view),
-        emitted: compared.map(Comparison::of),
+        emitted: beside.emitted.map(Comparison::of),
+        diff: beside.diff.map(|diff| Changes {
+            sentence: diff.sentence(),
+            lines: diff.lines(),
+        }),
+        controls: beside.controls.map(controls::Shown::of),
         last: Some(figures::allan_deviation(&view)),
         provenance: tables::provenance(closed),
     };

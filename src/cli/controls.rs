@@ -1,0 +1,57 @@
+//! `gyrogen close --controls`: what a name, and what silence is worth in this record.
+
+use crate::closure::close::Closed;
+use crate::design::Design;
+use crate::error::Result;
+use crate::record::ThermalRecord;
+use crate::report::closure::controls as words;
+use crate::selftest::controls::{self, Controls};
+use std::io::IsTerminal;
+use std::sync::Mutex;
+
+/// Controls of a closed record, with progress on a terminal.
+///
+/// # Errors
+/// A record that cannot be closed with what is added.
+pub fn run(closed: &Closed, record: &ThermalRecord, design: &Design) -> Result<Controls> {
+    let bar: Mutex<Option<indicatif::ProgressBar>> = Mutex::new(None);
+    let loud = std::io::stderr().is_terminal();
+    let progress = |done: usize, total: usize| {
+        if let Ok(mut bar) = bar.lock()
+            && loud
+        {
+            let bar = bar.get_or_insert_with(|| indicatif::ProgressBar::new(total as u64));
+            bar.set_position(done as u64);
+        }
+    };
+    let out = controls::run(closed, record, design, super::threads(None), &progress);
+    if let Ok(Some(bar)) = bar.into_inner() {
+        bar.finish_and_clear();
+    }
+    out
+}
+
+/// The tables.
+pub fn print(c: &Controls) {
+    let mut table = super::table(&["fake column", "spectrum of", "p", "p beside", "control"]);
+    for fake in &c.negative.fakes {
+        table.add_row(words::fake(fake));
+    }
+    say!("{table}");
+    say!("negative control: {}", words::negative(c));
+    if !c.positive.is_empty() {
+        let mut table = super::table(&[
+            "planted",
+            "90 % from",
+            "planted x",
+            "which is",
+            "named",
+            "other names",
+        ]);
+        for planted in &c.positive {
+            table.add_row(words::planted(planted));
+        }
+        say!("{table}");
+    }
+    say!("positive control: {}", words::positive(c));
+}
