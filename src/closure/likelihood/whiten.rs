@@ -268,9 +268,10 @@ fn total<const N: usize>(m: &[[f64; LANES]; N]) -> [f64; LANES] {
     let mut count = N;
     while count > 1 {
         let half = count.div_ceil(2);
-        for k in half..count {
-            for lane in 0..LANES {
-                sums[k - half][lane] += sums[k][lane];
+        let (low, high) = sums.split_at_mut(half);
+        for (low, high) in low.iter_mut().zip(&high[..count - half]) {
+            for (low, high) in low.iter_mut().zip(high) {
+                *low += high;
             }
         }
         count = half;

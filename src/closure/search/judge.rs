@@ -91,8 +91,10 @@ impl Search<'_> {
         let mut missing = Vec::new();
         let mut running: Running = Vec::new();
         let taken: Vec<String> = model.terms.iter().map(|t| t.id()).collect();
+        let barred = self.barred.borrow();
+        let is_out = |id: String| taken.contains(&id) || barred.contains(&id);
         for candidate in &self.candidates {
-            if taken.contains(&candidate.id()) {
+            if is_out(candidate.id()) {
                 continue;
             }
             match candidate.channels(c) {
@@ -120,7 +122,7 @@ impl Search<'_> {
                 frequency_hz: tone.frequency_hz,
                 further: taken.iter().any(|id| id == "periodic_pickup"),
             });
-            if !taken.contains(&pickup.id()) {
+            if !is_out(pickup.id()) {
                 let points = pickup.points(c);
                 running.push((pickup, points));
             }

@@ -37,6 +37,11 @@ impl<T: Clone> Memo<T> {
         entries.iter().find(|e| e.0 == key).map(|e| e.1.clone())
     }
 
+    /// Forgets all.
+    pub fn clear(&self) {
+        self.entries.borrow_mut().clear();
+    }
+
     /// Keeps a result, in place of the oldest.
     pub fn keep(&self, terms: &[Term], value: T) {
         let key = key(terms);
@@ -46,5 +51,50 @@ impl<T: Clone> Memo<T> {
             entries.pop_front();
         }
         entries.push_back((key, value));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn term(id: &str, theta: f64) -> Term {
+        use crate::closure::effects::Candidate;
+        use crate::closure::effects::tone::Pickup;
+        Term {
+            candidate: std::sync::Arc::new(Pickup {
+                frequency_hz: theta,
+                further: id == "outside:tone",
+            }) as std::sync::Arc<dyn Candidate>,
+            point: Point::at(0, &[theta]),
+            p_value: 1.0,
+            rivals: Vec::new(),
+            gain: 0.0,
+            beside: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn results_belong_to_their_terms_and_the_oldest_go_first() {
+        let memo = Memo::default();
+        let terms = |k: usize| vec![term("periodic_pickup", k as f64)];
+        for k in 0..KEPT + 1 {
+            memo.keep(&terms(k), k);
+        }
+        assert_eq!(memo.get(&terms(0)), None);
+        assert_eq!(memo.get(&terms(1)), Some(1));
+        memo.keep(&terms(1), 100);
+        assert_eq!(memo.get(&terms(1)), Some(100));
+        // Kept again: the next to go is another one.
+        memo.keep(&terms(50), 50);
+        assert_eq!(
+            (memo.get(&terms(1)), memo.get(&terms(2))),
+            (Some(100), None)
+        );
+        // Another id, another shape, another length: other terms.
+        assert_eq!(memo.get(&[term("outside:tone", 3.0)]), None);
+        assert_eq!(memo.get(&[]), None);
+        memo.clear();
+        assert_eq!(memo.get(&terms(1)), None);
     }
 }

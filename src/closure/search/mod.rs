@@ -29,6 +29,7 @@ use super::likelihood::linear::{Basis, add_scaled, dot};
 use super::likelihood::reml::{self, Fit};
 use judge::{Judged, Round};
 use memo::Memo;
+use std::cell::RefCell;
 use std::sync::Arc;
 
 /// How hard to search.
@@ -147,6 +148,7 @@ pub struct Search<'a> {
     candidates: Vec<Arc<dyn Candidate>>,
     models: Memo<Arc<Model>>,
     rounds: Memo<Arc<Round>>,
+    barred: RefCell<Vec<String>>,
 }
 
 /// The regressors of the declared model: 1, u, u^2.
@@ -180,7 +182,14 @@ impl<'a> Search<'a> {
             candidates,
             models: Memo::default(),
             rounds: Memo::default(),
+            barred: RefCell::default(),
         }
+    }
+
+    /// Never again a candidate: it was taken and did not hold. Rounds with it are forgotten.
+    fn bar(&self, id: String) {
+        self.barred.borrow_mut().push(id);
+        self.rounds.clear();
     }
 
     /// All candidates but tones, named or not.

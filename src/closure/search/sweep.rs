@@ -275,6 +275,7 @@ impl Search<'_> {
                     k += 1;
                 }
                 None => {
+                    self.bar(own.id());
                     model = without;
                     k = 0;
                 }

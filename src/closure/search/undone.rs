@@ -16,14 +16,14 @@ const STRANGERS: f64 = 0.5;
 const ALL: f64 = 0.1;
 
 impl Search<'_> {
-    /// The model without names of which the other terms leave next to nothing.
+    /// The model without names of which the other terms leave next to nothing; these are barred.
     ///
     /// # Errors
     /// Too few rows.
     pub fn without_undone(&self, mut model: Model) -> Result<Model, Unusable> {
         while let Some(k) = self.undone(&model) {
             let mut terms = model.terms.clone();
-            terms.remove(k);
+            self.bar(terms.remove(k).id());
             model = self.model(&terms)?;
         }
         Ok(model)
