@@ -105,8 +105,8 @@ fn single_effects_are_named() {
         "{} singles: first {first:.3}, with more {extra:.3}",
         marks.len()
     );
-    // What stands today (0.96 of 53), so that it does not fall unseen. To reach: 0.98. Other seeds that were looked
-    // at once (set 91, 70 captures): first 0.91, with more 0.014.
+    // What stands today (0.98 of 53), so that it does not fall unseen. To reach: 0.98. Other seeds that were looked
+    // at once (set 137, 55 captures): first 0.945, with more 0.036.
     assert!(first >= 0.93 && extra <= 0.03, "{first} {extra}");
 }
 

@@ -4,7 +4,7 @@
 use super::candidates::{Known, base_ridge};
 use super::columns::{COS, HARMONICS, LINES, Model, ONE, SIN, TRUNCATED, harmonic, line};
 use super::errors::residuals;
-use super::gram::{Combo, Detail, Gram, solve, spread};
+use super::gram::{Combo, Detail, Gram, Summed, solve, spread};
 use super::input::{Capture, Part};
 use super::spectrum::{self, Spectrum};
 use super::wander::{self, Series};
@@ -68,9 +68,9 @@ impl Around {
 
 /// Fits the generous description; with `neutral` the quantiser's steps go to where it puts the signal.
 pub fn around(capture: &Capture, model: &mut Model, base: &[Combo], neutral: bool) -> Around {
-    let gram = Gram::of(capture, model);
     let combos = generous(base, model);
     let combos: Vec<&Combo> = combos.iter().collect();
+    let gram = Gram::over(capture, model, &Summed::of(&combos, 1));
     let mut ridge = base_ridge(base);
     ridge.resize(combos.len(), 0.0);
     let solved = solve(gram.all(), &combos, &ridge, Detail::All);

@@ -221,40 +221,28 @@ fn value(tone: &[f64; 3], bin: &[f64; 4]) -> f64 {
 /// bend may stand for the limit) give, have to suffice.
 fn cut(capture: &Capture, model: &Model, channel: usize, tone: &[f64; 3]) -> (Limits, f64) {
     let mut out = (Limits::NONE, 0.0);
-    // Beside jitter the noise at the peaks is hardly known.
-    if model.variance.jitter > 0.0 {
-        return out;
-    }
     let codes = || training(capture, channel).map(|(_, c)| c);
     let (Some(high), Some(low)) = (codes().max(), codes().min()) else {
         return out;
     };
-    let noise = 0.8 * (model.variance.base[channel] - 1.0 / 12.0).max(0.0).sqrt();
-    if noise < LEAST_NOISE {
+    let noise = (model.variance.base[channel] - 1.0 / 12.0).max(0.0).sqrt();
+    if 0.8 * noise < LEAST_NOISE {
         return out;
     }
     let sides = [(f64::from(high), 1.0), (f64::from(low), -1.0)];
-    let mut expected = [0.0; 2];
-    let mut rows = Rows::new();
-    for segment in capture.segments.iter().filter(|s| s.part != Part::HeldOut) {
-        for chunk in chunks(segment.rows.clone()) {
-            let n = chunk.len();
-            rows.fill(capture, model, chunk);
-            for i in 0..n {
-                let at = |k: usize| rows.dense[channel][k][i];
-                let tone = tone[0] + tone[1] * at(SIN) + tone[2] * at(COS);
-                let signal = rows.signal[channel][i];
-                for ((level, sign), expected) in sides.iter().zip(&mut expected) {
-                    let nearest = (sign * tone).min(sign * signal);
-                    let under = sign * level - nearest + 0.5 + 0.25;
-                    if under < 6.0 * noise {
-                        *expected += normal::below(-under / noise);
-                    }
-                }
-            }
+    let near = near(capture, model, channel, tone, sides, 6.0 * noise);
+    for ((level, sign), points) in sides.into_iter().zip(near) {
+        // Jitter and the noise at the peaks are hardly told from each other there.
+        let noise = match model.variance.jitter > 0.0 {
+            true => noise.min(inner_noise(&points, 2.0 * noise)),
+            false => noise,
+        };
+        let noise = 0.8 * noise;
+        if noise < LEAST_NOISE {
+            continue;
         }
-    }
-    for ((level, sign), expected) in sides.into_iter().zip(expected) {
+        let beyond = |p: &[f64; 2]| normal::below(-(p[0] + 0.5 + 0.25) / noise);
+        let expected: f64 = points.iter().map(beyond).sum();
         if expected > LEAST_CUT {
             out.1 += expected;
             match sign > 0.0 {
@@ -264,6 +252,57 @@ fn cut(capture: &Capture, model: &Model, channel: usize, tone: &[f64; 3]) -> (Li
         }
     }
     out
+}
+
+/// The training rows near each of two outermost codes (and the sign of its side): by how much tone and model are
+/// inside of it, the larger of both, up to `reach`; and the same of the code. Codes.
+fn near(
+    capture: &Capture,
+    model: &Model,
+    channel: usize,
+    tone: &[f64; 3],
+    sides: [(f64, f64); 2],
+    reach: f64,
+) -> [Vec<[f64; 2]>; 2] {
+    let mut out = [Vec::new(), Vec::new()];
+    let mut rows = Rows::new();
+    for segment in capture.segments.iter().filter(|s| s.part != Part::HeldOut) {
+        for chunk in chunks(segment.rows.clone()) {
+            let n = chunk.len();
+            rows.fill(capture, model, chunk);
+            for i in 0..n {
+                let at = |k: usize| rows.dense[channel][k][i];
+                let tone = tone[0] + tone[1] * at(SIN) + tone[2] * at(COS);
+                let signal = rows.signal[channel][i];
+                for ((level, sign), out) in sides.iter().zip(&mut out) {
+                    let inside = |value: f64| sign * (level - value);
+                    let under = inside(tone).max(inside(signal));
+                    if under < reach {
+                        out.push([under, inside(rows.code(channel, i))]);
+                    }
+                }
+            }
+        }
+    }
+    out
+}
+
+/// Codes further inside than the signal from which on their spread is known.
+const LEAST_INNER: usize = 50;
+
+/// The noise of rows less than `depth` inside an outermost code, from the codes that are further inside than the
+/// signal, as no limit touches these: their mean square about the signal is the variance, with the rounding's.
+/// 0 where they are few.
+fn inner_noise(points: &[[f64; 2]], depth: f64) -> f64 {
+    let inner = points
+        .iter()
+        .filter(|[under, code]| *under < depth && code > under);
+    let squares: Vec<f64> = inner.map(|[under, code]| (code - under).powi(2)).collect();
+    if squares.len() < LEAST_INNER {
+        return 0.0;
+    }
+    let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+    (mean - 1.0 / 12.0).max(0.0).sqrt()
 }
 
 /// Row and code of the training rows.
@@ -305,4 +344,64 @@ fn pile(capture: &Capture, channel: usize, sigma: f64) -> (Limits, f64) {
         }
     }
     (out, gain)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::synthetic::{AMPLITUDE, Made, model};
+    use super::*;
+
+    /// The limits that the missing rows beyond the outermost drive codes tell.
+    fn cut_of(made: &Made) -> (Limits, f64) {
+        let capture = made.capture();
+        let (_, model) = model(&capture, made);
+        cut(&capture, &model, 0, &[0.0, 0.0, -AMPLITUDE])
+    }
+
+    #[test]
+    fn noise_that_stops_at_a_code_is_cut() {
+        let limit = 200.0;
+        let found = cut_of(&Made {
+            limit,
+            ..Made::CLEAN
+        });
+        assert_eq!((found.0.high, found.0.low), (limit, f64::NEG_INFINITY));
+        assert!(found.1 > LEAST_CUT, "{}", found.1);
+    }
+
+    #[test]
+    fn whole_noise_is_not_cut_with_or_without_jitter() {
+        for jitter in [0.0, 0.05] {
+            let found = cut_of(&Made {
+                jitter,
+                ..Made::CLEAN
+            });
+            assert_eq!(found, (Limits::NONE, 0.0), "{jitter}");
+        }
+    }
+
+    #[test]
+    fn beside_jitter_the_codes_inside_the_peak_tell_the_noise() {
+        let limit = 200.0;
+        let made = Made {
+            limit,
+            jitter: 0.05,
+            ..Made::CLEAN
+        };
+        assert_eq!(cut_of(&made).0.high, limit);
+        // A model that takes the noise for three times what it is would miss rows that never were.
+        let capture = Made {
+            jitter: 0.05,
+            ..Made::CLEAN
+        }
+        .capture();
+        let loud = Made {
+            jitter: 0.05,
+            noise: 3.0,
+            ..Made::CLEAN
+        };
+        let (_, loud) = model(&capture, &loud);
+        let tone = [0.0, 0.0, -AMPLITUDE];
+        assert_eq!(cut(&capture, &loud, 0, &tone).0, Limits::NONE);
+    }
 }

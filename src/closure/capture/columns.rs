@@ -9,6 +9,7 @@ use super::clipping::Limits;
 use super::input::Capture;
 use super::missing::Missing;
 use super::tone::{Phases, Tone};
+use crate::plant::turn;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
@@ -251,7 +252,7 @@ impl Rows {
                 dense[POWER + k][i] = power;
             }
             let place = ((tone + model.span_codes) * scale).clamp(0.0, (HATS - 1) as f64 - 1e-9);
-            self.hats[channel][i] = (place as usize, place.fract());
+            self.hats[channel][i] = (place as usize, place - (place as usize) as f64);
             let bend: f64 = if bent {
                 let (k, part) = self.hats[channel][i];
                 let powers: f64 = (POWER..SAW).map(|k| at(k) * dense[k][i]).sum();
@@ -264,9 +265,9 @@ impl Rows {
             let there: f64 = neutral_terms.iter().map(|(k, b)| b * dense[*k][i]).sum();
             let there =
                 declared + there + neutral_hat(k) * (1.0 - part) + neutral_hat(k + 1) * part;
-            dense[SAW][i] = (there + 0.5).floor() - there;
+            dense[SAW][i] = floor(there + 0.5) - there;
             let (wave, turn) = match with_wave {
-                true => (TAU * there.fract()).sin_cos(),
+                true => turn::sin_cos(phase_of(there)),
                 false => (0.0, 0.0),
             };
             // sin(2 a) and sin(3 a).
@@ -307,6 +308,20 @@ fn terms(coefficients: &[f64], end: usize) -> Vec<(usize, f64)> {
         .filter_map(|k| Some((k, *coefficients.get(k)?)))
         .filter(|(_, b)| *b != 0.0)
         .collect()
+}
+
+/// The largest whole number that is not above x, for codes (below 2^62): without a call, as there is one a row.
+#[inline]
+fn floor(x: f64) -> f64 {
+    let whole = x as i64 as f64;
+    if whole > x { whole - 1.0 } else { whole }
+}
+
+/// The part of x after the point, turns, as a phase in 2^-64 turn (to 2^-62), for codes.
+#[inline]
+fn phase_of(x: f64) -> u64 {
+    let part = x - x as i64 as f64;
+    ((part * 4_611_686_018_427_387_904.0) as i64 as u64) << 2
 }
 
 impl Default for Rows {

@@ -4,7 +4,7 @@ use super::around::{Around, LEAST_VARIANCE, add_lines, add_slow_mains, around};
 use super::candidates::{Effect, Known, Variant, base, base_ridge, variants};
 use super::clipping::{self, Limits};
 use super::columns::{ALL, Model, Variance};
-use super::gram::{Combo, Detail, Gram, solve, spread};
+use super::gram::{Combo, Detail, Gram, Summed, solve, spread};
 use super::input::Capture;
 use super::missing::{self, Missing};
 use super::own_steps::OwnSteps;
@@ -85,8 +85,8 @@ pub fn declared(capture: &Capture, known: &Known, tone: Tone) -> Model {
 pub fn rounds(capture: &Capture, known: &Known, start: &Model) -> Fitted {
     let mut model = start.clone();
     let base = base(known);
-    let first = Gram::of(capture, &model);
     let combos: Vec<&Combo> = base.iter().collect();
+    let first = Gram::over(capture, &model, &Summed::of(&combos, 1));
     let solved = solve(first.all(), &combos, &base_ridge(&base), Detail::All);
     model.coefficients = spread(&combos, &solved);
     model.neutral = model.coefficients.clone();
@@ -218,7 +218,14 @@ fn follow_lines(
 
 /// Constant and tone of what is left, block by block.
 fn block_series(model: &Model, seen: &Around) -> [Option<Series>; 2] {
-    [0, 1].map(|c: usize| wander::series(&seen.residuals[c], seen.noise[c], &model.tone))
+    [0, 1].map(|c: usize| {
+        wander::series(
+            &seen.residuals[c],
+            seen.noise[c],
+            &model.tone,
+            &model.phases,
+        )
+    })
 }
 
 /// Sets the model's variance, with jitter where it earns its place; what was found of it, and whether it did.

@@ -43,6 +43,8 @@ pub mod spectrum;
 pub mod spur;
 pub mod steps;
 pub mod structure;
+#[cfg(test)]
+mod synthetic;
 pub mod tone;
 pub mod truncation;
 pub mod wander;
@@ -53,7 +55,7 @@ use crate::error::{InputError, Result};
 use crate::record::Warning;
 use candidates::Known;
 use columns::{COS, Model, SIN};
-use gram::{Combo, Detail, Gram, solve};
+use gram::{Combo, Detail, Gram, Summed, solve};
 use input::Capture;
 use report::Findings;
 use std::path::Path;
@@ -189,8 +191,9 @@ fn baseline(capture: &Capture, known: &Known, tone: Tone) -> Model {
     let base = candidates::base(known);
     let combos: Vec<&Combo> = base.iter().collect();
     // Twice: the quantiser's error needs the signal.
+    let summed = Summed::of(&combos, 1);
     for _ in 0..2 {
-        let gram = Gram::of(capture, &model);
+        let gram = Gram::over(capture, &model, &summed);
         let solved = solve(
             gram.all(),
             &combos,

@@ -1,6 +1,7 @@
 //! The phase of the oscillator at each row, and the declared tones.
 
 use super::input::Capture;
+use crate::plant::turn;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 use std::f64::consts::TAU;
@@ -60,7 +61,10 @@ pub struct Phases(std::sync::Arc<Vec<[f64; 2]>>);
 impl Phases {
     /// Of the first `rows` rows.
     pub fn of(tone: &Tone, rows: usize) -> Phases {
-        let at = |row| (TAU * tone.phase(row)).sin_cos();
+        let at = |row: usize| match tone.word {
+            Some(word) => turn::sin_cos(u64::from(word.wrapping_mul(row as u32)) << 32),
+            None => (TAU * tone.phase(row)).sin_cos(),
+        };
         let pairs = (0..rows).map(|row| {
             let (sin, cos) = at(row);
             [sin, cos]

@@ -7,7 +7,7 @@
 use super::columns::{COS, HARMONICS, ONE, SIN, harmonic};
 use super::gram::Combo;
 use super::spectrum::Spectrum;
-use super::tone::Tone;
+use super::tone::{Phases, Tone};
 use std::f64::consts::{PI, TAU};
 
 /// Blocks at most; at least [`LEAST_BLOCKS`], or nothing is said.
@@ -24,7 +24,7 @@ pub struct Series {
 }
 
 /// Demodulates a residual (zero where rows are left out). `None`: too short for blocks.
-pub fn series(residual: &[f64], variance: f64, tone: &Tone) -> Option<Series> {
+pub fn series(residual: &[f64], variance: f64, tone: &Tone, phases: &Phases) -> Option<Series> {
     let rows = residual.len();
     let periods = (tone.folded() * rows as f64) as usize;
     let blocks = BLOCKS.min(periods / 2).min(rows / 32);
@@ -35,7 +35,7 @@ pub fn series(residual: &[f64], variance: f64, tone: &Tone) -> Option<Series> {
     let mut counts = vec![0.0; blocks];
     for (row, r) in residual.iter().enumerate() {
         let block = row * blocks / rows;
-        let (sin, cos) = (TAU * tone.phase(row)).sin_cos();
+        let (sin, cos) = phases.at(row);
         counts[block] += 1.0;
         values[0][block] += r;
         values[1][block] += 2.0 * r * sin;
@@ -214,4 +214,45 @@ fn without(modes: &[f64], a: &[f64], b: &[f64], white: f64, slow: f64) -> Vec<f6
         .zip(a.iter().zip(b))
         .map(|(m, (a, b))| m - p * a - q * b)
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::noise::Noise;
+
+    /// Modes of a wander of strength `slow` beside white noise of variance 1.
+    fn drawn(stream: u64, slow: f64) -> Vec<f64> {
+        let noise = Noise::new(11, stream);
+        let mode = |k: u64| (1.0 + slow / (k + 1) as f64).sqrt() * noise.gaussian_pair(k).0;
+        (0..63).map(mode).collect()
+    }
+
+    #[test]
+    fn without_modes_no_wander_is_as_likely_as_some() {
+        let grid: Vec<f64> = (0..27)
+            .map(|k| f64::powf(10.0, -1.0 + 0.15 * f64::from(k)))
+            .collect();
+        let mean = grid.iter().sum::<f64>() / 27.0;
+        let expected = expected_strength(&[], 2.0);
+        assert!((expected / mean - 1.0).abs() < 1e-12, "{expected} {mean}");
+    }
+
+    #[test]
+    fn white_modes_leave_less_than_their_noise() {
+        let strengths: Vec<f64> = (0..40)
+            .map(|s| expected_strength(&drawn(s, 0.0), 1.0))
+            .collect();
+        let mean = strengths.iter().sum::<f64>() / 40.0;
+        assert!(mean > 0.0 && mean < 0.6, "{mean}");
+    }
+
+    #[test]
+    fn a_strong_wander_is_expected_at_its_strength() {
+        let strengths: Vec<f64> = (0..40)
+            .map(|s| expected_strength(&drawn(s, 30.0), 1.0))
+            .collect();
+        let mean = strengths.iter().sum::<f64>() / 40.0;
+        assert!((20.0..45.0).contains(&mean), "{mean}");
+    }
 }
