@@ -3,9 +3,10 @@
 
 use crate::design::Design;
 use crate::numeric::format::pow2;
+use crate::numeric::turn;
+use crate::plant::Gyroscope;
 use crate::plant::converter::{Channel, Converter};
 use crate::plant::noise::Noise;
-use crate::plant::{Gyroscope, turn};
 use std::f64::consts::TAU;
 
 /// The stream of the jitter's noise; readings count theirs from 0, slow noise has the last two.

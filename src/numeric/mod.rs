@@ -2,7 +2,8 @@
 //!
 //! [`mod@format`] and [`cast`] say what a quantiser does; [`arithmetic`] is the interface of the
 //! blocks; [`float`], [`fixed`], [`trace`] and [`paired`] implement it; [`constants`] decides the integers
-//! nearest to sines, arc tangents and the CORDIC gain.
+//! nearest to sines, arc tangents and the CORDIC gain; [`turn`] holds elementary functions with the same bits on every
+//! machine.
 
 pub mod arithmetic;
 pub mod cast;
@@ -14,3 +15,4 @@ pub mod lane;
 pub mod paired;
 mod paired_word;
 pub mod trace;
+pub mod turn;

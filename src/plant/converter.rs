@@ -4,8 +4,8 @@
 //! offset, bend and missing codes. Both channels have the same converter; only the sense channel has
 //! the drive's feedthrough and the later sample. Plausible ranges are general knowledge ("k").
 
-use super::turn;
 use crate::design::Effects;
+use crate::numeric::turn;
 
 /// Which pick-off is converted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

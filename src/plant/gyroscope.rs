@@ -27,8 +27,8 @@ use super::converter::{Channel, Converter};
 use super::device::Device;
 use super::effects;
 use super::thermal::Temperatures;
-use super::turn;
 use crate::design::{Gyro, ThermalRun};
+use crate::numeric::turn;
 use nalgebra::{Complex, Matrix2, Matrix4, Vector2};
 use std::f64::consts::TAU;
 

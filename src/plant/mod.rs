@@ -3,7 +3,7 @@
 //! In reading order: [`resonator`] (eq. 1 to 8 of the seed paper), [`device`] (measured phase and
 //! bias by eq. 9), [`effects`] (what the device does beyond it), [`profile`] and [`thermal`] (chamber and
 //! heat), [`gyroscope`] (the motion at the ADC rate), [`converter`] (the ADCs), [`noise`] and [`slow_noise`]
-//! (noise that depends on its place alone); [`turn`] holds the elementary functions. All that a plant
+//! (noise that depends on its place alone). All that a plant
 //! knows of the circuit is [`gyroscope::Reference`] and [`gyroscope::Drive`].
 
 pub mod converter;
@@ -15,7 +15,6 @@ pub mod profile;
 pub mod resonator;
 pub mod slow_noise;
 pub mod thermal;
-pub mod turn;
 
 pub use converter::Converter;
 pub use device::Device;

@@ -7,7 +7,7 @@
 //! streams apart even where their counters meet. Only integers and IEEE basic operations are used
 //! ([`super::turn`]), so the values are the same on every machine.
 
-use super::turn;
+use crate::numeric::turn;
 
 /// 2^64 over the golden ratio, odd.
 const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;

@@ -9,7 +9,7 @@ use super::clipping::Limits;
 use super::input::Capture;
 use super::missing::Missing;
 use super::tone::{Phases, Tone};
-use crate::plant::turn;
+use crate::numeric::turn;
 use std::f64::consts::TAU;
 use std::ops::Range;
 

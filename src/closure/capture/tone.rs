@@ -1,7 +1,7 @@
 //! The phase of the oscillator at each row, and the declared tones.
 
 use super::input::Capture;
-use crate::plant::turn;
+use crate::numeric::turn;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 use std::f64::consts::TAU;
