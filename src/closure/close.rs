@@ -235,13 +235,31 @@ impl Told<'_> {
             return none;
         };
         let noise = self.after.fit.noise.white_rms_dps;
-        match firmware::judged(&plan, record, c, &self.search.heldout, noise) {
-            Ok((correction, errors)) => (Some(correction), errors),
+        let judged = |plan: &crate::correction::Plan| {
+            firmware::judged(plan, record, c, &self.search.heldout, noise)
+        };
+        let (correction, errors) = match judged(&plan) {
+            Ok(both) => both,
             Err(e) => {
                 warnings.push(Warning::general("no_firmware", e.to_string()));
-                none
+                return none;
             }
+        };
+        // Coefficients that cancel may be a model's; in words they are worse than no step at all.
+        let declared = firmware::plan(c, self.before, &[], widest);
+        let declared = declared.and_then(|plan| judged(&plan).ok()?.1.heldout_rms);
+        if let (Some(with), Some(without)) = (errors.heldout_rms, declared)
+            && !self.after.terms.is_empty()
+            && with > 1.02 * without
+        {
+            let said = format!(
+                "the steps' coefficients cancel each other: in firmware's words they leave {with:.3e} deg/s of \
+                 held-out rows, the declared model alone {without:.3e}; do the separating experiment"
+            );
+            warnings.push(Warning::general("no_firmware", said));
+            return none;
         }
+        (Some(correction), errors)
     }
 
     fn evidence(&self, steps: &[Step]) -> Vec<Evidence> {
