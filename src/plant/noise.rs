@@ -5,7 +5,7 @@
 //! bijection of 64 bits with full avalanche) is applied to the counter times the golden ratio under a
 //! key, and to the result under a second key. Both keys come from seed and stream. The second round keeps two
 //! streams apart even where their counters meet. Only integers and IEEE basic operations are used
-//! ([`super::turn`]), so the values are the same on every machine.
+//! ([`turn`]), so the values are the same on every machine.
 
 use crate::numeric::turn;
 
