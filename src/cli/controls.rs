@@ -6,29 +6,15 @@ use crate::error::Result;
 use crate::record::ThermalRecord;
 use crate::report::closure::controls as words;
 use crate::selftest::controls::{self, Controls};
-use std::io::IsTerminal;
-use std::sync::Mutex;
 
 /// Controls of a closed record, with progress on a terminal.
 ///
 /// # Errors
 /// A record that cannot be closed with what is added.
 pub fn run(closed: &Closed, record: &ThermalRecord, design: &Design) -> Result<Controls> {
-    let bar: Mutex<Option<indicatif::ProgressBar>> = Mutex::new(None);
-    let loud = std::io::stderr().is_terminal();
-    let progress = |done: usize, total: usize| {
-        if let Ok(mut bar) = bar.lock()
-            && loud
-        {
-            let bar = bar.get_or_insert_with(|| indicatif::ProgressBar::new(total as u64));
-            bar.set_position(done as u64);
-        }
-    };
-    let out = controls::run(closed, record, design, super::threads(None), &progress);
-    if let Ok(Some(bar)) = bar.into_inner() {
-        bar.finish_and_clear();
-    }
-    out
+    super::with_bar(|progress| {
+        controls::run(closed, record, design, super::threads(None), progress)
+    })
 }
 
 /// The tables.

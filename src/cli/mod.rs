@@ -28,7 +28,9 @@ mod verify;
 use crate::error::{Error, Result};
 use crate::verify::compare::Compared;
 use clap::{Parser, Subcommand, ValueEnum};
+use std::io::IsTerminal;
 use std::process::ExitCode;
+use std::sync::Mutex;
 
 /// From a MEMS gyro's thermal drift to trusted fixed-point firmware.
 #[derive(Debug, Parser)]
@@ -98,6 +100,25 @@ fn threads(asked: Option<u16>) -> usize {
         || std::thread::available_parallelism().map_or(1, usize::from),
         usize::from,
     )
+}
+
+/// Something with a bar of its progress (done, in all) on a terminal, gone when it ends.
+fn with_bar<T>(work: impl FnOnce(crate::selftest::Progress<'_>) -> T) -> T {
+    let bar: Mutex<Option<indicatif::ProgressBar>> = Mutex::new(None);
+    let loud = std::io::stderr().is_terminal();
+    let progress = |done: usize, total: usize| {
+        if let Ok(mut bar) = bar.lock()
+            && loud
+        {
+            let bar = bar.get_or_insert_with(|| indicatif::ProgressBar::new(total as u64));
+            bar.set_position(done as u64);
+        }
+    };
+    let out = work(&progress);
+    if let Ok(Some(bar)) = bar.into_inner() {
+        bar.finish_and_clear();
+    }
+    out
 }
 
 /// Indented JSON with a final newline: what is written and what `--format json` prints.

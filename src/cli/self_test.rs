@@ -7,8 +7,6 @@ use crate::error::{Error, Result};
 use crate::report::text::significant;
 use crate::selftest::outcome::{EffectScore, Minimum, Outcome};
 use crate::selftest::{self, Request};
-use std::io::IsTerminal;
-use std::sync::Mutex;
 
 /// Of a self-test.
 #[derive(Debug, clap::Args)]
@@ -53,21 +51,8 @@ pub fn run(arguments: &Arguments, design: &Design) -> Result<()> {
         command: command(arguments),
         ..Request::default()
     };
-    let bar: Mutex<Option<indicatif::ProgressBar>> = Mutex::new(None);
-    let loud = std::io::stderr().is_terminal();
-    let progress = |done: usize, total: usize| {
-        if let Ok(mut bar) = bar.lock()
-            && loud
-        {
-            let bar = bar.get_or_insert_with(|| indicatif::ProgressBar::new(total as u64));
-            bar.set_position(done as u64);
-        }
-    };
     let record = read.as_ref().map(|(r, w)| (r, w.as_slice()));
-    let outcome = selftest::run(design, record, &request, &progress)?;
-    if let Ok(Some(bar)) = bar.into_inner() {
-        bar.finish_and_clear();
-    }
+    let outcome = super::with_bar(|progress| selftest::run(design, record, &request, progress))?;
     let json = super::json(&outcome);
     if let Some(out) = &arguments.out {
         let page = crate::report::selftest::html(&outcome)?;
