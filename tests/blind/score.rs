@@ -150,10 +150,15 @@ fn mark(a: &Answer, truth: &Truth) -> Mark {
         }
         _ => None,
     };
-    let nothing = matches!(
-        truth.class,
-        Class::None | Class::NoiseOnly | Class::HiddenChannel | Class::Unexcited
-    );
+    let false_discovery = match truth.class {
+        Class::None | Class::NoiseOnly | Class::Unexcited => !a.steps.is_empty(),
+        // Its own name, found another way (a warm-up by the clock that starts with the record), is not wrong.
+        Class::HiddenChannel => {
+            let hidden = |id: &String| truth.planted.iter().any(|p| p.id == *id);
+            a.steps.iter().any(|s| !hidden(&s.0))
+        }
+        _ => false,
+    };
     let outside = truth.class == Class::Outside;
     let channel = truth
         .outside_channel
@@ -178,7 +183,7 @@ fn mark(a: &Answer, truth: &Truth) -> Mark {
         found,
         named: a.steps.len(),
         rightly,
-        false_discovery: nothing && !a.steps.is_empty(),
+        false_discovery,
         confident_wrong: outside && !a.steps.is_empty() && !a.left,
         admitted: outside.then_some(a.left && channel),
         over_oracle: None,
