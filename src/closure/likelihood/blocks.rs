@@ -5,12 +5,12 @@
 //! 1. The record is cut into segments. If the thermometer makes at least [`RAMPS`] runs up or down
 //!    (turning points by more than a tenth of its range), segments are those runs; else [`SPANS`] spans of
 //!    equal numbers of rows.
-//! 2. Of the segments, four or more are held out, about 27 % of the rows: every fourth on the average,
-//!    at uneven distances, so that a periodic temperature profile does not always lose the same
-//!    part; never the first nor the last (a transient at power-on and a slow drift could then only be
+//! 2. Of every 15 segments four are held out, about 27 % of the rows, at least three segments apart; never the
+//!    first nor the last of the record (a transient at power-on and a slow drift could then only be
 //!    extrapolated).
-//! 3. Of the three shifts of that pattern, the one is taken whose training rows cover most of the
-//!    thermometer's range, the first among equals: held-out error is about interpolation.
+//! 3. Of the 35 ways to do that, the one is taken whose training rows leave the narrowest gaps in the
+//!    thermometer's range, taken as a whole and on the way up and down, the first among equals:
+//!    held-out error is about interpolation.
 //!
 //! Held-out rows are not used in any estimate, and predictions for them are those of the
 //! regressors alone: the noise's memory never carries a training row's noise across the border.
@@ -27,8 +27,9 @@ pub const SPANS: usize = 15;
 /// Fewest rows.
 pub const LEAST: usize = 15;
 
-/// Segments that are held out, of 15, before the shift.
-const PATTERN: [usize; 4] = [1, 4, 8, 11];
+/// Segments of every 15 that are held out, and how far apart they are at least.
+const HELD: usize = 4;
+const APART: usize = 3;
 
 /// A cut into training and held-out rows.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -67,13 +68,14 @@ pub fn split(times_s: &[f64], thermometer: &[f64]) -> Result<Split, Unusable> {
         (0..n).map(|i| i * spans / n).collect()
     };
     let segments = segment.last().map_or(0, |last| last + 1);
+    let direction = directions(thermometer);
     let mut best: Option<(f64, Vec<bool>)> = None;
-    for shift in 0..3 {
-        let held = held_segments(segments, shift);
+    for pattern in patterns() {
+        let held = held_segments(segments, &pattern);
         let heldout: Vec<bool> = segment.iter().map(|s| held[*s]).collect();
-        let covered = coverage(thermometer, &heldout);
-        if best.as_ref().is_none_or(|b| covered > b.0 + 0.005) {
-            best = Some((covered, heldout));
+        let open = left_open(thermometer, &direction, &heldout);
+        if best.as_ref().is_none_or(|b| open < b.0) {
+            best = Some((open, heldout));
         }
     }
     let heldout = best.map(|b| b.1).unwrap_or_default();
@@ -108,37 +110,82 @@ impl Split {
     }
 }
 
-/// The pattern, repeated every 15 segments, shifted; never the first nor the last segment.
-fn held_segments(segments: usize, shift: usize) -> Vec<bool> {
+/// All ways to hold out four of 15 segments, neither the first nor the last, in lexicographic order.
+fn patterns() -> Vec<Vec<usize>> {
+    let mut all: Vec<Vec<usize>> = vec![Vec::new()];
+    for _ in 0..HELD {
+        all = all
+            .iter()
+            .flat_map(|begun| {
+                let next = begun.last().map_or(1, |last| last + APART);
+                (next..SPANS - 1).map(move |s| [begun.as_slice(), &[s]].concat())
+            })
+            .collect();
+    }
+    all
+}
+
+/// A pattern, repeated every 15 segments; never the first nor the last segment.
+fn held_segments(segments: usize, pattern: &[usize]) -> Vec<bool> {
     (0..segments)
-        .map(|s| {
-            let inside = s > 0 && s + 1 < segments;
-            inside && PATTERN.iter().any(|p| (p + shift) % SPANS == s % SPANS)
-        })
+        .map(|s| s > 0 && s + 1 < segments && pattern.contains(&(s % SPANS)))
         .collect()
 }
 
-/// Share of the thermometer's range (in fifty bins) that training rows reach, of what rows reach.
-fn coverage(thermometer: &[f64], heldout: &[bool]) -> f64 {
+/// Bins of the thermometer's range.
+const BINS: usize = 50;
+
+/// What a gap on the way up or down alone counts, and one at an end of the range, where predictions are
+/// extrapolated.
+const ONE_WAY: f64 = 0.25;
+const AT_AN_END: f64 = 4.0;
+
+/// Whether the thermometer rises at each row, by its neighbours.
+fn directions(thermometer: &[f64]) -> Vec<bool> {
+    let at = |i: usize| thermometer[i.min(thermometer.len() - 1)];
+    (0..thermometer.len())
+        .map(|i| at(i + 2) > at(i.saturating_sub(2)))
+        .collect()
+}
+
+/// Squares of the widths of the gaps that training rows leave in the thermometer's range, in bins.
+fn left_open(thermometer: &[f64], rising: &[bool], heldout: &[bool]) -> f64 {
     let finite = || thermometer.iter().copied().filter(|v| v.is_finite());
     let low = finite().fold(f64::INFINITY, f64::min);
-    let width = (finite().fold(f64::NEG_INFINITY, f64::max) - low) / 50.0;
-    let (mut all, mut train) = ([false; 50], [false; 50]);
-    for (t, held) in thermometer.iter().zip(heldout) {
+    let width = (finite().fold(f64::NEG_INFINITY, f64::max) - low) / BINS as f64;
+    let bin = |t: f64| match width > 0.0 {
         // A cast of a float saturates and turns NaN into 0.
-        let bin = if width > 0.0 {
-            ((t - low) / width) as usize
-        } else {
-            0
-        };
-        let bin = bin.min(49);
-        all[bin] = true;
-        train[bin] |= !held;
+        true => (((t - low) / width) as usize).min(BINS - 1),
+        false => 0,
+    };
+    // Down, up, either way.
+    let (mut all, mut train) = ([[false; BINS]; 3], [[false; BINS]; 3]);
+    for ((t, held), rises) in thermometer.iter().zip(heldout).zip(rising) {
+        for way in [usize::from(*rises), 2] {
+            all[way][bin(*t)] = true;
+            train[way][bin(*t)] |= !held;
+        }
     }
-    let count = |of: &[bool]| of.iter().filter(|b| **b).count() as f64;
-    let ends = [0, 49].iter().filter(|i| train[**i]).count() as f64;
-    // An end that is lost is an extrapolation: it counts as five bins.
-    (count(&train) + 5.0 * ends) / (count(&all) + 10.0)
+    let gaps = |way: usize| gaps(&all[way], &train[way]);
+    gaps(2) + ONE_WAY * (gaps(0) + gaps(1))
+}
+
+/// Of one way: bins that are reached, and that training rows reach.
+fn gaps(all: &[bool], train: &[bool]) -> f64 {
+    let open: Vec<bool> = all.iter().zip(train).map(|(a, t)| *a && !t).collect();
+    let runs = open.chunk_by(|a, b| a == b);
+    let mut from = 0;
+    let mut sum = 0.0;
+    for run in runs {
+        let to = from + run.len();
+        if run.first() == Some(&true) {
+            let outer = !train[..from].contains(&true) || !train[to..].contains(&true);
+            let weight = if outer { AT_AN_END } else { 1.0 };
+            sum += weight * (run.len() as f64).powi(2);
+        }
+        from = to;
+    }
+    sum
 }
 
 /// The number of the monotone run of each row, turning points by a tenth of the range.
@@ -218,9 +265,9 @@ mod tests {
                 assert!(blocks >= 4, "{what}");
                 assert!(!split.heldout[0] && !split.heldout[n - 1], "{what}");
                 // A single ramp passes each temperature once: there held-out rows are gaps.
-                let least = if cycles < 1.0 { 0.7 } else { 0.85 };
-                let covered = coverage(&t, &split.heldout);
-                assert!(cycles == 0.0 || covered > least, "{what}: {covered}");
+                let open = left_open(&t, &directions(&t), &split.heldout);
+                let most = if cycles < 1.0 { 400.0 } else { 40.0 };
+                assert!(open < most, "{what}: {open}");
             }
         }
         assert!(super::split(&[0.0; 10], &[0.0; 10]).is_err());
