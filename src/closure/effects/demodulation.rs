@@ -2,7 +2,6 @@
 
 use super::{
     Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, gain, heated, moving,
-    product,
 };
 use crate::closure::channels::Channels;
 use crate::closure::firmware::Words;
@@ -77,7 +76,7 @@ const PHASE_DRIFT: Sheet = Sheet {
         },
         Parameter {
             name: "zero_degc",
-            plausible: (-40.0, 125.0),
+            plausible: ZERO_DEGC,
         },
     ],
     compensable: true,
@@ -85,6 +84,28 @@ const PHASE_DRIFT: Sheet = Sheet {
     experiment: "two levels of quadrature at several temperatures",
     reference: "Pileri et al., MEMS 2025",
 };
+
+/// Where a phase error that drifts may pass through zero, degC: beyond, the drift is the smaller part of it, and what
+/// there is to name is the constant error.
+const ZERO_DEGC: (f64, f64) = (-40.0, 125.0);
+
+/// The same in spans of the record's own temperature from its middle, for a thermometer whose degrees are those of
+/// a design that may be another gyro's.
+const ZERO_SPANS: f64 = 1.5;
+
+/// First guesses of the zero, in half spans from the middle.
+const ZEROS: [f64; 4] = [-1.5, -0.5, 0.5, 1.5];
+
+/// Least and greatest zero of the phase error, in half spans from the middle.
+fn zeros(c: &Channels) -> (f64, f64) {
+    let at = |degc: f64| (degc - c.middle_degc) / c.kelvin_per_u;
+    let (a, b) = (at(ZERO_DEGC.0), at(ZERO_DEGC.1));
+    let own = match c.thermometer.ends_with("_degc") {
+        true => 1.0,
+        false => 2.0 * ZERO_SPANS,
+    };
+    (a.min(b).min(-own), a.max(b).max(own))
+}
 
 /// Temperatures at which the phase is taken to be trimmed, degC: 300 K and the usual ambient ones.
 const TRIMMED_DEGC: [f64; 3] = [26.85, 25.0, 20.0];
@@ -103,26 +124,36 @@ impl Candidate for PhaseDrift {
     }
 
     fn points(&self, c: &Channels) -> Vec<Point> {
-        // The temperature at which the phase is trimmed is an ambient one; else two columns.
-        (0..TRIMMED_DEGC.len() + c.heats())
-            .map(Point::form)
-            .collect()
+        // The temperature at which the phase is trimmed is an ambient one; else it is sought.
+        let (low, high) = zeros(c);
+        let mut points: Vec<Point> = (0..TRIMMED_DEGC.len()).map(Point::form).collect();
+        for heat in 0..c.heats() {
+            let starts = ZEROS.iter().filter(|z| (low..=high).contains(*z));
+            points.extend(starts.map(|z| Point::at(TRIMMED_DEGC.len() + heat, &[*z])));
+        }
+        points
     }
 
     fn columns(&self, c: &Channels, _bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
         let Some(q) = c.column("quad_dps") else {
             return Vec::new();
         };
-        match TRIMMED_DEGC.get(point.form) {
-            Some(trimmed) => {
-                let zero = (trimmed - c.middle_degc) / c.kelvin_per_u;
-                vec![q.iter().zip(&c.u).map(|(q, u)| q * (u - zero)).collect()]
+        let drift = |heat: &[f64], zero: f64| {
+            let pairs = q.iter().zip(heat);
+            vec![pairs.map(|(q, u)| q * (u - zero)).collect()]
+        };
+        let (low, high) = zeros(c);
+        match (TRIMMED_DEGC.get(point.form), point.theta.first()) {
+            (Some(trimmed), _) => drift(&c.u, (trimmed - c.middle_degc) / c.kelvin_per_u),
+            (None, Some(zero)) if (low..=high).contains(zero) => {
+                drift(c.heat(point.form - TRIMMED_DEGC.len()), *zero)
             }
-            None => vec![
-                product(q, c.heat(point.form - TRIMMED_DEGC.len())),
-                q.to_vec(),
-            ],
+            _ => vec![vec![0.0; q.len()]],
         }
+    }
+
+    fn spacing(&self, _c: &Channels, point: &Point) -> Vec<f64> {
+        vec![0.5; point.theta.len()]
     }
 
     fn correction(&self, c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
@@ -134,17 +165,17 @@ impl Candidate for PhaseDrift {
         let mut out: Reported = [gain("phase_slope_rad_per_k", e, 0, 1.0 / c.kelvin_per_u)]
             .into_iter()
             .collect();
-        match TRIMMED_DEGC.get(e.point.form) {
-            Some(t) => _ = out.insert("zero_degc".to_owned(), (*t, 0.0)),
-            None => {
-                let (slope, constant) = (e.beta[0], e.beta.get(1).copied().unwrap_or(0.0));
-                if slope != 0.0 {
-                    let zero = c.middle_degc - c.kelvin_per_u * constant / slope;
-                    let std = e.beta_std.get(1).copied().unwrap_or(0.0);
-                    let std = (c.kelvin_per_u * std / slope).abs();
-                    out.insert("zero_degc".to_owned(), (zero, std));
-                }
+        let zero = match (TRIMMED_DEGC.get(e.point.form), e.point.theta.first()) {
+            (Some(trimmed), _) => Some((*trimmed, 0.0)),
+            (None, Some(zero)) => {
+                let std = e.theta_std.first().copied().unwrap_or(0.0);
+                let degc = c.middle_degc + c.kelvin_per_u * zero;
+                Some((degc, (c.kelvin_per_u * std).abs()))
             }
+            _ => None,
+        };
+        if let Some(zero) = zero {
+            out.insert("zero_degc".to_owned(), zero);
         }
         out
     }
