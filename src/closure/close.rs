@@ -207,7 +207,9 @@ impl Told<'_> {
                 parameter_std: reported.iter().map(|(n, v)| (n.clone(), v.1)).collect(),
                 heldout_rms: model.heldout_rms,
                 p_value: term.p_value.clamp(1e-300, 1.0),
-                selection_frequency: self.search.selection_frequency(self.after, k, &round),
+                selection_frequency: self
+                    .search
+                    .selection_frequency(self.after, k, &round.judged),
                 indistinguishable_from: term.rivals.clone(),
                 separating_experiment: (!term.rivals.is_empty())
                     .then(|| term.candidate.sheet().experiment.to_owned()),

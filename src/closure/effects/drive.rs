@@ -81,6 +81,11 @@ impl Candidate for Damping {
         true
     }
 
+    fn admits(&self, point: &Point, beta: &[f64]) -> bool {
+        // Less Q bends the phase one way.
+        point.form == 0 || beta.last().is_none_or(|share| *share >= 0.0)
+    }
+
     fn surcharge(&self, _c: &Channels, point: &Point) -> f64 {
         if point.form == 2 { 2.0 } else { 0.0 }
     }

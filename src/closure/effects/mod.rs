@@ -215,6 +215,11 @@ pub trait Candidate: Send + Sync {
         false
     }
 
+    /// False for coefficients that physics excludes, however well they fit.
+    fn admits(&self, _point: &Point, _beta: &[f64]) -> bool {
+        true
+    }
+
     /// What firmware subtracts; `None` if it cannot, or does not see what it needs.
     fn correction(&self, _c: &Channels, _e: &Estimate, _f: &mut Words) -> Option<Vec<Term>> {
         None

@@ -188,12 +188,7 @@ impl Search<'_> {
         // one leads without the spikes.
         let quick = self.judge(&plain, 0);
         let mut worthy: Option<(&Judged, f64)> = None;
-        for j in quick
-            .judged
-            .iter()
-            .filter(|j| j.candidate.named())
-            .take(LOOKED)
-        {
+        for j in looked(&quick.judged, Judged::is_named) {
             let above = value(j)? - model.value - worth(j) + MARGIN;
             if above >= worthy.map_or(0.0, |w| w.1) {
                 worthy = Some((j, above));
@@ -209,7 +204,7 @@ impl Search<'_> {
         let all = self.judge(&plain, self.effort.surrogates);
         let mut best: Option<(&Judged, f64)> = None;
         let mut others = Vec::new();
-        for j in all.judged.iter().filter(|j| j.is_found()).take(LOOKED) {
+        for j in looked(&all.judged, Judged::is_found) {
             let value = value(j)?;
             others.push((j.candidate.id(), value));
             if best.is_none_or(|b| value > b.1) {
@@ -271,6 +266,14 @@ impl Search<'_> {
         }
         Ok(best.map(|b| b.0))
     }
+}
+
+/// The best names and every clip, of those that `are`: the noise of the plain fit, which holds all spikes, hides
+/// those that only a few of them explain.
+fn looked(judged: &[Judged], are: impl Fn(&Judged) -> bool) -> impl Iterator<Item = &Judged> {
+    let each = judged.iter().filter(move |j| are(j)).enumerate();
+    each.filter(|(k, j)| *k < LOOKED || j.candidate.is_last())
+        .map(|(_, j)| j)
 }
 
 /// A named term, unless too many others do as well.

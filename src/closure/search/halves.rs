@@ -1,6 +1,6 @@
 //! How often a term is chosen again when the record is halved.
 
-use super::judge::{PRICE, Round};
+use super::judge::{Judged, PRICE};
 use super::{Model, Search, Term, declared};
 use crate::closure::likelihood::linear::{Basis, dot};
 use crate::closure::likelihood::random::Stream;
@@ -12,9 +12,14 @@ const PAIRS: usize = 15;
 impl Search<'_> {
     /// Share of the halves of the record (whole segments, complementary pairs; Meinshausen & Buhlmann 2010,
     /// Shah & Samworth 2013) in which the term explains more than every one of its competitors, the
-    /// other terms being in, and more than its price. `round` holds the competitors: everything beside
-    /// the other terms.
-    pub fn selection_frequency(&self, model: &Model, term: usize, round: &Round) -> f64 {
+    /// other terms being in, and more than its price. `competitors`: what was judged beside the other
+    /// terms, best first.
+    pub fn selection_frequency<'j>(
+        &self,
+        model: &Model,
+        term: usize,
+        competitors: impl IntoIterator<Item = &'j Judged>,
+    ) -> f64 {
         let c = self.channels;
         let fit = &model.fit;
         let reduce = |columns: Vec<Vec<f64>>| -> Vec<Vec<f64>> {
@@ -29,7 +34,8 @@ impl Search<'_> {
         }
         let own = &model.terms[term];
         let mut contenders = vec![(of(own), own.point.theta.len())];
-        for j in round.judged.iter().filter(|j| j.candidate.named()).take(6) {
+        let competitors = competitors.into_iter();
+        for j in competitors.filter(|j| j.candidate.named()).take(6) {
             if j.candidate.id() != own.id() {
                 let columns = reduce(j.candidate.columns(c, &model.bias, &j.point));
                 contenders.push((columns, j.point.theta.len()));

@@ -6,6 +6,7 @@ use crate::closure::channels::Channels;
 use crate::closure::effects::tone::Pickup;
 use crate::closure::effects::{Bias, Candidate, Missing, Point};
 use crate::closure::likelihood::candidates::Group;
+use crate::closure::likelihood::linear::add_scaled;
 use crate::closure::likelihood::reml::Fit;
 use crate::closure::likelihood::score::{self, Scores};
 use std::cmp::Ordering;
@@ -46,6 +47,11 @@ pub struct Judged {
 }
 
 impl Judged {
+    /// Not a shape without a name.
+    pub fn is_named(&self) -> bool {
+        self.candidate.named()
+    }
+
     /// A name that is beyond chance.
     pub fn is_found(&self) -> bool {
         self.candidate.named() && self.p_value <= LEVEL
@@ -152,6 +158,7 @@ impl Search<'_> {
         let best = scores.groups.iter().map(|g| g.gain).fold(0.0, f64::max);
         let mut starts = Vec::new();
         let mut wholes = Vec::new();
+        let mut biases = Vec::new();
         for (k, (candidate, points)) in running.iter().enumerate() {
             let (point, shape, p_value, gain) = match scores.groups.get(k) {
                 Some(g) => {
@@ -182,6 +189,12 @@ impl Search<'_> {
                 }
                 _ => start.clone(),
             };
+            let acting = near && candidate.acts_on_bias() && !candidate.is_last();
+            let (point, bias) = match acting {
+                true => self.admitted(model, candidate.as_ref(), point, points, gain),
+                false => (point, None),
+            };
+            biases.push(bias);
             // At one noise; the null hypothesis may choose the one that suits it best.
             let whole = candidate.is_whole().then(|| gain(&point)).flatten();
             let whole = whole.map(|g| g + fit.problem.evaluate(shape).loglik - fit.at.loglik);
@@ -190,7 +203,10 @@ impl Search<'_> {
         }
         let columns: Vec<Vec<Vec<f64>>> = starts
             .iter()
-            .map(|(candidate, point, _)| candidate.columns(c, &model.bias, point))
+            .zip(&biases)
+            .map(|((candidate, point, _), bias)| {
+                candidate.columns(c, bias.as_ref().unwrap_or(&model.bias), point)
+            })
             .collect();
         let gains = refine::profiled(fit, &scores.grid, &columns);
         starts
@@ -213,6 +229,63 @@ impl Search<'_> {
                 },
             )
             .collect()
+    }
+}
+
+/// Passes in which the declared bias and an effect that acts on it find each other.
+const PASSES: usize = 2;
+
+impl Search<'_> {
+    /// A shape whose coefficients physics admits, that one or the best of `points`, with the declared bias
+    /// beside it.
+    fn admitted(
+        &self,
+        model: &Model,
+        candidate: &dyn Candidate,
+        best: Point,
+        points: &[Point],
+        gain: impl Fn(&Point) -> Option<f64>,
+    ) -> (Point, Option<Bias>) {
+        let (bias, beta) = self.bias_beside(model, candidate, &best);
+        if candidate.admits(&best, &beta) {
+            return (best, Some(bias));
+        }
+        let each = points.iter().filter_map(|p| {
+            let (bias, beta) = self.bias_beside(model, candidate, p);
+            let there = gain(p)?;
+            candidate.admits(p, &beta).then_some((there, p, bias))
+        });
+        match each.max_by(|a, b| a.0.total_cmp(&b.0)) {
+            Some((_, point, bias)) => (point.clone(), Some(bias)),
+            None => (best, None),
+        }
+    }
+
+    /// The declared bias with a candidate in, and the candidate's coefficients: a strong effect that acts on the
+    /// bias bends what the declared model finds without it, and is then judged by a bias that it made
+    /// itself. Ordinary least squares, for the shape alone.
+    fn bias_beside(
+        &self,
+        model: &Model,
+        candidate: &dyn Candidate,
+        point: &Point,
+    ) -> (Bias, Vec<f64>) {
+        let c = self.channels;
+        let mut bias = model.bias.clone();
+        let order = bias.coefficients_dps.len();
+        let mut rest = c.error_dps.clone();
+        for (column, b) in model.columns.iter().zip(&model.beta).skip(order) {
+            add_scaled(&mut rest, -b, column);
+        }
+        let mut own = Vec::new();
+        for _ in 0..PASSES {
+            let mut columns = super::declared(c);
+            columns.extend(candidate.columns(c, &bias, point));
+            let mut found = super::weighted(&columns, &rest, &model.fit.row_weights);
+            own = found.split_off(order.min(found.len()));
+            bias.coefficients_dps = found;
+        }
+        (bias, own)
     }
 }
 

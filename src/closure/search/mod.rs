@@ -4,7 +4,7 @@
 //! against the noise that the record itself shows ([`super::likelihood`]): a step must be beyond what
 //! chance makes of the best of all candidates ([`judge`]) and may have at most four rivals that do as
 //! well. Rows that stand out are spikes, unless a candidate explains them ([`forward`]). At the end every
-//! step is tried again with the others in, against all other names ([`sweep`]), and must lower the error of
+//! step is tried again with the others in, against all other names ([`sweep`]), must hold ([`validate`]) and lower the error of
 //! held-out rows ([`heldout`]). Where a shape without a name wins, it is kept as what is left.
 
 pub mod constancy;
@@ -20,6 +20,7 @@ pub mod structure;
 pub mod sweep;
 pub mod tones;
 pub mod undone;
+pub mod validate;
 
 use super::channels::{Channels, range};
 use super::effects::{self, Bias, Candidate, Missing, Point};

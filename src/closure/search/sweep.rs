@@ -2,7 +2,7 @@
 
 use super::judge::{Judged, PRICE};
 use super::refine::{self, Bench};
-use super::{Found, LEVEL, MOST_RIVALS, Model, Search, Term, stairs, structure};
+use super::{LEVEL, MOST_RIVALS, Model, Search, Term, stairs};
 use crate::closure::effects::Point;
 use crate::closure::likelihood::Unusable;
 use crate::closure::likelihood::linear::add_scaled;
@@ -16,23 +16,6 @@ const POLISHES: usize = 3;
 
 /// Passes over all terms.
 const SWEEPS: usize = 2;
-
-/// Slow noise, in units of white noise over the record, from which on a single step is no evidence.
-const SLOW: f64 = 2.0;
-
-/// Probability that a step needs over slow noise of twice that strength.
-const WEAK: f64 = 1e-4;
-
-/// A sinusoid beside which another one of this share of its gain is needed is none: a drifting tone, or
-/// something else that repeats.
-const OVERTONE: f64 = 0.1;
-
-/// Probability and share of its gain from which on an effect's gain is not one.
-const UNSTEADY: f64 = 1e-3;
-const UNSTEADY_SHARE: f64 = 0.05;
-
-/// Least selection frequency of a local shape (Meinshausen & Buhlmann 2010 take 0.6 to 0.9).
-const STABLE: f64 = 0.7;
 
 impl Search<'_> {
     /// The non-linear parameters of every term again, with the other terms' columns in: with spikes at
@@ -289,134 +272,5 @@ impl Search<'_> {
         let mut terms = others.to_vec();
         terms.push(term.clone());
         Ok(self.model(&terms)?.value)
-    }
-
-    /// Drops terms that do not lower the held-out error, and tones that are none.
-    ///
-    /// # Errors
-    /// Too few rows.
-    pub fn validated(&self, mut model: Model, found: &mut Found) -> Result<Model, Unusable> {
-        let mut terms = model.terms.clone();
-        let tone = terms
-            .iter()
-            .find(|t| t.id() == "periodic_pickup")
-            .map(|t| t.gain);
-        let further = terms
-            .iter()
-            .find(|t| t.id() == "outside:tone")
-            .map(|t| t.gain);
-        if let (Some(tone), Some(further)) = (tone, further)
-            && further > OVERTONE * tone
-        {
-            terms.retain(|t| t.id() != "periodic_pickup");
-            found.left = Some("time_s".to_owned());
-            model = self.model(&terms)?;
-        }
-        model = self.without_likenesses(model)?;
-        model = self.without_accidents(model, found)?;
-        model = self.without_chance(model, found)?;
-        let mut k = 0;
-        while k < model.terms.len() {
-            let term = model.terms[k].clone();
-            if !term.candidate.named() {
-                k += 1;
-                continue;
-            }
-            let mut others = model.terms.clone();
-            others.remove(k);
-            let without = self.model(&others)?;
-            let (a, b) = (
-                self.heldout_error(&model, &model),
-                self.heldout_error(&without, &model),
-            );
-            if a.innovations >= b.innovations && a.square >= b.square {
-                found.left = found.left.take().or_else(|| self.channel(&term));
-                model = without;
-            } else {
-                k += 1;
-            }
-        }
-        Ok(model)
-    }
-
-    /// Without names that a greater nameless shape in the same channel has left over.
-    fn without_likenesses(&self, model: Model) -> Result<Model, Unusable> {
-        let mut terms = model.terms.clone();
-        let strangers: Vec<(Option<String>, f64)> = terms
-            .iter()
-            .filter(|t| !t.candidate.named())
-            .map(|t| (self.channel(t), t.gain))
-            .collect();
-        terms.retain(|t| {
-            let channel = self.channel(t);
-            !t.candidate.named() || !strangers.iter().any(|(c, g)| *c == channel && *g > t.gain)
-        });
-        if terms.len() == model.terms.len() {
-            return Ok(model);
-        }
-        self.model(&terms)
-    }
-
-    /// Without steps that happen once: they are no law of temperature unless everything else is clean,
-    /// for anything may happen once. And without weak names over strong slow noise.
-    fn without_accidents(&self, model: Model, found: &mut Found) -> Result<Model, Unusable> {
-        let rows = model.fit.problem.line.used();
-        let slow = structure::slowness(model.fit.at.shape, rows);
-        let more = model.terms.iter().any(|t| !t.candidate.named()) || self.coloured(&model);
-        let mut terms = model.terms.clone();
-        terms.retain(|t| {
-            if !t.candidate.named() {
-                return true;
-            }
-            let single = t.id() == "stress_jump" && self.switches(t, &model) < 2;
-            let accident = single && (more || slow > SLOW);
-            let weak = slow > 2.0 * SLOW && t.p_value > WEAK;
-            if accident || weak {
-                found.left = self.channel(t);
-            }
-            !(accident || weak)
-        });
-        if terms.len() == model.terms.len() {
-            return Ok(model);
-        }
-        self.model(&terms)
-    }
-
-    /// Without names that do not hold: with one gain over the whole record, or, for a shape that chance finds
-    /// at some temperature, in most halves of it.
-    fn without_chance(&self, model: Model, found: &mut Found) -> Result<Model, Unusable> {
-        let mut terms = Vec::new();
-        for (k, term) in model.terms.iter().enumerate() {
-            let lasting = self
-                .constancy(&model, term)
-                .is_none_or(|c| c.p_value > UNSTEADY || c.share < UNSTEADY_SHARE);
-            let stable = !term.candidate.is_local() || self.stability(&model, k)? >= STABLE;
-            if term.candidate.named() && !(lasting && stable) {
-                found.left = found.left.take().or_else(|| self.channel(term));
-            } else {
-                terms.push(term.clone());
-            }
-        }
-        if terms.len() == model.terms.len() {
-            return Ok(model);
-        }
-        self.model(&terms)
-    }
-
-    /// The selection frequency of a term against all other names beside the other terms.
-    fn stability(&self, model: &Model, term: usize) -> Result<f64, Unusable> {
-        let mut others = model.terms.clone();
-        others.remove(term);
-        let round = self.round(&self.model(&others)?, 0);
-        Ok(self.selection_frequency(model, term, &round))
-    }
-
-    /// How often a term's column switches between 0 and 1.
-    fn switches(&self, term: &Term, model: &Model) -> usize {
-        let columns = term
-            .candidate
-            .columns(self.channels, &model.bias, &term.point);
-        let count = |c: &Vec<f64>| c.windows(2).filter(|w| w[0] != w[1]).count();
-        columns.iter().map(count).max().unwrap_or(0)
     }
 }

@@ -1,0 +1,250 @@
+//! Names that do not hold lose them: what the record cannot tell from chance, from a wander or from an accident.
+
+use super::judge::Judged;
+use super::{Found, LEVEL, Model, Search, Term, structure};
+use crate::closure::effects::tone::Pickup;
+use crate::closure::likelihood::Unusable;
+use std::sync::Arc;
+
+/// Slow noise, in units of white noise over the record, from which on a single step is no evidence.
+const SLOW: f64 = 2.0;
+
+/// Probability that a step needs over slow noise of twice that strength.
+const WEAK: f64 = 1e-4;
+
+/// Probability from which on a step stands that the held-out rows do not show.
+const CERTAIN: f64 = 1e-8;
+
+/// A sinusoid beside which another one of this share of its gain is needed is none: a drifting tone, or
+/// something else that repeats.
+const OVERTONE: f64 = 0.1;
+
+/// Fewest periods over the record of a tone with a name. What wanders slowly, a channel that was not recorded
+/// say, turns two or three times in a record as well; that it comes back a fourth time is a prediction.
+const NAMED_PERIODS: f64 = 4.0;
+
+/// Probability and share of its gain from which on an effect's gain is not one.
+const UNSTEADY: f64 = 1e-3;
+const UNSTEADY_SHARE: f64 = 0.05;
+
+/// Least selection frequency of a local shape (Meinshausen & Buhlmann 2010 take 0.6 to 0.9), and of any other.
+const STABLE: f64 = 0.7;
+const EVER: f64 = 0.1;
+
+/// Share of the net gain of a name that does not hold with which a law takes its place.
+const AS_GOOD: f64 = 0.85;
+
+impl Search<'_> {
+    /// Drops terms that do not lower the held-out error, and tones that are none.
+    ///
+    /// # Errors
+    /// Too few rows.
+    pub fn validated(&self, mut model: Model, found: &mut Found) -> Result<Model, Unusable> {
+        let mut terms = model.terms.clone();
+        let tone = terms
+            .iter()
+            .find(|t| t.id() == "periodic_pickup")
+            .map(|t| t.gain);
+        let further = terms
+            .iter()
+            .find(|t| t.id() == "outside:tone")
+            .map(|t| t.gain);
+        if let (Some(tone), Some(further)) = (tone, further)
+            && further > OVERTONE * tone
+        {
+            terms.retain(|t| t.id() != "periodic_pickup");
+            found.left = Some("time_s".to_owned());
+            model = self.model(&terms)?;
+        }
+        model = self.without_waves(model, found)?;
+        model = self.without_likenesses(model)?;
+        model = self.without_accidents(model, found)?;
+        model = self.without_chance(model, found)?;
+        let mut k = 0;
+        while k < model.terms.len() {
+            let term = model.terms[k].clone();
+            if !term.candidate.named() {
+                k += 1;
+                continue;
+            }
+            let mut others = model.terms.clone();
+            others.remove(k);
+            let without = self.model(&others)?;
+            let (a, b) = (
+                self.heldout_error(&model, &model),
+                self.heldout_error(&without, &model),
+            );
+            let silent = term.p_value <= CERTAIN && self.unseen(&model, &term);
+            if !silent && a.innovations >= b.innovations && a.square >= b.square {
+                found.left = found.left.take().or_else(|| self.channel(&term));
+                model = without;
+            } else {
+                k += 1;
+            }
+        }
+        Ok(model)
+    }
+
+    /// Whether a term adds nothing in any held-out row, so that these say nothing of it: a clip of a few rows.
+    fn unseen(&self, model: &Model, term: &Term) -> bool {
+        let columns = term
+            .candidate
+            .columns(self.channels, &model.bias, &term.point);
+        let is_zero = |column: &Vec<f64>| {
+            let mut rows = column.iter().zip(&self.heldout);
+            rows.all(|(v, held)| !held || *v == 0.0)
+        };
+        columns.iter().all(is_zero)
+    }
+
+    /// Tones of too few periods keep their shape and lose their name.
+    fn without_waves(&self, model: Model, found: &mut Found) -> Result<Model, Unusable> {
+        let mut terms = model.terms.clone();
+        let mut waves = false;
+        for term in terms.iter_mut().filter(|t| t.id() == "periodic_pickup") {
+            let frequency_hz = term.point.theta.first().copied().unwrap_or(0.0);
+            if frequency_hz * self.channels.span_s() < NAMED_PERIODS {
+                waves = true;
+                term.candidate = Arc::new(Pickup {
+                    frequency_hz,
+                    further: true,
+                });
+            }
+        }
+        if !waves {
+            return Ok(model);
+        }
+        found.left = found.left.take().or_else(|| Some("time_s".to_owned()));
+        self.model(&terms)
+    }
+
+    /// Without names that a greater nameless shape in the same channel has left over.
+    fn without_likenesses(&self, model: Model) -> Result<Model, Unusable> {
+        let mut terms = model.terms.clone();
+        let strangers: Vec<(Option<String>, f64)> = terms
+            .iter()
+            .filter(|t| !t.candidate.named())
+            .map(|t| (self.channel(t), t.gain))
+            .collect();
+        terms.retain(|t| {
+            let channel = self.channel(t);
+            !t.candidate.named() || !strangers.iter().any(|(c, g)| *c == channel && *g > t.gain)
+        });
+        if terms.len() == model.terms.len() {
+            return Ok(model);
+        }
+        self.model(&terms)
+    }
+
+    /// Without steps that happen once: they are no law of temperature unless everything else is clean,
+    /// for anything may happen once. And without weak names over strong slow noise.
+    fn without_accidents(&self, model: Model, found: &mut Found) -> Result<Model, Unusable> {
+        let rows = model.fit.problem.line.used();
+        let slow = structure::slowness(model.fit.at.shape, rows);
+        let more = model.terms.iter().any(|t| !t.candidate.named()) || self.coloured(&model);
+        let mut terms = model.terms.clone();
+        terms.retain(|t| {
+            if !t.candidate.named() {
+                return true;
+            }
+            let single = t.id() == "stress_jump" && self.switches(t, &model) < 2;
+            let accident = single && (more || slow > SLOW);
+            let weak = slow > 2.0 * SLOW && t.p_value > WEAK;
+            if accident || weak {
+                found.left = self.channel(t);
+            }
+            !(accident || weak)
+        });
+        if terms.len() == model.terms.len() {
+            return Ok(model);
+        }
+        self.model(&terms)
+    }
+
+    /// Without names that do not hold: with one gain over the whole record, in some halves of it, or, for a shape
+    /// that chance finds at some temperature, in most of them. They leave their place to a law of the whole
+    /// record that explains as much: the more supple of the two came first.
+    fn without_chance(&self, model: Model, found: &mut Found) -> Result<Model, Unusable> {
+        let mut terms = model.terms.clone();
+        let mut k = 0;
+        let mut changed = false;
+        for (own, term) in model.terms.iter().enumerate() {
+            if !term.candidate.named() || (self.lasts(&model, term) && self.recurs(&model, own)?) {
+                k += 1;
+                continue;
+            }
+            changed = true;
+            let mut others = terms.clone();
+            others.remove(k);
+            match self.law_instead(&others, term)? {
+                Some(law) => {
+                    terms[k] = law;
+                    k += 1;
+                }
+                None => {
+                    found.left = found.left.take().or_else(|| self.channel(term));
+                    terms = others;
+                }
+            }
+        }
+        if !changed {
+            return Ok(model);
+        }
+        self.polished(self.model(&terms)?)
+    }
+
+    /// Whether a term has one gain.
+    fn lasts(&self, model: &Model, term: &Term) -> bool {
+        self.constancy(model, term)
+            .is_none_or(|c| c.p_value > UNSTEADY || c.share < UNSTEADY_SHARE)
+    }
+
+    /// The best law in place of a name that does not hold, if it is as good.
+    fn law_instead(&self, others: &[Term], own: &Term) -> Result<Option<Term>, Unusable> {
+        let without = self.model(others)?;
+        let round = self.round(&without, self.effort.surrogates);
+        let is_own = |j: &&Judged| j.candidate.id() == own.id();
+        let same = round.judged.iter().find(is_own);
+        let mut laws = round.judged.iter().filter(|j| !is_own(j));
+        let laws = laws.find(|j| j.candidate.named() && !j.candidate.is_local());
+        let (Some(law), Some(same)) = (laws, same) else {
+            return Ok(None);
+        };
+        if law.p_value > LEVEL || law.net < AS_GOOD * same.net {
+            return Ok(None);
+        }
+        let mut term = Term::of(law, round.rivals(law));
+        term.beside = others.iter().map(Term::id).collect();
+        let mut terms = others.to_vec();
+        terms.push(term.clone());
+        let model = self.model(&terms)?;
+        Ok(self.lasts(&model, &term).then_some(term))
+    }
+
+    /// Whether enough halves of the record select a term beside the other terms. A local shape competes with laws
+    /// alone: of two shapes at one temperature each takes halves from the other, and whatever is there
+    /// stays.
+    fn recurs(&self, model: &Model, own: usize) -> Result<bool, Unusable> {
+        let candidate = &model.terms[own].candidate;
+        if candidate.is_whole() {
+            return Ok(true);
+        }
+        let local = candidate.is_local();
+        let mut others = model.terms.clone();
+        others.remove(own);
+        let round = self.round(&self.model(&others)?, 0);
+        let against = round.judged.iter();
+        let against = against.filter(|j| !(local && j.candidate.is_local()));
+        let least = if local { STABLE } else { EVER };
+        Ok(self.selection_frequency(model, own, against) >= least)
+    }
+
+    /// How often a term's column switches between 0 and 1.
+    fn switches(&self, term: &Term, model: &Model) -> usize {
+        let columns = term
+            .candidate
+            .columns(self.channels, &model.bias, &term.point);
+        let count = |c: &Vec<f64>| c.windows(2).filter(|w| w[0] != w[1]).count();
+        columns.iter().map(count).max().unwrap_or(0)
+    }
+}
