@@ -7,7 +7,7 @@
 //! the smoothest course that stays within the cell of every reading.
 
 use super::channels::Channels;
-use super::likelihood::linear::{Basis, dot};
+use super::search::declared_by;
 use super::staircase::Staircase;
 use crate::design::Design;
 use crate::record::stats;
@@ -46,15 +46,11 @@ pub fn course(c: &Channels, design: &Design) -> Option<Course> {
     let step = step_of(&raw)?;
     let reading = smoothest(&raw, &cells(c, design, &raw, step));
     let u: Vec<f64> = reading.iter().map(|r| (r - c.centre) / c.half).collect();
-    let measured: Vec<usize> = (0..c.len())
-        .filter(|i| c.error_dps[*i].is_finite())
-        .collect();
-    let (_, rounded) = residual(c, &c.u, &measured);
-    let (beta, smooth) = residual(c, &u, &measured);
-    let bias = |u: f64| beta.iter().rev().fold(0.0, |sum, b| sum * u + b);
-    let artefact: Vec<f64> = measured
-        .iter()
-        .map(|i| bias(c.u[*i]) - bias(u[*i]))
+    let (_, rounded) = declared_by(&c.u, &c.error_dps);
+    let (bias, smooth) = declared_by(&u, &c.error_dps);
+    let artefact: Vec<f64> = (c.u.iter().zip(&u).zip(&c.error_dps))
+        .filter(|(_, e)| e.is_finite())
+        .map(|((rounded, u), _)| bias.at(*rounded) - bias.at(*u))
         .collect();
     let artefact_rms_dps = stats::rms(&artefact);
     let matters = artefact_rms_dps > MATTERS * stats::difference_noise(&smooth);
@@ -93,16 +89,6 @@ fn cells(c: &Channels, design: &Design, raw: &[f64], step: f64) -> Vec<(f64, f64
         own.unwrap_or((r - 0.5 * step, r + 0.5 * step))
     };
     raw.iter().map(cell).collect()
-}
-
-/// Least squares of 1, u, u^2 over some rows: coefficients and residuals.
-fn residual(c: &Channels, u: &[f64], rows: &[usize]) -> (Vec<f64>, Vec<f64>) {
-    let power = |k: i32| rows.iter().map(|i| u[*i].powi(k)).collect::<Vec<f64>>();
-    let basis = Basis::new(&[power(0), power(1), power(2)]);
-    let mut rest: Vec<f64> = rows.iter().map(|i| c.error_dps[*i]).collect();
-    let z: Vec<f64> = basis.q.iter().map(|q| dot(q, &rest)).collect();
-    basis.project_off(&mut rest);
-    (basis.solve(&z), rest)
 }
 
 /// The step of readings that take few values, evenly spaced; `None` for others.
