@@ -43,7 +43,7 @@ fn the_rms_is_the_formulas() {
         ("Q1.7", 1024, 60.0),
         ("Q1.7", 1024, 20.0),
         ("Q1.9", 32, 240.0),
-        ("Q1.5", 64, 24.0),
+        ("Q1.5", 64, 16.0),
     ] {
         let design = design(adc, count);
         for noise_lsb in [0.0, 0.1, 0.2, 0.35] {
