@@ -102,3 +102,46 @@ fn steps_of_the_phase_word_are_taken_out_and_not_named() {
     let firmware = closure["firmware"]["heldout_rms"].as_f64().unwrap();
     assert!(after < 0.04 && firmware > 0.3, "{after} {firmware}");
 }
+
+/// An ADC of 8 bits with a tenth of an LSB of noise before it, and an oscillator of 32 phases: 0.5 deg/s that turn with
+/// temperature. The circuit's own blocks tell them, and what is in the record beside them.
+#[test]
+fn rounding_of_an_undithered_adc_is_taken_out_and_not_named() {
+    let changes = [
+        (
+            "format = \"Q1.15\"\n\n# The osc",
+            "format = \"Q1.7\"\n\n# The osc",
+        ),
+        ("adc_noise_lsb = 1.0", "adc_noise_lsb = 0.1"),
+        (
+            "rate_noise_dps_rthz = 0.0073",
+            "rate_noise_dps_rthz = 0.0001",
+        ),
+        ("flicker_dph = 30.0", "flicker_dph = 0.1"),
+        (
+            "rate_random_walk_dph_rth = 10.0",
+            "rate_random_walk_dph_rth = 0.02",
+        ),
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    let closure = closed(folder.path(), &design(&changes));
+    assert_eq!(closure["steps"], serde_json::json!([]));
+    let before = closure["before"]["heldout_rms"].as_f64().unwrap();
+    assert!(before < 0.06, "{before}");
+    let warnings = closure["warnings"].as_array().unwrap();
+    assert!(warnings.iter().any(|w| w["code"] == "adc_not_dithered"));
+    // The firmware reads the codes.
+    let firmware = closure["firmware"]["heldout_rms"].as_f64().unwrap();
+    assert!(firmware > 0.3, "{firmware}");
+
+    // A cause of 0.2 deg/s rms beside it.
+    let effect = "[gyro.effects.mode_crossing]\namplitude_dps = 0.3\ncenter_degc = 37.5\nhalf_width_k = 3.7\n\n\n# ---- The thermal run";
+    let mut changes = changes.to_vec();
+    changes.push(("# ---- The thermal run", effect));
+    let closure = closed(folder.path(), &design(&changes));
+    let steps = closure["steps"].as_array().unwrap();
+    assert_eq!(steps.len(), 1, "{steps:?}");
+    assert_eq!(steps[0]["effect"], "mode_crossing");
+    let centre_degc = steps[0]["parameters"]["centre_degc"].as_f64().unwrap();
+    assert!((centre_degc - 37.5).abs() < 1.0, "{centre_degc}");
+}

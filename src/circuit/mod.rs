@@ -23,6 +23,7 @@ pub mod engine;
 pub mod in_range;
 pub mod nco;
 pub mod phase_loop;
+pub mod scale;
 
 /// The four channels, in the contract's order.
 pub const CHANNELS: [&str; 4] = ["drive_i", "drive_q", "sense_i", "sense_q"];

@@ -33,6 +33,8 @@ pub struct Channels {
     /// For a phase: the temperature as a resonator without phase lag elsewhere has it, tan(p - p_r),
     /// scaled to -1..1 and smooth; `None` for other thermometers, and for a phase far from resonance.
     pub tangent: Option<Vec<f64>>,
+    /// rms of the error that the circuit's own rounding leaves in the output, deg/s; 0 where it does not matter.
+    pub rounding_dps: f64,
     /// All other columns but the output, by name.
     pub columns: BTreeMap<String, Vec<f64>>,
 }
@@ -97,6 +99,7 @@ impl Channels {
             middle_degc: 0.0,
             kelvin_per_u: 1.0,
             tangent: None,
+            rounding_dps: 0.0,
             columns: others,
         };
         out.tangent = out.tangent_of_phase();

@@ -277,6 +277,14 @@ impl Told<'_> {
             } else if confounded.contains(&&id) || self.found.undecided.contains(&id) {
                 let remark = format!("explains as much; {}", j.candidate.sheet().experiment);
                 (Fate::Confounded, remark)
+            } else if let Some((_, rms_dps)) = self.found.within_rounding.iter().find(|r| r.0 == id)
+            {
+                let remark = format!(
+                    "its whole contribution, {rms_dps:.2e} deg/s rms, is below twice the {:.2e} deg/s that the ADC's \
+                     rounding makes",
+                    self.search.channels.rounding_dps
+                );
+                (Fate::Rejected, remark)
             } else if j.p_value <= LEVEL {
                 let remark = "seen alone it helps, but what was taken explains more";
                 (Fate::Rejected, remark.to_owned())
@@ -312,6 +320,19 @@ impl Told<'_> {
     }
 
     fn warn(&self, warnings: &mut Vec<Warning>) {
+        if !self.found.within_rounding.is_empty() {
+            let each = self.found.within_rounding.iter();
+            let names: Vec<String> = each.map(|(id, rms)| format!("{id} ({rms:.2e})")).collect();
+            warnings.push(Warning::general(
+                "within_adc_rounding",
+                format!(
+                    "not named, as the whole contribution (deg/s rms) is below twice the {:.2e} deg/s that the ADC's \
+                     rounding makes: {}",
+                    self.search.channels.rounding_dps,
+                    names.join(", ")
+                ),
+            ));
+        }
         if !self.found.undecided.is_empty() {
             warnings.push(Warning::general(
                 "undecided",

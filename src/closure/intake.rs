@@ -1,5 +1,6 @@
 //! A record as candidates see it: which column is the thermometer, and what its readings are in degC.
 
+use super::adc_rows;
 use super::channels::Channels;
 use super::quantised::{self, Course};
 use crate::design::{Design, Gyro, RecordMapping};
@@ -115,13 +116,24 @@ pub fn channels_of(
         let made = Channels::new(&record.time_s, columns, &name, degc);
         made.map_err(|missing| refused(record, format!("column {missing} holds no measured value")))
     };
-    let channels = seen(&columns)?;
-    let Some(course) = quantised::course(&channels, design) else {
+    let mut channels = seen(&columns)?;
+    if let Some(course) = quantised::course(&channels, design) {
+        warnings.push(rounding(design, &name, &course));
+        columns.insert(name.clone(), course.reading);
+        channels = seen(&columns)?;
+    }
+    let Some(undithered) = adc_rows::found(&columns, &channels, design, seen)? else {
         return Ok(channels);
     };
-    warnings.push(rounding(design, &name, &course));
-    columns.insert(name.clone(), course.reading);
-    seen(&columns)
+    warnings.push(undithered.warning(design));
+    let rounding_dps = undithered.left_dps();
+    if let Some((columns, _)) = &undithered.removed {
+        channels = seen(columns)?;
+    }
+    Ok(Channels {
+        rounding_dps,
+        ..channels
+    })
 }
 
 /// What is said of a thermometer that is read in coarse steps.

@@ -5,10 +5,12 @@
 //! correlation, and the coefficients' covariance), [`folds`] (held-out blocks), [`order`] (its
 //! choice), [`sweep`] (heating against cooling) and [`checks`] (what a user should know of before
 //! believing the fit). [`likelihood`] is what tells an effect from noise with a memory. [`capture`] does the
-//! same for ADC codes. [`close`] answers for a thermal record: [`intake`] ([`quantised`], [`staircase`]: coarse thermometers), [`channels`],
+//! same for ADC codes. [`close`] answers for a thermal record: [`intake`] ([`quantised`], [`staircase`]: coarse thermometers; [`adc_rows`], [`adc_rounding`]: coarse ADCs), [`channels`],
 //! candidate [`effects`] and their [`search`], [`firmware`]; [`verdict`] is the form of the answer. Nothing here knows the plant
 //! (law 4).
 
+pub mod adc_rounding;
+pub mod adc_rows;
 pub mod baseline;
 pub mod capture;
 pub mod channels;

@@ -12,10 +12,10 @@ pub mod inexact;
 pub mod path;
 pub mod readings;
 pub mod rest;
-pub mod scale;
 pub mod stream;
 pub mod surroundings;
 
+pub use crate::circuit::scale;
 pub use path::{Path, RealRow};
 
 #[cfg(test)]

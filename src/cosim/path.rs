@@ -84,18 +84,6 @@ impl Units {
     }
 }
 
-/// What an amplitude at the drive ADC (LSB) is, for a magnitude of 1: a product with the carrier
-/// halves it, and the decimator's gain is (R M)^N / 2^G.
-pub fn amplitude_lsb_per_magnitude(design: &Design) -> f64 {
-    let circuit = &design.circuit;
-    let decimator = &circuit.decimator;
-    let span = f64::from(decimator.ratio * decimator.differential_delay);
-    let gain = span.powi(decimator.stages as i32) * pow2(-(decimator.gain_bits() as i32));
-    let table = circuit.nco.table;
-    let carrier = (pow2(table.bits() as i32 - 1) - 1.0) * table.lsb();
-    2.0 / (carrier * gain) / circuit.adc.format.lsb()
-}
-
 impl Path {
     /// A circuit and a gyro that have not started.
     pub fn new(design: &Design, kind: ArithmeticKind) -> Self {

@@ -1,7 +1,7 @@
 //! Where the loops come to rest, and how fast: the closed loop linearised around its steady state.
 
-use super::path::amplitude_lsb_per_magnitude;
 use crate::circuit::chain::Held;
+use crate::circuit::scale::amplitude_lsb_per_magnitude;
 use crate::design::Design;
 use crate::error::{InputError, Result};
 use crate::numeric::format::pow2;

@@ -102,7 +102,7 @@ fn at(design: &Design, degc: f64) -> Result<Vec<Hunting>> {
     }
     // One LSB of the drive ADC over the amplitude.
     let amplitude = rows.last().map_or(0.0, |r| r.magnitude)
-        * crate::cosim::path::amplitude_lsb_per_magnitude(design);
+        * crate::circuit::scale::amplitude_lsb_per_magnitude(design);
     let converters = 1.0 / amplitude.max(1.0) + address_truncation_rad(design);
     let mut found = Vec::new();
     if let Some(l) = &circuit.phase_loop {

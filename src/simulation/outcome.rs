@@ -326,7 +326,7 @@ fn warnings(parts: &Parts) -> Vec<Warning> {
     let mut warnings = parts.warnings.clone();
     let design = &parts.design;
     let full_scale = |t: &Taken| t.fixed.magnitude;
-    let amplitude = crate::cosim::path::amplitude_lsb_per_magnitude(design);
+    let amplitude = crate::circuit::scale::amplitude_lsb_per_magnitude(design);
     let largest = parts.run.taken.iter().map(full_scale).fold(0.0, f64::max) * amplitude;
     let adc = crate::numeric::format::pow2(design.circuit.adc.format.bits() as i32 - 1);
     if largest > 0.99 * adc {

@@ -1,6 +1,7 @@
 //! Forward steps.
 
 use super::judge::{Judged, Round};
+use super::memo::Memo;
 use super::{Found, LEVEL, MOST_RIVALS, Model, Search, Term};
 use crate::closure::likelihood::{Unusable, reml};
 
@@ -52,6 +53,7 @@ impl Search<'_> {
             first: Vec::new(),
             missing: Vec::new(),
             undecided: Vec::new(),
+            within_rounding: Vec::new(),
         };
         let mut model = self.model(&[])?;
         for _ in 0..ROUNDS {
@@ -78,6 +80,7 @@ impl Search<'_> {
             found.left = found.left.or_else(|| self.channel(stranger));
         }
         self.kept_below(&mut found)?;
+        self.kept_above_rounding(&mut found)?;
         Ok(found)
     }
 
@@ -175,10 +178,15 @@ impl Search<'_> {
             ..self.options()
         };
         let plain = self.model_with(&model.terms, &plainly)?;
+        // The thorough look meets the names of the quick one again.
+        let known = Memo::default();
         let value = |j: &Judged| -> Result<f64, Unusable> {
             let mut terms = model.terms.clone();
             terms.push(Term::of(j, Vec::new()));
-            Ok(self.model_with(&terms, &self.near(model))?.value - j.gain + j.net)
+            if known.get(&terms).is_none() {
+                known.keep(&terms, self.model_with(&terms, &self.near(model))?.value);
+            }
+            Ok(known.get(&terms).unwrap_or(f64::NEG_INFINITY) - j.gain + j.net)
         };
         let worth = |j: &Judged| match j.candidate.is_whole() {
             true => WORTH_WHOLE,

@@ -7,7 +7,7 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 
 /// Entries that are kept: a search comes back to what it has just left.
-const KEPT: usize = 8;
+const KEPT: usize = 32;
 
 /// Terms by their ids and shapes, in order.
 type Key = Vec<(String, Point)>;

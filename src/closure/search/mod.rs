@@ -15,6 +15,7 @@ pub mod heldout;
 pub mod judge;
 mod memo;
 pub mod refine;
+mod rounding;
 pub mod stairs;
 pub mod structure;
 pub mod sweep;
@@ -134,6 +135,8 @@ pub struct Found {
     pub missing: Vec<(Arc<dyn Candidate>, Missing)>,
     /// More than four explanations of one thing: no step.
     pub undecided: Vec<String>,
+    /// Names whose whole contribution the circuit's own rounding may be, with its rms, deg/s: no steps.
+    pub within_rounding: Vec<(String, f64)>,
 }
 
 /// A search over one record.
@@ -154,11 +157,34 @@ pub struct Search<'a> {
 
 /// The regressors of the declared model: 1, u, u^2.
 pub fn declared(c: &Channels) -> Vec<Vec<f64>> {
-    let (low, high) = range(&c.u);
+    powers(&c.u)
+}
+
+/// The same of any scaled reading; 1 alone if it does not move.
+pub fn powers(u: &[f64]) -> Vec<Vec<f64>> {
+    let (low, high) = range(u);
     let order = if high > low { 3 } else { 1 };
     (0..order)
-        .map(|k| c.u.iter().map(|u| u.powi(k)).collect())
+        .map(|k| u.iter().map(|u| u.powi(k)).collect())
         .collect()
+}
+
+/// The declared bias in a scaled reading by ordinary least squares, and what it leaves of the rows that are measured.
+pub fn declared_by(u: &[f64], error_dps: &[f64]) -> (Bias, Vec<f64>) {
+    let measured = |e: &f64| f64::from(u8::from(e.is_finite()));
+    let weights: Vec<f64> = error_dps.iter().map(measured).collect();
+    let columns = powers(u);
+    let coefficients_dps = weighted(&columns, error_dps, &weights);
+    let mut rest = error_dps.to_vec();
+    for (b, column) in coefficients_dps.iter().zip(&columns) {
+        add_scaled(&mut rest, -b, column);
+    }
+    rest.retain(|r| r.is_finite());
+    let bias = Bias {
+        coefficients_dps,
+        others_dps: Vec::new(),
+    };
+    (bias, rest)
 }
 
 impl<'a> Search<'a> {
@@ -248,8 +274,12 @@ impl<'a> Search<'a> {
             (true, 1) => 2,
             (true, _) => 3,
         };
+        // Later passes move the bias a little; the noise is near that of the first.
+        let mut passing = *options;
         for _ in 0..passes {
-            bias = self.model_once(terms, &bias, options)?.bias;
+            let pass = self.model_once(terms, &bias, &passing)?;
+            passing.near = passing.near.or(Some(pass.fit.at.shape));
+            bias = pass.bias;
         }
         self.model_once(terms, &bias, options)
     }
@@ -400,7 +430,7 @@ fn clip(c: &Channels, bias: &Bias, columns: &mut [Vec<f64>], kinds: &[Kind]) -> 
 }
 
 /// Weighted least squares; rows of weight 0 may hold anything.
-fn weighted(columns: &[Vec<f64>], y: &[f64], weights: &[f64]) -> Vec<f64> {
+pub fn weighted(columns: &[Vec<f64>], y: &[f64], weights: &[f64]) -> Vec<f64> {
     let scaled = |c: &[f64]| -> Vec<f64> {
         let pairs = c.iter().zip(weights);
         pairs

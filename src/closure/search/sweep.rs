@@ -150,7 +150,7 @@ impl Search<'_> {
                 let mut others = model.terms.clone();
                 let own = others.remove(k);
                 let own_spikes = self.spikes(&model.fit);
-                let ag = self.again(&others, &own, own_spikes)?;
+                let ag = self.again((&others, k), &own, own_spikes)?;
                 match ag {
                     Some(term) => {
                         changed |= term.id() != own.id();
@@ -172,7 +172,7 @@ impl Search<'_> {
     /// What takes a term's place beside the others; `None`: nothing is needed.
     fn again(
         &self,
-        others: &[Term],
+        (others, k): (&[Term], usize),
         own: &Term,
         own_spikes: usize,
     ) -> Result<Option<Term>, Unusable> {
@@ -214,7 +214,7 @@ impl Search<'_> {
             let mut term = kept(same);
             // Judged with the rows out that only it explains, it may have lost its shape.
             if term.point != own.point
-                && self.value_of(others, own)? > self.value_of(others, &term)?
+                && self.value_of((others, k), own)? > self.value_of((others, k), &term)?
             {
                 term.point = own.point.clone();
             }
@@ -267,10 +267,10 @@ impl Search<'_> {
         Ok(model)
     }
 
-    /// Log-likelihood with one term more.
-    fn value_of(&self, others: &[Term], term: &Term) -> Result<f64, Unusable> {
+    /// Log-likelihood with one term more, at its place among the others: that model is known, or needed next.
+    fn value_of(&self, (others, k): (&[Term], usize), term: &Term) -> Result<f64, Unusable> {
         let mut terms = others.to_vec();
-        terms.push(term.clone());
+        terms.insert(k, term.clone());
         Ok(self.model(&terms)?.value)
     }
 }

@@ -89,6 +89,72 @@ mod tests {
     use super::*;
     use crate::closure::likelihood::random::Stream;
 
+    /// A supply and a column that is the supply with a little of its own; the output has `own` of that and `supply` of
+    /// the supply. Which of the two names the model with both takes back.
+    fn taken_back(own: f64, supply_dps: f64) -> Option<usize> {
+        use crate::closure::channels::Channels;
+        use crate::closure::effects::Candidate;
+        use crate::closure::likelihood::blocks;
+        use crate::closure::search::Effort;
+        use crate::closure::synthetic::triangle;
+        use std::collections::BTreeMap;
+        let [noise, little] = [0, 1].map(|k| Stream::new(11, k).normals(300));
+        let degc = [triangle(150), triangle(150)].concat();
+        let supply: Vec<f64> = (0..300)
+            .map(|k| f64::from(u8::from(k / 11 % 3 == 1)))
+            .collect();
+        let rate = |i: usize| {
+            let bias = 5.0 + 0.1 * degc[i];
+            bias + own * little[i] + supply_dps * supply[i] + 0.01 * noise[i]
+        };
+        let columns = BTreeMap::from([
+            ("rate_out_dps".to_owned(), (0..300).map(rate).collect()),
+            ("die_degc".to_owned(), degc.clone()),
+            (
+                "accel_g".to_owned(),
+                (0..300).map(|i| supply[i] + 0.02 * little[i]).collect(),
+            ),
+            ("supply_v".to_owned(), supply.clone()),
+        ]);
+        let time_s: Vec<f64> = (0..300).map(|k| 10.0 * f64::from(k)).collect();
+        let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+        let split = blocks::split(&c.time_s, &c.u).unwrap();
+        let search = Search::new(&c, &split, Effort::default(), Vec::new());
+        let term = |id: &str| {
+            let is_it = |c: &&std::sync::Arc<dyn Candidate>| c.id() == id;
+            let candidate = search.candidates().iter().find(is_it).unwrap().clone();
+            Term {
+                point: candidate.points(&c).remove(0),
+                candidate,
+                p_value: 0.0,
+                rivals: Vec::new(),
+                gain: 0.0,
+                beside: Vec::new(),
+            }
+        };
+        let terms = [term("supply_sensitivity"), term("g_sensitivity")];
+        let model = search.model(&terms).unwrap();
+        let before = search.undone(&model);
+        let left = search.without_undone(model).unwrap();
+        assert_eq!(left.terms.len(), 2 - usize::from(before.is_some()));
+        // It never comes back.
+        assert_eq!(search.barred.borrow().len(), usize::from(before.is_some()));
+        before
+    }
+
+    #[test]
+    fn two_names_that_cancel_are_not_both_kept() {
+        // What the columns differ in, 2 per cent of each: fifty times that of both.
+        assert_eq!(taken_back(0.02, 0.0), Some(0));
+        // The supply alone beside nothing of the other.
+        assert_eq!(taken_back(0.0, 0.3), None);
+        // Both, much of each.
+        assert_eq!(taken_back(0.02, 3.0), None);
+        // Opposed: -0.75 and 1 leave 0.06 of the second's sum of squares, -0.6 and 1 leave 0.16.
+        assert_eq!(taken_back(0.02, 0.25), Some(1));
+        assert_eq!(taken_back(0.02, 0.4), None);
+    }
+
     #[test]
     fn what_is_taken_back_is_undone_and_what_stands_beside_is_not() {
         let part = Stream::new(3, 0).normals(500);
