@@ -1,7 +1,8 @@
 //! Effects of the demodulation phase: quadrature that leaks into the rate.
 
 use super::{
-    Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, gain, heated, moving,
+    Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, entry, gain, heated,
+    moving,
 };
 use crate::closure::channels::Channels;
 use crate::closure::firmware::Words;
@@ -93,8 +94,10 @@ const ZERO_DEGC: (f64, f64) = (-40.0, 125.0);
 /// a design that may be another gyro's.
 const ZERO_SPANS: f64 = 1.5;
 
-/// First guesses of the zero, in half spans from the middle.
+/// First guesses of the zero: in half spans from the middle, and where a phase is usually trimmed, degC (300 K,
+/// ambient temperatures).
 const ZEROS: [f64; 4] = [-1.5, -0.5, 0.5, 1.5];
+const TRIMMED_DEGC: [f64; 3] = [26.85, 25.0, 20.0];
 
 /// Least and greatest zero of the phase error, in half spans from the middle.
 fn zeros(c: &Channels) -> (f64, f64) {
@@ -106,9 +109,6 @@ fn zeros(c: &Channels) -> (f64, f64) {
     };
     (a.min(b).min(-own), a.max(b).max(own))
 }
-
-/// Temperatures at which the phase is taken to be trimmed, degC: 300 K and the usual ambient ones.
-const TRIMMED_DEGC: [f64; 3] = [26.85, 25.0, 20.0];
 
 impl Candidate for PhaseDrift {
     fn sheet(&self) -> &Sheet {
@@ -124,32 +124,28 @@ impl Candidate for PhaseDrift {
     }
 
     fn points(&self, c: &Channels) -> Vec<Point> {
-        // The temperature at which the phase is trimmed is an ambient one; else it is sought.
         let (low, high) = zeros(c);
-        let mut points: Vec<Point> = (0..TRIMMED_DEGC.len()).map(Point::form).collect();
-        for heat in 0..c.heats() {
-            let starts = ZEROS.iter().filter(|z| (low..=high).contains(*z));
-            points.extend(starts.map(|z| Point::at(TRIMMED_DEGC.len() + heat, &[*z])));
-        }
-        points
+        let trimmed = TRIMMED_DEGC.map(|t| (t - c.middle_degc) / c.kelvin_per_u);
+        let starts: Vec<f64> = ZEROS.into_iter().chain(trimmed).collect();
+        let starts = starts.iter().filter(|z| (low..=high).contains(*z));
+        (0..c.heats())
+            .flat_map(|heat| starts.clone().map(move |z| Point::at(heat, &[*z])))
+            .collect()
     }
 
     fn columns(&self, c: &Channels, _bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
         let Some(q) = c.column("quad_dps") else {
             return Vec::new();
         };
-        let drift = |heat: &[f64], zero: f64| {
-            let pairs = q.iter().zip(heat);
-            vec![pairs.map(|(q, u)| q * (u - zero)).collect()]
-        };
         let (low, high) = zeros(c);
-        match (TRIMMED_DEGC.get(point.form), point.theta.first()) {
-            (Some(trimmed), _) => drift(&c.u, (trimmed - c.middle_degc) / c.kelvin_per_u),
-            (None, Some(zero)) if (low..=high).contains(zero) => {
-                drift(c.heat(point.form - TRIMMED_DEGC.len()), *zero)
+        let heat = c.heat(point.form);
+        let drift = match point.theta.first() {
+            Some(zero) if (low..=high).contains(zero) => {
+                q.iter().zip(heat).map(|(q, u)| q * (u - zero)).collect()
             }
-            _ => vec![vec![0.0; q.len()]],
-        }
+            _ => vec![0.0; q.len()],
+        };
+        vec![drift]
     }
 
     fn spacing(&self, _c: &Channels, point: &Point) -> Vec<f64> {
@@ -162,21 +158,14 @@ impl Candidate for PhaseDrift {
     }
 
     fn report(&self, c: &Channels, e: &Estimate) -> Reported {
-        let mut out: Reported = [gain("phase_slope_rad_per_k", e, 0, 1.0 / c.kelvin_per_u)]
-            .into_iter()
-            .collect();
-        let zero = match (TRIMMED_DEGC.get(e.point.form), e.point.theta.first()) {
-            (Some(trimmed), _) => Some((*trimmed, 0.0)),
-            (None, Some(zero)) => {
-                let std = e.theta_std.first().copied().unwrap_or(0.0);
-                let degc = c.middle_degc + c.kelvin_per_u * zero;
-                Some((degc, (c.kelvin_per_u * std).abs()))
-            }
-            _ => None,
-        };
-        if let Some(zero) = zero {
-            out.insert("zero_degc".to_owned(), zero);
-        }
-        out
+        let at = |v: &[f64]| v.first().copied().unwrap_or(0.0);
+        let degc = c.middle_degc + c.kelvin_per_u * at(&e.point.theta);
+        let std = (c.kelvin_per_u * at(&e.theta_std)).abs();
+        [
+            gain("phase_slope_rad_per_k", e, 0, 1.0 / c.kelvin_per_u),
+            entry("zero_degc", degc, std),
+        ]
+        .into_iter()
+        .collect()
     }
 }
