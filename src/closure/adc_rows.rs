@@ -147,7 +147,9 @@ pub fn found<E>(
     let predicted_dps = sense_dps
         .hypot(drive * by_phase)
         .hypot(drive * by_amplitude);
-    if !(predicted_dps > MATTERS * stats::difference_noise(&rest)) {
+    // Without any noise to hold it against, it does not.
+    let matters = predicted_dps > MATTERS * stats::difference_noise(&rest);
+    if !matters {
         return Ok(None);
     }
     let removed = match quadrature {

@@ -97,6 +97,11 @@ mod tests {
             for k in 0..300 {
                 let phase_rad = -2.19 + 0.0026 * f64::from(k);
                 let word = phase_word(&vectoring, magnitude, fraction_bits, phase_rad);
+                // The word is the phase, but for the last micro-rotation and half an LSB of each angle (Hu 1992).
+                let off = word as f64 * lsb_rad - phase_rad;
+                let rounded = 0.5 * lsb_rad * f64::from(iterations);
+                let bound = 2f64.powi(1 - iterations as i32) + rounded;
+                assert!(off.abs() < bound, "{iterations} {phase_rad}: {off}");
                 let (low, high) = stairs.cell(word as f64 * lsb_rad).unwrap();
                 let slack = 1.01 * step / POINTS;
                 assert!(

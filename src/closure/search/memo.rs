@@ -91,6 +91,9 @@ mod tests {
             (memo.get(&terms(1)), memo.get(&terms(2))),
             (Some(100), None)
         );
+        // In place of an entry that is not the oldest.
+        memo.keep(&terms(5), 105);
+        assert_eq!(memo.get(&terms(5)), Some(105));
         // Another id, another shape, another length: other terms.
         assert_eq!(memo.get(&[term("outside:tone", 3.0)]), None);
         assert_eq!(memo.get(&[]), None);

@@ -114,7 +114,11 @@ mod tests {
                 "accel_g".to_owned(),
                 (0..300).map(|i| supply[i] + 0.02 * little[i]).collect(),
             ),
-            ("supply_v".to_owned(), supply.clone()),
+            // A level of its own is nothing that the other term could take back.
+            (
+                "supply_v".to_owned(),
+                supply.iter().map(|v| v + 5.0).collect(),
+            ),
         ]);
         let time_s: Vec<f64> = (0..300).map(|k| 10.0 * f64::from(k)).collect();
         let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
