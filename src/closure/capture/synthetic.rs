@@ -26,8 +26,14 @@ pub struct Made {
     pub limit: f64,
     /// Random time of the drive's samples, samples rms.
     pub jitter: f64,
+    /// 50 Hz in the drive's signal, codes.
+    pub mains: f64,
+    /// Address bits of the oscillator's table.
+    pub bits: Option<u32>,
 }
 
+/// Sample rate, Hz.
+const FS_HZ: f64 = 1e5;
 /// Amplitude of the drive, codes.
 pub const AMPLITUDE: f64 = 200.3;
 
@@ -41,6 +47,8 @@ impl Made {
         offset: 0.0,
         limit: f64::INFINITY,
         jitter: 0.0,
+        mains: 0.0,
+        bits: None,
     };
 
     /// The capture.
@@ -49,9 +57,12 @@ impl Made {
         let normal = |stream: usize, row: usize| streams[stream].gaussian_pair(row as u64).0;
         let code = |channel: usize, row: usize| {
             let turns = f64::from(self.word.wrapping_mul(row as u32)) / 4_294_967_296.0;
+            let steps = self.bits.map(|bits| f64::powi(2.0, bits as i32));
+            let turns = steps.map_or(turns, |n| (turns * n).floor() / n);
+            let mains = self.mains * (TAU * 50.0 * row as f64 / FS_HZ).sin();
             let late = f64::from(self.word) / 4_294_967_296.0 * self.jitter * normal(2, row);
             let signal = match channel {
-                0 => self.offset - AMPLITUDE * (TAU * (turns - late)).cos(),
+                0 => self.offset + mains - AMPLITUDE * (TAU * (turns - late)).cos(),
                 _ => 61.7 * (TAU * turns).sin() + 20.2 * (TAU * turns).cos(),
             };
             let noise = self.noise * normal(channel, row);
@@ -61,14 +72,14 @@ impl Made {
                 f64::INFINITY
             };
             let code = match self.after {
-                true => signal.round() + noise.round(),
+                true => signal.min(limit).round() + noise.round(),
                 false => (signal + noise).min(limit).round(),
             };
             code as i32
         };
         let codes = [0, 1].map(|c| (0..self.rows).map(|row| code(c, row)).collect());
         let meta = CaptureMeta {
-            fs_hz: Some(1e5),
+            fs_hz: Some(FS_HZ),
             ftw: Some(self.word),
             adc_bits: Some(10),
             drive_amplitude_codes: Some(AMPLITUDE),
