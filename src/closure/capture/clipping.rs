@@ -384,25 +384,6 @@ mod tests {
     }
 
     #[test]
-    fn a_truncated_tone_is_limited_at_its_level_or_not_at_all() {
-        for (limit, expected) in [(195.0, 195.0), (f64::INFINITY, f64::INFINITY)] {
-            let made = Made {
-                bits: Some(4),
-                noise: 0.3,
-                limit,
-                ..Made::CLEAN
-            };
-            let capture = made.capture();
-            let (_, mut model) = model(&capture, &made);
-            model.truncation = made.bits;
-            model.coefficients[0][TRUNCATED + 1] = -AMPLITUDE;
-            let found = find(&capture, &model, 0).map_or(Limits::NONE, |f| f.limits);
-            assert!(found.high == expected || (found.high - expected).abs() < 0.1);
-            assert_eq!(found.low, f64::NEG_INFINITY);
-        }
-    }
-
-    #[test]
     fn a_table_that_no_step_has_does_not_move_the_tone() {
         let made = Made {
             noise: 0.3,

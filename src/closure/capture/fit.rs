@@ -358,38 +358,3 @@ fn with_limits(capture: &Capture, known: &Known, start: &Model, plain: Fitted) -
     }
     plain
 }
-
-#[cfg(test)]
-mod tests {
-    use super::super::known;
-    use super::super::synthetic::Made;
-    use super::*;
-
-    /// Effects of the rounds' choice.
-    fn chosen(made: &Made) -> Vec<Effect> {
-        let capture = made.capture();
-        let tone = Tone::of(&capture).unwrap();
-        let (known, _) = known(&capture, tone);
-        let fitted = rounds(&capture, &known, &declared(&capture, &known, tone));
-        fitted
-            .set
-            .iter()
-            .map(|k| fitted.variants[*k].effect)
-            .collect()
-    }
-
-    #[test]
-    fn slow_mains_of_two_codes_are_found_without_dither() {
-        let undithered = Made {
-            noise: 0.3,
-            after: true,
-            ..Made::CLEAN
-        };
-        assert_eq!(chosen(&undithered), []);
-        let made = Made {
-            mains: 1.8,
-            ..undithered
-        };
-        assert_eq!(chosen(&made), [Effect::Mains]);
-    }
-}

@@ -329,18 +329,13 @@ mod tests {
 
     /// Effects that the search takes in the codes of a capture with noise after rounding, best first.
     fn found(made: &Made) -> (Vec<Effect>, Own) {
-        found_beside(made, &[])
-    }
-
-    /// The same beside slow noise.
-    fn found_beside(made: &Made, nuisance: &[(Combo, f64)]) -> (Vec<Effect>, Own) {
         let capture = made.capture();
         let (known, mut model) = model(&capture, made);
         model.variance.base = [made.noise.powi(2).max(0.07); 2];
         let base = base(&known);
         let free = [[0.0, -AMPLITUDE], [61.7, 20.2]];
         let variants = variants(&known, &model, free, made.rows, false);
-        let mut search = OwnSteps::new(&capture, &model, &base, nuisance, &variants);
+        let mut search = OwnSteps::new(&capture, &model, &base, &[], &variants);
         let (set, own) = search.best();
         (set.iter().map(|k| variants[*k].effect).collect(), own)
     }
@@ -364,17 +359,26 @@ mod tests {
     }
 
     #[test]
-    fn slow_noise_does_not_stand_for_an_offset_far_above_it() {
+    fn what_slow_noise_takes_has_its_price() {
         let made = Made {
             offset: 0.3,
-            ..UNDITHERED
+            noise: 0.2,
+            ..Made::CLEAN
         };
-        // 0.03 codes rms: that such a noise is at ten times its own deviation has its price.
-        let wander = (Combo::one("wander", 0, super::super::columns::ONE), 1e-3);
-        let (effects, own) = found_beside(&made, &[wander]);
-        assert_eq!(effects, [Effect::Offset]);
-        let offset = own.coefficients[0][super::super::columns::ONE];
-        assert!((offset - 0.3).abs() < 0.03, "{offset}");
+        let capture = made.capture();
+        let (known, model) = model(&capture, &made);
+        let base = base(&known);
+        let free = [[0.0, -AMPLITUDE], [61.7, 20.2]];
+        let variants = variants(&known, &model, free, made.rows, false);
+        // 0.03 codes rms: the offset is ten times that.
+        let wander = [(Combo::one("wander", 0, super::super::columns::ONE), 1e-3)];
+        let mut search = OwnSteps::new(&capture, &model, &base, &wander, &variants);
+        let is_offset = |v: &Variant| v.combos[0].name == "drive_offset_codes";
+        let offset = variants.iter().position(is_offset).unwrap();
+        let with = search.fit(&[offset], &model.coefficients);
+        // From the same steps, the wander in the offset's place.
+        let without = search.fit_from(&[], Some(&with.coefficients));
+        assert!(with.objective > without.objective + 10.0);
     }
 
     #[test]

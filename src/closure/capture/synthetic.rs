@@ -26,14 +26,10 @@ pub struct Made {
     pub limit: f64,
     /// Random time of the drive's samples, samples rms.
     pub jitter: f64,
-    /// 50 Hz in the drive's signal, codes.
-    pub mains: f64,
     /// Address bits of the oscillator's table.
     pub bits: Option<u32>,
 }
 
-/// Sample rate, Hz.
-const FS_HZ: f64 = 1e5;
 /// Amplitude of the drive, codes.
 pub const AMPLITUDE: f64 = 200.3;
 
@@ -47,7 +43,6 @@ impl Made {
         offset: 0.0,
         limit: f64::INFINITY,
         jitter: 0.0,
-        mains: 0.0,
         bits: None,
     };
 
@@ -59,10 +54,9 @@ impl Made {
             let turns = f64::from(self.word.wrapping_mul(row as u32)) / 4_294_967_296.0;
             let steps = self.bits.map(|bits| f64::powi(2.0, bits as i32));
             let turns = steps.map_or(turns, |n| (turns * n).floor() / n);
-            let mains = self.mains * (TAU * 50.0 * row as f64 / FS_HZ).sin();
             let late = f64::from(self.word) / 4_294_967_296.0 * self.jitter * normal(2, row);
             let signal = match channel {
-                0 => self.offset + mains - AMPLITUDE * (TAU * (turns - late)).cos(),
+                0 => self.offset - AMPLITUDE * (TAU * (turns - late)).cos(),
                 _ => 61.7 * (TAU * turns).sin() + 20.2 * (TAU * turns).cos(),
             };
             let noise = self.noise * normal(channel, row);
@@ -79,7 +73,7 @@ impl Made {
         };
         let codes = [0, 1].map(|c| (0..self.rows).map(|row| code(c, row)).collect());
         let meta = CaptureMeta {
-            fs_hz: Some(FS_HZ),
+            fs_hz: Some(1e5),
             ftw: Some(self.word),
             adc_bits: Some(10),
             drive_amplitude_codes: Some(AMPLITUDE),
