@@ -105,8 +105,8 @@ fn single_effects_are_named() {
         "{} singles: first {first:.3}, with more {extra:.3}",
         marks.len()
     );
-    // What stands today (0.98 of 53), so that it does not fall unseen. To reach: 0.98. Other seeds that were looked
-    // at once (set 137, 55 captures): first 0.945, with more 0.036.
+    // What stands today (0.98 of 53, none with more), so that it does not fall unseen. Other seeds that were looked at
+    // once (set 311, 111 captures): first 0.982, with more 0.009.
     assert!(first >= 0.93 && extra <= 0.03, "{first} {extra}");
 }
 
@@ -143,6 +143,6 @@ fn pairs_are_named_in_full() {
     let first = share(&marks, |m| m.first);
     let all = share(&marks, |m| m.all);
     println!("{} pairs: first {first:.3}, both {all:.3}", marks.len());
-    // What stands today (0.95 and 0.86 of 22), so that it does not fall unseen. To reach: 0.95 of all.
-    assert!(first >= 0.85 && all >= 0.75, "{first} {all}");
+    // What stands today (0.95 and 0.95 of 22), so that it does not fall unseen.
+    assert!(first >= 0.85 && all >= 0.85, "{first} {all}");
 }

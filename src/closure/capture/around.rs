@@ -142,41 +142,52 @@ pub fn add_lines(capture: &Capture, model: &mut Model, around: &Around) -> bool 
     model.lines.len() > before
 }
 
-/// Periods in the capture below which a line is slow: the spectrum's floor there is made of its own skirts.
-const SLOW_PERIODS: f64 = 12.0;
+/// Periods a block of the series up to which a line is slow: the spectrum's floor there is made of its own skirts, and
+/// the blocks' means leave four fifths of it.
+const SLOW_PERIODS_OF_A_BLOCK: f64 = 0.375;
 
-/// Sine and cosine in both channels at one of two frequencies: less than one in a thousand by chance.
-fn is_sure(gain: f64) -> bool {
-    chi_square_surprise(4, 2.0 * gain) > 1000f64.ln() + 2f64.ln()
+/// Multiples of the mains that are looked for together where they are slow: alone, or with the strongest overtones of
+/// a power line.
+const SLOW_MULTIPLES: [&[f64]; 3] = [&[1.0], &[1.0, 2.0], &[1.0, 3.0]];
+
+/// Sine and cosine in both channels of some lines, of several sets of them: less than one in a thousand by chance.
+fn surplus(lines: usize, gain: f64) -> f64 {
+    let sets = (mains::MAINS_HZ.len() * SLOW_MULTIPLES.len()) as f64;
+    chi_square_surprise(4 * lines, 2.0 * gain) - 1000f64.ln() - sets.ln()
 }
 
-/// Adds the mains' own frequencies where they are too slow for the spectrum.
+/// Adds the mains' own frequencies where they are too slow for the spectrum; true if any was added.
 pub fn add_slow_mains(
     capture: &Capture,
     known: &Known,
     model: &mut Model,
     series: &[Option<Series>; 2],
-) {
-    let Some(fs) = known.fs_hz else { return };
+) -> bool {
+    let Some(fs) = known.fs_hz else { return false };
     let rows = capture.rows();
-    let mut best: Option<(f64, f64)> = None;
+    let blocks = series.iter().flatten().map(|s| s.values[0].len()).max();
+    let slowest = SLOW_PERIODS_OF_A_BLOCK * blocks.unwrap_or(0) as f64;
+    let mut best: Option<(f64, Vec<f64>)> = None;
     for hz in mains::MAINS_HZ {
-        let turns = hz / fs;
-        let periods = turns * rows as f64;
-        let is_new = model
-            .lines
-            .iter()
-            .all(|t| (t - turns).abs() * rows as f64 > 0.7);
-        if (0.1..SLOW_PERIODS).contains(&periods) && is_new {
-            let gain = wander::slow_line_gain(series, rows, turns);
-            if is_sure(gain) && best.is_none_or(|b| gain > b.0) {
-                best = Some((gain, turns));
+        for multiples in SLOW_MULTIPLES {
+            let turns: Vec<f64> = multiples.iter().map(|k| k * hz / fs).collect();
+            let is_slow = |t: &f64| (0.1..slowest).contains(&(t * rows as f64));
+            let is_new = |t: &f64| {
+                let apart = |line: &f64| (line - t).abs() * rows as f64 > 0.7;
+                model.lines.iter().all(apart)
+            };
+            if !turns.iter().all(|t| is_slow(t) && is_new(t)) {
+                continue;
+            }
+            let gain = wander::slow_line_gain(series, rows, &turns);
+            let surplus = surplus(turns.len(), gain);
+            if surplus > 0.0 && best.as_ref().is_none_or(|b| surplus > b.0) {
+                best = Some((surplus, turns));
             }
         }
     }
-    if let Some((_, turns)) = best
-        && model.lines.len() < LINES
-    {
-        model.lines.push(turns);
-    }
+    let Some((_, turns)) = best else { return false };
+    let room = LINES.saturating_sub(model.lines.len());
+    model.lines.extend(turns.iter().take(room));
+    room > 0
 }

@@ -2,6 +2,7 @@
 
 use super::columns::{COS, Model, SIN};
 use super::gram::Combo;
+use std::collections::BTreeMap;
 
 /// An effect of the contract's list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -110,20 +111,27 @@ pub struct Variant {
     pub combos: Vec<Combo>,
     /// What it has to gain in log-likelihood before it counts.
     pub cost: f64,
+    /// The part of it by which the variant is less likely than the effect's usual form, or by which it was searched.
+    pub further: f64,
 }
 
 /// Gain that an effect with no free column would have to make: one in a thousand captures without it.
 const PRIOR: f64 = 7.0;
-/// Gain that each free column costs.
-const PER_COLUMN: f64 = 2.0;
+
+/// Gain that each free column costs: the logarithm of how much narrower the rows make its coefficient than what a
+/// single one tells (Schwarz 1978).
+pub fn per_column(rows: usize) -> f64 {
+    (0.5 * (rows.max(1) as f64).ln()).max(2.0)
+}
 
 impl Variant {
     /// A variant that is `further` nats less likely than the effect's usual form.
     pub fn new(effect: Effect, combos: Vec<Combo>, further: f64) -> Self {
         Variant {
             effect,
-            cost: PRIOR + PER_COLUMN * combos.len() as f64 + further,
+            cost: PRIOR + further,
             combos,
+            further,
         }
     }
 }
@@ -210,5 +218,37 @@ pub fn variants(
     out.extend(super::harmonics::variants(known, model));
     out.extend(super::mains::variants(known, model, rows));
     out.extend(super::spur::variants(known, model, rows));
+    let mut ways: BTreeMap<Effect, usize> = BTreeMap::new();
+    for variant in &out {
+        *ways.entry(variant.effect).or_default() += 1;
+    }
+    // All effects are as likely; what has many ways to show has each of them the less.
+    for variant in &mut out {
+        let ways = ways.get(&variant.effect).copied().unwrap_or(1) as f64;
+        variant.cost += ways.ln() + variant.combos.len() as f64 * per_column(rows);
+    }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::synthetic::{Made, model};
+    use super::*;
+
+    #[test]
+    fn a_variant_costs_its_columns_by_rows_and_its_effects_ways() {
+        assert!((per_column(20_000) - 0.5 * 20_000f64.ln()).abs() < 1e-12);
+        // Few rows: what a column gains by chance, and some.
+        assert_eq!(per_column(10), 2.0);
+        let made = Made::CLEAN;
+        let (known, model) = model(&made.capture(), &made);
+        let free = model.declared;
+        let all = variants(&known, &model, free, made.rows, true);
+        for variant in &all {
+            let ways = all.iter().filter(|v| v.effect == variant.effect).count() as f64;
+            let columns = variant.combos.len() as f64 * per_column(made.rows);
+            let rest = variant.cost - PRIOR - variant.further - columns - ways.ln();
+            assert!(rest.abs() < 1e-9, "{:?} {rest}", variant.effect);
+        }
+    }
 }

@@ -4,7 +4,7 @@
 //! noise is limited with the signal, the outermost code is far more frequent than those next to it.
 //! What is limited is left out of all other fits.
 
-use super::columns::{COS, Model, Rows, SIN, chunks};
+use super::columns::{COS, Model, Rows, SIN, TRUNCATED, chunks};
 use super::input::{Capture, Part};
 use super::normal;
 
@@ -100,6 +100,16 @@ const LEAST_CUT: f64 = 15.0;
 /// Phases that the mean is taken over.
 const BINS: usize = 1024;
 
+/// The address bits of a channel's tone, if most of it is at truncated phases in the model.
+fn truncated(model: &Model, channel: usize) -> Option<u32> {
+    let coefficients = &model.coefficients[channel];
+    let at = |k: usize| coefficients.get(k).copied().unwrap_or(0.0);
+    let [sin, cos] = model.declared[channel];
+    let tone = (sin + at(SIN)).hypot(cos + at(COS));
+    let replaced = at(TRUNCATED).hypot(at(TRUNCATED + 1));
+    model.truncation.filter(|_| replaced > 0.5 * tone)
+}
+
 /// Means by phase.
 struct Profile {
     /// Rows, sum of codes, sums of cos and sin by phase.
@@ -109,8 +119,12 @@ struct Profile {
 impl Profile {
     fn of(capture: &Capture, model: &Model, channel: usize) -> Self {
         let mut bins = vec![[0.0; 4]; BINS];
+        // The tone of a truncated oscillator is at the phases of its table.
+        let steps = truncated(model, channel).map(|bits| f64::powi(2.0, bits as i32));
         for (row, code) in training(capture, channel) {
-            let phase = model.tone.phase(row);
+            let phase = steps.map_or(model.tone.phase(row), |n| {
+                (model.tone.phase(row) * n).floor() / n
+            });
             let (sin, cos) = (std::f64::consts::TAU * phase).sin_cos();
             if let Some(bin) = bins.get_mut((phase * BINS as f64) as usize % BINS) {
                 for (sum, value) in bin.iter_mut().zip([1.0, f64::from(code), sin, cos]) {
@@ -367,6 +381,20 @@ mod tests {
         });
         assert_eq!((found.0.high, found.0.low), (limit, f64::NEG_INFINITY));
         assert!(found.1 > LEAST_CUT, "{}", found.1);
+    }
+
+    #[test]
+    fn a_table_that_no_step_has_does_not_move_the_tone() {
+        let made = Made {
+            noise: 0.3,
+            limit: 195.0,
+            ..Made::CLEAN
+        };
+        let capture = made.capture();
+        let (_, mut model) = model(&capture, &made);
+        model.truncation = Some(4);
+        let found = find(&capture, &model, 0).map_or(Limits::NONE, |f| f.limits);
+        assert!((found.high - 195.0).abs() < 0.1, "{found:?}");
     }
 
     #[test]

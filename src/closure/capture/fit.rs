@@ -1,7 +1,7 @@
 //! The rounds of the fit: noise, lines and nonlinear parts around the model, then the set of effects.
 
 use super::around::{Around, LEAST_VARIANCE, add_lines, add_slow_mains, around};
-use super::candidates::{Effect, Known, Variant, base, base_ridge, variants};
+use super::candidates::{Effect, Known, Variant, base, base_ridge, per_column, variants};
 use super::clipping::{self, Limits};
 use super::columns::{ALL, Model, Variance};
 use super::gram::{Combo, Detail, Gram, Summed, solve, spread};
@@ -19,7 +19,7 @@ const ROUNDS: usize = 6;
 /// The same after the first, where the quantiser's steps show: each is dear, and exact.
 const SHARP_ROUNDS: usize = 1;
 /// Gain that jitter has to make: one free parameter.
-const JITTER_COST: f64 = 9.0;
+const JITTER_COST: f64 = 7.0;
 
 /// The outcome of the rounds.
 pub struct Fitted {
@@ -91,8 +91,7 @@ pub fn rounds(capture: &Capture, known: &Known, start: &Model) -> Fitted {
     model.coefficients = spread(&combos, &solved);
     model.neutral = model.coefficients.clone();
 
-    let seen = around(capture, &mut model, &base, true);
-    model.variance.base = seen.noise;
+    begun(capture, known, &base, &mut model, true);
     let seen = placed(capture, &mut model, &base);
     let mut fitted = round(capture, known, &base, model, seen, true).0;
     for further in 1..ROUNDS {
@@ -100,8 +99,7 @@ pub fn rounds(capture: &Capture, known: &Known, start: &Model) -> Fitted {
         if is_sharp(&model.neutral, &model) {
             model.lines.clear();
         }
-        let seen = around(capture, &mut model, &base, false);
-        model.variance.base = seen.noise;
+        let seen = begun(capture, known, &base, &mut model, false);
         let (next, sharp) = round(capture, known, &base, model, seen, false);
         let same = (further > 1 || !sharp) && is_same(&fitted, &next);
         fitted = next;
@@ -110,6 +108,24 @@ pub fn rounds(capture: &Capture, known: &Known, start: &Model) -> Fitted {
         }
     }
     fitted
+}
+
+/// What is known around a model at first, and its noise; slow mains among it, of which the frequency is known: they
+/// move all codes, so the quantiser's steps and other lines are found beside them only.
+fn begun(
+    capture: &Capture,
+    known: &Known,
+    base: &[Combo],
+    model: &mut Model,
+    neutral: bool,
+) -> Around {
+    let mut seen = around(capture, model, base, neutral);
+    let series = block_series(model, &seen);
+    if add_slow_mains(capture, known, model, &series) {
+        seen = around(capture, model, base, neutral);
+    }
+    model.variance.base = seen.noise;
+    seen
 }
 
 /// Finds the quantiser's steps and a truncated oscillator; what is known around the model then.
@@ -207,9 +223,7 @@ fn follow_lines(
         *seen = around(capture, model, base, false);
     }
     let before = block_series(model, seen);
-    let lines = model.lines.len();
-    add_slow_mains(capture, known, model, &before);
-    if model.lines.len() == lines {
+    if !add_slow_mains(capture, known, model, &before) {
         return before;
     }
     *seen = around(capture, model, base, false);
@@ -237,7 +251,7 @@ fn follow_jitter(
     let [drive, sense] = &seen.residuals;
     let squares = jitter::Squares::of(capture, model, [drive, sense], false);
     let found = squares.fit(seen.noise);
-    let taken = found.filter(|f| f.gain > JITTER_COST);
+    let taken = found.filter(|f| f.gain > JITTER_COST + per_column(capture.training_rows()));
     model.variance = Variance {
         base: seen.noise,
         jitter: 0.0,

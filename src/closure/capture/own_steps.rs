@@ -91,13 +91,14 @@ impl<'a> OwnSteps<'a> {
     fn fit(&mut self, set: &[usize], from: &[Vec<f64>; 2]) -> Own {
         let mut key = set.to_vec();
         key.sort_unstable();
-        if let Some(own) = self.done.get(&key) {
-            return own.clone();
-        }
+        // A set that was fitted before gets the steps of the present one too: all are judged from equally good ones.
         let own = self.fit_from(&key, Some(from));
-        let anew = self.fit_from(&key, None);
-        let own = match anew.objective > own.objective {
-            true => anew,
+        let other = match self.done.get(&key) {
+            Some(done) => done.clone(),
+            None => self.fit_from(&key, None),
+        };
+        let own = match other.objective > own.objective {
+            true => other,
             false => own,
         };
         self.done.insert(key, own.clone());
@@ -127,6 +128,7 @@ impl<'a> OwnSteps<'a> {
             model.coefficients.clone_from(from);
             model.neutral.clone_from(from);
         }
+        let mut prior = 0.0;
         for turn in 0..FITS {
             let gram = Gram::over(self.capture, &model, &summed);
             let is_step = |c: &&Combo| matches!(c.name.as_str(), "saw" | "wave");
@@ -137,11 +139,14 @@ impl<'a> OwnSteps<'a> {
             let solved = solve(gram.all(), &used, &ridge, Detail::All);
             model.coefficients = spread(&used, &solved);
             model.neutral.clone_from(&model.coefficients);
+            // What the wander takes has its price, or it would stand for every offset and gain error.
+            let terms = ridge.iter().zip(&solved.coefficients);
+            prior = terms.map(|(r, c)| 0.5 * r * c * c).sum();
         }
         let chosen = set.iter().filter_map(|k| self.variants.get(*k));
         let costs: f64 = chosen.map(|v| v.cost).sum();
         Own {
-            objective: self.likelihood(&model) - costs,
+            objective: self.likelihood(&model) - prior - costs,
             coefficients: model.coefficients,
         }
     }
@@ -185,23 +190,27 @@ impl<'a> OwnSteps<'a> {
         let mut own = self.fit(&set, &start);
         own = self.polish(&set, own);
         for _ in 0..STEPS {
-            let mut better: Option<(Vec<usize>, Own)> = None;
-            for candidate in self.proposals(&set, &own) {
-                let next = self.fit(&candidate, &own.coefficients);
-                let least = better.as_ref().map_or(own.objective, |b| b.1.objective);
-                if next.objective > least + LEAST {
-                    better = Some((candidate, next));
-                }
-            }
-            match better {
-                Some((next, fitted)) => {
-                    own = self.polish(&next, fitted);
-                    set = next;
-                }
+            match self.better(&set, &own) {
+                Some((next, fitted)) => (set, own) = (next, fitted),
                 None => break,
             }
         }
         (self.cheaper(set), own)
+    }
+
+    /// The best of the sets next to one, if it is better.
+    fn better(&mut self, set: &[usize], own: &Own) -> Option<(Vec<usize>, Own)> {
+        let mut better: Option<(Vec<usize>, Own)> = None;
+        for candidate in self.proposals(set, own) {
+            let next = self.fit(&candidate, &own.coefficients);
+            let least = better.as_ref().map_or(own.objective, |b| b.1.objective);
+            if next.objective > least + LEAST {
+                better = Some((candidate, next));
+            }
+        }
+        let (next, fitted) = better?;
+        let polished = self.polish(&next, fitted);
+        Some((next, polished))
     }
 
     /// The same columns by the effect that costs least.
@@ -262,6 +271,9 @@ impl<'a> OwnSteps<'a> {
             }
             offers.extend(by_effect.into_values().flatten());
         }
+        let straight = search.straightened(set).into_iter();
+        let straight = straight.map(|candidate| (search.objective(&candidate), candidate));
+        offers.extend(straight.max_by(|a, b| a.0.total_cmp(&b.0)));
         offers.retain(|(value, _)| *value > here - SLACK);
         offers.sort_by(|a, b| b.0.total_cmp(&a.0));
         offers.truncate(PROPOSALS);
@@ -344,6 +356,51 @@ mod tests {
         assert_eq!(effects, [Effect::Offset]);
         let offset = own.coefficients[0][super::super::columns::ONE];
         assert!((offset - 0.3).abs() < 0.02, "{offset}");
+    }
+
+    #[test]
+    fn what_slow_noise_takes_has_its_price() {
+        let made = Made {
+            offset: 0.3,
+            noise: 0.2,
+            ..Made::CLEAN
+        };
+        let capture = made.capture();
+        let (known, model) = model(&capture, &made);
+        let base = base(&known);
+        let free = [[0.0, -AMPLITUDE], [61.7, 20.2]];
+        let variants = variants(&known, &model, free, made.rows, false);
+        // 0.03 codes rms: the offset is ten times that.
+        let wander = [(Combo::one("wander", 0, super::super::columns::ONE), 1e-3)];
+        let mut search = OwnSteps::new(&capture, &model, &base, &wander, &variants);
+        let is_offset = |v: &Variant| v.combos[0].name == "drive_offset_codes";
+        let offset = variants.iter().position(is_offset).unwrap();
+        let with = search.fit(&[offset], &model.coefficients);
+        // From the same steps, the wander in the offset's place.
+        let without = search.fit_from(&[], Some(&with.coefficients));
+        assert!(with.objective > without.objective + 10.0);
+    }
+
+    #[test]
+    fn a_set_is_fitted_again_from_better_steps() {
+        let made = Made {
+            offset: 0.3,
+            ..UNDITHERED
+        };
+        let capture = made.capture();
+        let (known, mut model) = model(&capture, &made);
+        model.variance.base = [made.noise.powi(2).max(0.07); 2];
+        let base = base(&known);
+        let free = [[0.0, -AMPLITUDE], [61.7, 20.2]];
+        let variants = variants(&known, &model, free, made.rows, false);
+        let mut search = OwnSteps::new(&capture, &model, &base, &[], &variants);
+        let poor = Own {
+            coefficients: model.coefficients.clone(),
+            objective: -1e9,
+        };
+        search.done.insert(vec![0], poor);
+        let own = search.fit(&[0], &model.coefficients);
+        assert!(own.objective > -1e6, "{}", own.objective);
     }
 
     #[test]

@@ -165,9 +165,8 @@ fn p_value(fitted: &Fitted, search: &mut Search, set: &[usize], member: usize) -
     let fewer: Vec<usize> = set.iter().copied().filter(|k| *k != member).collect();
     let gain = search.gain(set) - search.gain(&fewer);
     let columns = variant.combos.len();
-    let search_cost = variant.cost - 7.0 - 2.0 * columns as f64;
     let surprise = chi_square_surprise(columns, 2.0 * gain.max(0.0));
-    let tried = (fitted.variants.len() as f64).ln() + search_cost.max(0.0);
+    let tried = (fitted.variants.len() as f64).ln() + variant.further.max(0.0);
     Some((tried - surprise).exp().min(1.0))
 }
 

@@ -157,9 +157,8 @@ fn single(fitted: &Fitted, search: &mut Search, effect: Effect) -> (Option<f64>,
     {
         let gain = search.gain(&[k]) - none;
         let columns = v.combos.len();
-        let further = v.cost - 7.0 - 2.0 * columns as f64;
         let surprise = chi_square_surprise(columns, 2.0 * gain.max(0.0));
-        let p = (tried + further.max(0.0) - surprise).exp().min(1.0);
+        let p = (tried + v.further.max(0.0) - surprise).exp().min(1.0);
         if best.is_none_or(|b| gain - v.cost > b.0) {
             best = Some((gain - v.cost, gain, p));
         }

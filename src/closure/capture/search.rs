@@ -143,7 +143,7 @@ impl<'a> Search<'a> {
     }
 
     /// Sets with an offset and a gain error in the place of a bend, which a step forward may have taken for both.
-    fn straightened(&self, set: &[usize]) -> Vec<Vec<usize>> {
+    pub fn straightened(&self, set: &[usize]) -> Vec<Vec<usize>> {
         let is = |k: &usize, effect: Effect| self.effect(*k) == Some(effect);
         if !set.iter().any(|k| is(k, Effect::Nonlinearity)) {
             return Vec::new();

@@ -26,6 +26,8 @@ pub struct Made {
     pub limit: f64,
     /// Random time of the drive's samples, samples rms.
     pub jitter: f64,
+    /// Address bits of the oscillator's table.
+    pub bits: Option<u32>,
 }
 
 /// Amplitude of the drive, codes.
@@ -41,6 +43,7 @@ impl Made {
         offset: 0.0,
         limit: f64::INFINITY,
         jitter: 0.0,
+        bits: None,
     };
 
     /// The capture.
@@ -49,6 +52,8 @@ impl Made {
         let normal = |stream: usize, row: usize| streams[stream].gaussian_pair(row as u64).0;
         let code = |channel: usize, row: usize| {
             let turns = f64::from(self.word.wrapping_mul(row as u32)) / 4_294_967_296.0;
+            let steps = self.bits.map(|bits| f64::powi(2.0, bits as i32));
+            let turns = steps.map_or(turns, |n| (turns * n).floor() / n);
             let late = f64::from(self.word) / 4_294_967_296.0 * self.jitter * normal(2, row);
             let signal = match channel {
                 0 => self.offset - AMPLITUDE * (TAU * (turns - late)).cos(),
@@ -61,7 +66,7 @@ impl Made {
                 f64::INFINITY
             };
             let code = match self.after {
-                true => signal.round() + noise.round(),
+                true => signal.min(limit).round() + noise.round(),
                 false => (signal + noise).min(limit).round(),
             };
             code as i32

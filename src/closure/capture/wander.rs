@@ -75,11 +75,14 @@ fn likelihood(modes: &[f64], white: f64, slow: f64) -> f64 {
     modes.iter().enumerate().map(term).sum()
 }
 
+/// Strengths that are looked at, 0.15 decades apart from a tenth of the white noise up.
+const STEPS: i32 = 64;
+
 /// The likeliest strength, and how much likelier it is than none.
 pub fn strength(modes: &[f64], white: f64) -> (f64, f64) {
     let none = likelihood(modes, white, 0.0);
     let mut best = (0.0, 0.0);
-    for k in 0..64 {
+    for k in 0..STEPS {
         let slow = white * f64::powf(10.0, -1.0 + 0.15 * f64::from(k));
         let gain = likelihood(modes, white, slow) - none;
         if gain > best.1 {
@@ -89,20 +92,23 @@ pub fn strength(modes: &[f64], white: f64) -> (f64, f64) {
     best
 }
 
-/// Gain from which on a wander is seen: less than one in a thousand in white noise (half of chi-square with one
-/// degree of freedom, as the strength is not below 0).
-const SEEN: f64 = 4.8;
-
-/// The strength to be expected of a wander that is not seen, the modes given: none at all is as likely as some, and of
+/// The strength to be expected of a wander, the modes given: none at all is as likely as some, and of
 /// that every order of magnitude from a tenth of the white noise up as likely as the others. The likeliest strength
 /// instead would be as large as the white noise in every third capture without a wander.
 fn expected_strength(modes: &[f64], white: f64) -> f64 {
     let none = likelihood(modes, white, 0.0);
-    const STEPS: i32 = 27;
-    let (mut sum, mut all) = (0.0, 1.0);
-    for k in 0..STEPS {
-        let slow = white * f64::powf(10.0, -1.0 + 0.15 * f64::from(k));
-        let odds = (likelihood(modes, white, slow) - none).exp() / f64::from(STEPS);
+    let steps: Vec<(f64, f64)> = (0..STEPS)
+        .map(|k| {
+            let slow = white * f64::powf(10.0, -1.0 + 0.15 * f64::from(k));
+            let prior = f64::from(STEPS).ln();
+            (slow, likelihood(modes, white, slow) - none - prior)
+        })
+        .collect();
+    // Relative to the likeliest: a strong wander is likelier than none by more than a number holds.
+    let most = steps.iter().map(|s| s.1).fold(0.0, f64::max);
+    let (mut sum, mut all) = (0.0, (-most).exp());
+    for (slow, likelihood) in steps {
+        let odds = (likelihood - most).exp();
         sum += odds * slow;
         all += odds;
     }
@@ -110,17 +116,12 @@ fn expected_strength(modes: &[f64], white: f64) -> f64 {
 }
 
 /// Variance of the mean coefficient from a wander. A 1/f noise that began a hundred records ago has 4 h in
-/// mode 0; a wander that is seen gets four times that, as few modes tell its strength.
+/// mode 0.
 pub fn of_mean(series: &Series, column: usize) -> f64 {
     let (Some(values), Some(white)) = (series.values.get(column), series.white.get(column)) else {
         return 0.0;
     };
-    let modes = modes(values);
-    let variance = match strength(&modes, *white) {
-        (slow, gain) if gain > SEEN => 16.0 * slow,
-        _ => 4.0 * expected_strength(&modes, *white),
-    };
-    variance / values.len() as f64
+    4.0 * expected_strength(&modes(values), *white) / values.len() as f64
 }
 
 /// Columns with prior variances that stand for the wander of both channels' means.
@@ -161,26 +162,29 @@ pub fn of_harmonics(
     out
 }
 
-/// What a slow sinusoid of `turns` a sample gains in the constant's series of both channels, the wander
-/// fitted with and without it: a wander and a part of a period look alike.
-pub fn slow_line_gain(series: &[Option<Series>; 2], rows: usize, turns: f64) -> f64 {
+/// What slow sinusoids of these `turns` a sample gain together in the constant's series of both channels, the wander
+/// fitted with and without them: a wander and a part of a period look alike.
+pub fn slow_line_gain(series: &[Option<Series>; 2], rows: usize, turns: &[f64]) -> f64 {
     let mut sum = 0.0;
     for series in series.iter().flatten() {
         let [values, ..] = &series.values;
         let [white, ..] = series.white;
         let plain = modes(values);
         let n = values.len();
-        let wave = |quarter: f64| -> Vec<f64> {
+        let wave = |turns: f64, quarter: f64| -> Vec<f64> {
             let at = |m: usize| (m as f64 + 0.5) / n as f64 * rows as f64;
             let wave = (0..n).map(|m| (TAU * turns * at(m) + quarter).sin());
             modes(&wave.collect::<Vec<f64>>())
         };
-        let (sin, cos) = (wave(0.0), wave(PI / 2.0));
+        let waves: Vec<Vec<f64>> = turns
+            .iter()
+            .flat_map(|t| [wave(*t, 0.0), wave(*t, PI / 2.0)])
+            .collect();
         let (slow, before) = strength(&plain, white);
         let mut rest = plain.clone();
         let (mut after, mut used) = (before, slow);
         for _ in 0..3 {
-            rest = without(&plain, &sin, &cos, white, used);
+            rest = without(&plain, &waves, white, used);
             (used, after) = strength(&rest, white);
         }
         let base = likelihood(&plain, white, 0.0) + before;
@@ -189,31 +193,35 @@ pub fn slow_line_gain(series: &[Option<Series>; 2], rows: usize, turns: f64) -> 
     sum
 }
 
-/// The modes less their weighted projection on two others.
-fn without(modes: &[f64], a: &[f64], b: &[f64], white: f64, slow: f64) -> Vec<f64> {
-    let weight = |k: usize| 1.0 / (white + slow / (k + 1) as f64);
+/// The modes less their weighted projection on others.
+fn without(modes: &[f64], others: &[Vec<f64>], white: f64, slow: f64) -> Vec<f64> {
     let dot = |x: &[f64], y: &[f64]| -> f64 {
-        x.iter()
-            .zip(y)
-            .enumerate()
-            .map(|(k, (x, y))| weight(k) * x * y)
+        let products = x.iter().zip(y).enumerate();
+        products
+            .map(|(k, (x, y))| x * y / (white + slow / (k + 1) as f64))
             .sum()
     };
-    let (aa, ab, bb) = (dot(a, a), dot(a, b), dot(b, b));
-    let (ay, by) = (dot(a, modes), dot(b, modes));
-    let determinant = aa * bb - ab * ab;
-    if determinant <= 1e-9 * aa * bb {
-        return modes.to_vec();
+    let less = |from: &mut [f64], other: &[f64], size: f64| {
+        let share = dot(from, other) / size;
+        from.iter_mut()
+            .zip(other)
+            .for_each(|(f, o)| *f -= share * o);
+    };
+    let mut done: Vec<(Vec<f64>, f64)> = Vec::new();
+    let mut out = modes.to_vec();
+    for other in others {
+        let mut own = other.clone();
+        let whole = dot(&own, &own);
+        for (earlier, size) in &done {
+            less(&mut own, earlier, *size);
+        }
+        let size = dot(&own, &own);
+        if size > 1e-9 * whole {
+            less(&mut out, &own, size);
+            done.push((own, size));
+        }
     }
-    let (p, q) = (
-        (bb * ay - ab * by) / determinant,
-        (aa * by - ab * ay) / determinant,
-    );
-    modes
-        .iter()
-        .zip(a.iter().zip(b))
-        .map(|(m, (a, b))| m - p * a - q * b)
-        .collect()
+    out
 }
 
 #[cfg(test)]
@@ -230,10 +238,10 @@ mod tests {
 
     #[test]
     fn without_modes_no_wander_is_as_likely_as_some() {
-        let grid: Vec<f64> = (0..27)
+        let grid: Vec<f64> = (0..STEPS)
             .map(|k| f64::powf(10.0, -1.0 + 0.15 * f64::from(k)))
             .collect();
-        let mean = grid.iter().sum::<f64>() / 27.0;
+        let mean = grid.iter().sum::<f64>() / f64::from(STEPS);
         let expected = expected_strength(&[], 2.0);
         assert!((expected / mean - 1.0).abs() < 1e-12, "{expected} {mean}");
     }
@@ -248,11 +256,59 @@ mod tests {
     }
 
     #[test]
+    fn a_wander_as_strong_as_any_is_expected_at_its_strength() {
+        let strengths: Vec<f64> = (0..20)
+            .map(|s| expected_strength(&drawn(s, 1e6), 1.0))
+            .collect();
+        let mean = strengths.iter().sum::<f64>() / 20.0;
+        assert!((0.7e6..1.5e6).contains(&mean), "{mean}");
+    }
+
+    #[test]
     fn a_strong_wander_is_expected_at_its_strength() {
         let strengths: Vec<f64> = (0..40)
             .map(|s| expected_strength(&drawn(s, 30.0), 1.0))
             .collect();
         let mean = strengths.iter().sum::<f64>() / 40.0;
         assert!((20.0..45.0).contains(&mean), "{mean}");
+    }
+
+    /// The constant's series of 64 blocks of 100 rows: white noise of variance 1, and sinusoids (turns a row, amplitude).
+    fn slow(lines: &[(f64, f64)]) -> [Option<Series>; 2] {
+        let noise = Noise::new(5, 3);
+        let value = |m: usize| {
+            let row = 100.0 * (m as f64 + 0.5);
+            let lines = lines.iter().map(|(t, a)| a * (TAU * t * row + 0.4).sin());
+            noise.gaussian_pair(m as u64).0 + lines.sum::<f64>()
+        };
+        let series = Series {
+            values: [(0..64).map(value).collect(), Vec::new(), Vec::new()],
+            white: [1.0; 3],
+        };
+        [Some(series), None]
+    }
+
+    #[test]
+    fn a_slow_line_with_an_overtone_gains_as_one() {
+        let rows = 6400;
+        let (first, third) = (1.55 / 6400.0, 4.65 / 6400.0);
+        let series = slow(&[(first, 2.4), (third, 1.0)]);
+        let alone = slow_line_gain(&series, rows, &[first]);
+        let both = slow_line_gain(&series, rows, &[first, third]);
+        assert!(both > alone + 10.0, "{alone} {both}");
+        let none = slow_line_gain(&slow(&[]), rows, &[first, third]);
+        assert!(none < 8.0, "{none}");
+    }
+
+    #[test]
+    fn what_is_projected_out_is_not_left() {
+        let waves: Vec<Vec<f64>> = [[1.0, 0.5, 0.2, 0.1], [0.9, 0.7, 0.1, -0.3]]
+            .map(Vec::from)
+            .to_vec();
+        let sum: Vec<f64> = (0..4)
+            .map(|k| 3.0 * waves[0][k] - 2.0 * waves[1][k])
+            .collect();
+        let rest = without(&sum, &waves, 1.0, 5.0);
+        assert!(rest.iter().all(|r| r.abs() < 1e-9), "{rest:?}");
     }
 }
