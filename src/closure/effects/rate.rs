@@ -432,6 +432,15 @@ impl Candidate for Saturation {
         vec![map(&total, |x| x.max(low).min(high) - x)]
     }
 
+    fn fine(&self, _c: &Channels, point: &Point) -> Vec<Point> {
+        // A level that no reading reaches is none: it would clip rows that were not looked at.
+        let (low, high) = limits(point);
+        match point.form {
+            0 | 3 => vec![Point::at(1, &[high]), Point::at(2, &[low])],
+            _ => Vec::new(),
+        }
+    }
+
     fn spacing(&self, c: &Channels, point: &Point) -> Vec<f64> {
         let (low, high) = range(&observed(c));
         vec![0.04 * (high - low); point.theta.len()]

@@ -76,9 +76,10 @@ impl Search<'_> {
                     continue;
                 }
                 let mut terms = model.terms.clone();
+                let fewer = terms[k].point.theta.len() as f64 - point.theta.len() as f64;
                 terms[k].point = point;
                 let next = self.model_with(&terms, &self.near(&model))?;
-                if next.value > model.value {
+                if next.value + PRICE * fewer > model.value {
                     model = next;
                 }
             }

@@ -12,8 +12,10 @@ const SLOW: f64 = 2.0;
 /// Probability that a step needs over slow noise of twice that strength.
 const WEAK: f64 = 1e-4;
 
-/// Probability from which on a step stands that the held-out rows do not show.
+/// Probability from which on a step stands that the held-out rows do not show, and the share of its square that
+/// is none.
 const CERTAIN: f64 = 1e-8;
+const UNSEEN: f64 = 0.01;
 
 /// A sinusoid beside which another one of this share of its gain is needed is none: a drifting tone, or
 /// something else that repeats.
@@ -85,16 +87,20 @@ impl Search<'_> {
         Ok(model)
     }
 
-    /// Whether a term adds nothing in any held-out row, so that these say nothing of it: a clip of a few rows.
+    /// Whether a term adds next to nothing in held-out rows, so that these say nothing of it: a clip of a few rows,
+    /// a warm-up that is over before the first of them.
     fn unseen(&self, model: &Model, term: &Term) -> bool {
         let columns = term
             .candidate
             .columns(self.channels, &model.bias, &term.point);
-        let is_zero = |column: &Vec<f64>| {
-            let mut rows = column.iter().zip(&self.heldout);
-            rows.all(|(v, held)| !held || *v == 0.0)
+        let square = |column: &Vec<f64>, rows: &[bool]| -> f64 {
+            let pairs = column.iter().zip(rows);
+            pairs.filter(|(_, row)| **row).map(|(v, _)| v * v).sum()
         };
-        columns.iter().all(is_zero)
+        columns.iter().all(|column| {
+            let held = square(column, &self.heldout);
+            held <= UNSEEN * (held + square(column, &self.used))
+        })
     }
 
     /// Tones of too few periods keep their shape and lose their name.
