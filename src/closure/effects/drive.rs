@@ -192,3 +192,25 @@ fn without_temperature(g: &[f64], u: &[f64]) -> Vec<f64> {
         .map(|(g, r)| if g == r { 1.0 } else { g / (g - r) })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn less_q_does_not_bend_the_phase_back() {
+        for (form, beta, admitted) in [
+            (0, vec![-3.0], true),
+            (1, vec![0.9], true),
+            (1, vec![-0.9], false),
+            (2, vec![-3.0, 0.9], true),
+            (2, vec![3.0, -0.9], false),
+        ] {
+            assert_eq!(
+                Damping.admits(&Point::form(form), &beta),
+                admitted,
+                "{form}"
+            );
+        }
+    }
+}

@@ -254,3 +254,7 @@ impl Search<'_> {
         columns.iter().map(count).max().unwrap_or(0)
     }
 }
+
+#[cfg(test)]
+#[path = "validate_tests.rs"]
+mod tests;

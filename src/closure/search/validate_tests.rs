@@ -1,0 +1,104 @@
+//! Records whose residual only resembles an effect, and the effect itself beside each.
+
+use super::*;
+use crate::closure::channels::Channels;
+use crate::closure::likelihood::blocks;
+use crate::closure::search::Effort;
+use crate::closure::synthetic::{Random, triangle};
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+
+const ROWS: usize = 300;
+
+/// What is named, and what is left.
+type Names = (Vec<String>, Option<String>);
+
+/// Two heatings from -35 to 35 degC around 20, with more columns, and what the output has beside the declared
+/// model, in units of its noise.
+fn closed(seed: u64, more: &[(&str, Vec<f64>)], added: impl Fn(usize, f64) -> f64) -> Names {
+    limited(seed, more, added, f64::INFINITY)
+}
+
+/// The same with an output that ends at `limit_dps`: the rate's first peak alone, of 80 deg/s, is beyond 61.
+fn limited(
+    seed: u64,
+    more: &[(&str, Vec<f64>)],
+    added: impl Fn(usize, f64) -> f64,
+    limit_dps: f64,
+) -> Names {
+    let mut random = Random::new(seed);
+    let degc: Vec<f64> = [triangle(ROWS / 2), triangle(ROWS / 2)].concat();
+    let rate_dps = |k: usize| {
+        let peak = if k < 19 { 80.0 } else { 60.0 };
+        peak * (TAU * k as f64 / 37.0).sin()
+    };
+    let noise_dps = 0.01;
+    let output = (0..ROWS).map(|k| {
+        let u = degc[k] / 35.0 - 1.0;
+        let total = rate_dps(k) + 0.3 - 0.2 * u + noise_dps * added(k, degc[k]);
+        total.min(limit_dps) + noise_dps * random.normal()
+    });
+    let mut columns = BTreeMap::from([
+        ("rate_out_dps".to_owned(), output.collect()),
+        ("rate_dps".to_owned(), (0..ROWS).map(rate_dps).collect()),
+        ("die_degc".to_owned(), degc.clone()),
+    ]);
+    for (name, values) in more {
+        columns.insert((*name).to_owned(), values.clone());
+    }
+    let time_s: Vec<f64> = (0..ROWS).map(|k| 10.0 * k as f64).collect();
+    let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+    let split = blocks::split(&c.time_s, &c.u).unwrap();
+    let found = Search::new(&c, &split, Effort::default(), Vec::new())
+        .run()
+        .unwrap();
+    (found.terms.iter().map(Term::id).collect(), found.left)
+}
+
+#[test]
+fn a_wave_of_three_periods_is_left_and_one_of_eleven_is_a_tone() {
+    let wave = |periods: f64| {
+        move |k: usize, _| 5.0 * (TAU * periods * k as f64 / ROWS as f64 + 0.4).sin()
+    };
+    for seed in 0..3 {
+        let (names, left) = closed(seed, &[], wave(3.3));
+        assert!(
+            names.is_empty() && left.is_some(),
+            "{seed}: {names:?}, {left:?}"
+        );
+        let (names, left) = closed(seed, &[], wave(11.3));
+        assert_eq!(
+            (names, left),
+            (vec!["periodic_pickup".to_owned()], None),
+            "{seed}"
+        );
+    }
+}
+
+#[test]
+fn a_phase_error_that_hardly_drifts_is_leakage() {
+    let quadrature: Vec<f64> = (0..ROWS)
+        .map(|k| 40.0 + 9.0 * (k as f64 / 7.0).sin())
+        .collect();
+    let columns = [("quad_dps", quadrature.clone())];
+    // Zero far outside of all temperatures; and within the record.
+    for (zero_degc, name) in [(900.0, "quadrature_leakage"), (30.0, "demod_phase_drift")] {
+        let unit = if zero_degc > 100.0 { 900.0 } else { 15.0 };
+        for seed in 0..3 {
+            let (names, _) = closed(seed, &columns, |k, degc| {
+                0.7 * quadrature[k] * (degc - zero_degc) / unit
+            });
+            assert_eq!(names, [name], "{zero_degc} degC, {seed}");
+        }
+    }
+}
+
+#[test]
+fn a_clip_that_no_held_out_row_shows_stands() {
+    for seed in 0..3 {
+        let (names, _) = limited(seed, &[], |_, _| 0.0, f64::INFINITY);
+        assert!(names.is_empty(), "{seed}: {names:?}");
+        let (names, _) = limited(seed, &[], |_, _| 0.0, 70.0);
+        assert_eq!(names, ["output_saturation"], "{seed}");
+    }
+}
