@@ -1,6 +1,9 @@
 //! What a record's rows say, ready for candidate effects: every channel whole, the thermometer smooth
 //! and scaled.
 
+use super::likelihood::Unusable;
+use super::likelihood::blocks::{self, Split};
+use crate::record::stats;
 use std::collections::BTreeMap;
 
 /// The channels of a record. All columns have one value a row, without holes: what was not measured
@@ -105,6 +108,22 @@ impl Channels {
         out.tangent = out.tangent_of_phase();
         (out.middle_degc, out.kelvin_per_u) = out.temperature(thermometer, degc_of);
         Ok(out)
+    }
+
+    /// Which rows are fitted on and which are held out.
+    ///
+    /// # Errors
+    /// Too few rows.
+    pub fn split(&self) -> Result<Split, Unusable> {
+        let rate = self.columns.get("rate_dps").filter(|rate| {
+            let (low, high) = range(rate);
+            high > low
+        });
+        let output: Option<Vec<f64>> = rate.map(|rate| {
+            let pairs = self.error_dps.iter().zip(rate);
+            pairs.map(|(e, r)| e + r).collect()
+        });
+        blocks::split(&self.time_s, &self.u, output.as_deref())
     }
 
     /// (temperature at u = 0, change per u): the thermometer itself, another one by regression, or
@@ -265,7 +284,11 @@ pub fn scaled(values: &[f64]) -> (Vec<f64>, f64, f64) {
     (values.iter().map(of).collect(), middle, half)
 }
 
-/// Holes filled linearly in time, at the ends by the nearest value; `None` without any value.
+/// Times the usual change from row to row that a channel has to change across a hole for a step.
+const STEPS: f64 = 10.0;
+
+/// Holes filled linearly in time, at the ends by the nearest value, and so where the channel steps, for halfway it
+/// never was; `None` without any value.
 pub fn filled(time_s: &[f64], values: &[f64]) -> Option<Vec<f64>> {
     let known: Vec<usize> = (0..values.len().min(time_s.len()))
         .filter(|i| values[*i].is_finite())
@@ -274,30 +297,30 @@ pub fn filled(time_s: &[f64], values: &[f64]) -> Option<Vec<f64>> {
     if known.len() == time_s.len() {
         return Some(values.to_vec());
     }
+    let change = |w: &[usize]| (values[w[1]] - values[w[0]]).abs() / (w[1] - w[0]) as f64;
+    let changes: Vec<f64> = known.windows(2).map(change).collect();
+    let usual = stats::median(&changes);
     let mut next = 0;
-    Some(
-        (0..time_s.len())
-            .map(|i| {
-                while next < known.len() && known[next] < i {
-                    next += 1;
-                }
-                if i <= first {
-                    return values[first];
-                }
-                if i >= last {
-                    return values[last];
-                }
-                let (a, b) = (known[next - 1], known[next]);
-                let width = time_s[b] - time_s[a];
-                let share = if width > 0.0 {
-                    (time_s[i] - time_s[a]) / width
-                } else {
-                    0.5
-                };
-                values[a] + share * (values[b] - values[a])
-            })
-            .collect(),
-    )
+    let at = |i: usize| {
+        while next < known.len() && known[next] < i {
+            next += 1;
+        }
+        if i <= first {
+            return values[first];
+        }
+        if i >= last {
+            return values[last];
+        }
+        let (a, b) = (known[next - 1], known[next]);
+        let width = time_s[b] - time_s[a];
+        let share = match (width > 0.0, change(&[a, b]) > STEPS * usual) {
+            (true, false) => (time_s[i] - time_s[a]) / width,
+            (true, true) => f64::from(u8::from(time_s[i] - time_s[a] > 0.5 * width)),
+            (false, _) => 0.5,
+        };
+        values[a] + share * (values[b] - values[a])
+    };
+    Some((0..time_s.len()).map(at).collect())
 }
 
 /// Times since power-on with their holes filled: a hole before which there was no power-on, or after

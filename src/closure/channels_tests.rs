@@ -1,6 +1,6 @@
 //! What stands for channels with holes, and which way a temperature goes.
 
-use super::channels::Channels;
+use super::channels::{Channels, filled};
 use super::synthetic::Random;
 use std::collections::BTreeMap;
 
@@ -122,4 +122,19 @@ fn a_temperature_goes_one_way_if_it_hardly_comes_back() {
     }
     let time_s: Vec<f64> = (0..50).map(f64::from).collect();
     assert!(!channels(&time_s, vec![20.0; 50], None).goes_one_way());
+}
+
+#[test]
+fn a_hole_on_a_slope_lies_on_the_line_and_a_hole_at_a_step_on_one_of_its_sides() {
+    let nan = f64::NAN;
+    let time_s: Vec<f64> = (0..8).map(f64::from).collect();
+    let slope = [0.0, 1.0, 2.0, nan, 4.0, 5.5, 6.0, 7.0];
+    assert_eq!(filled(&time_s, &slope).unwrap()[3], 3.0);
+    let switched = [0.01, 0.0, 0.02, nan, nan, 1.0, 1.01, nan];
+    let whole = filled(&time_s, &switched).unwrap();
+    assert_eq!((whole[3], whole[4], whole[7]), (0.02, 1.0, 1.01));
+    // Noise of the size of its changes is no step.
+    let noisy = [0.0, 1.0, 0.0, nan, 2.0, 0.0, 1.0, 0.0];
+    assert_eq!(filled(&time_s, &noisy).unwrap()[3], 1.0);
+    assert_eq!(filled(&time_s, &[nan; 8]), None);
 }

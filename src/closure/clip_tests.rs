@@ -2,7 +2,6 @@
 
 use super::channels::Channels;
 use super::effects::Point;
-use super::likelihood::blocks;
 use super::search::{Effort, Model, Search, Term};
 use super::synthetic::{Random, triangle};
 use std::collections::BTreeMap;
@@ -53,7 +52,7 @@ fn term(search: &Search, point: Point) -> Term {
 
 /// The model with the clip polished from a shape.
 fn polished(c: &Channels, point: &Point) -> Model {
-    let split = blocks::split(&c.time_s, &c.u).unwrap();
+    let split = c.split().unwrap();
     let search = Search::new(c, &split, Effort::default(), Vec::new());
     let start = search.model(&[term(&search, point.clone())]).unwrap();
     search.polished(start).unwrap()

@@ -5,7 +5,7 @@ use super::effects::{Candidate, Missing, user};
 use super::firmware;
 pub use super::intake::channels_of;
 use super::intake::refused;
-use super::likelihood::blocks::{self, Split};
+use super::likelihood::blocks::Split;
 use super::search::{Effort, Found, LEVEL, Model, Search};
 use super::verdict::{
     Closure, Errors, Evidence, Fate, FirmwareErrors, SCHEMA, Step, Structure, Verdict,
@@ -66,7 +66,7 @@ pub fn names(record: &ThermalRecord, design: &Design, effort: Effort) -> Result<
     let record = condensed.as_ref().map_or(record, |(short, _)| short);
     let channels = channels_of(record, design, &mut warnings)?;
     let unusable = |e: super::likelihood::Unusable| refused(record, e.to_string());
-    let split = blocks::split(&channels.time_s, &channels.u).map_err(unusable)?;
+    let split = channels.split().map_err(unusable)?;
     let own = own_candidates(design, &channels, &mut warnings);
     let found = Search::new(&channels, &split, effort, own)
         .run()
@@ -97,7 +97,7 @@ pub fn close(
     });
     let channels = channels_of(record, design, &mut warnings)?;
     let refuse = |why: String| refused(record, why);
-    let split = blocks::split(&channels.time_s, &channels.u).map_err(|e| refuse(e.to_string()))?;
+    let split = channels.split().map_err(|e| refuse(e.to_string()))?;
     let (closure, before, after, correction) = {
         let own = own_candidates(design, &channels, &mut warnings);
         let search = Search::new(&channels, &split, effort, own);
@@ -193,9 +193,6 @@ impl Told<'_> {
             } else {
                 self.errors(&self.search.model(&terms[..=k])?)
             };
-            let mut others = terms.clone();
-            others.remove(k);
-            let round = self.search.round(&self.search.model(&others)?, 0);
             let reported = term.candidate.report(self.search.channels, estimate);
             out.push(Step {
                 effect: term.id(),
@@ -207,9 +204,7 @@ impl Told<'_> {
                 parameter_std: reported.iter().map(|(n, v)| (n.clone(), v.1)).collect(),
                 heldout_rms: model.heldout_rms,
                 p_value: term.p_value.clamp(1e-300, 1.0),
-                selection_frequency: self
-                    .search
-                    .selection_frequency(self.after, k, &round.judged),
+                selection_frequency: self.search.selected_beside(self.after, k, &[])?,
                 indistinguishable_from: term.rivals.clone(),
                 separating_experiment: (!term.rivals.is_empty())
                     .then(|| term.candidate.sheet().experiment.to_owned()),

@@ -15,7 +15,6 @@ use super::trial::{Answer, Mark};
 use super::{Case, Progress, Request, marked, of_record, trials};
 use crate::closure::close::{self, Closed, Named, channels_of, own_candidates};
 use crate::closure::intake::refused;
-use crate::closure::likelihood::blocks;
 use crate::closure::search::{Effort, Search};
 use crate::closure::verdict::Fate;
 use crate::design::Design;
@@ -175,7 +174,7 @@ pub fn look(record: &ThermalRecord, design: &Design, effort: Effort) -> Result<S
     let mut warnings = Vec::new();
     let channels = channels_of(record, design, &mut warnings)?;
     let unusable = |e: crate::closure::likelihood::Unusable| refused(record, e.to_string());
-    let split = blocks::split(&channels.time_s, &channels.u).map_err(unusable)?;
+    let split = channels.split().map_err(unusable)?;
     let own = own_candidates(design, &channels, &mut warnings);
     let search = Search::new(&channels, &split, effort, own);
     let found = search.run().map_err(unusable)?;

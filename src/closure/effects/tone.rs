@@ -8,8 +8,17 @@ use std::f64::consts::TAU;
 pub struct Pickup {
     /// Where to start, Hz.
     pub frequency_hz: f64,
-    /// Whether there is one already: then this one has no name.
+    /// Whether there is one already, or too little of it to tell: then this one has no name.
     pub further: bool,
+}
+
+/// Fewest periods over the record of a tone with a name. What wanders slowly, a channel that was not recorded
+/// say, turns two or three times in a record as well; that it comes back a fourth time is a prediction.
+const NAMED_PERIODS: f64 = 4.0;
+
+/// Whether a tone comes back often enough in a record for a name.
+pub fn returns(c: &Channels, frequency_hz: f64) -> bool {
+    frequency_hz * c.span_s() >= NAMED_PERIODS
 }
 
 const PICKUP: Sheet = Sheet {

@@ -1,5 +1,5 @@
-//! Held-out blocks and cross-validation folds: whole stretches of time, fixed by the times and the
-//! thermometer alone.
+//! Held-out blocks and cross-validation folds: whole stretches of time, fixed by the times, the
+//! thermometer and where the output lies outermost.
 //!
 //! The rule:
 //! 1. The record is cut into segments. If the thermometer makes at least [`RAMPS`] runs up or down
@@ -9,8 +9,9 @@
 //!    first nor the last of the record (a transient at power-on and a slow drift could then only be
 //!    extrapolated).
 //! 3. Of the 35 ways to do that, the one is taken whose training rows leave the narrowest gaps in the
-//!    thermometer's range, taken as a whole and on the way up and down, the first among equals:
-//!    held-out error is about interpolation.
+//!    thermometer's range, taken as a whole and on the way up and down, and, where a rate was applied, hold
+//!    out least of the highest and of the lowest readings, the first among equals: held-out error is
+//!    about interpolation, and a clip shows in few rows.
 //!
 //! Held-out rows are not used in any estimate, and predictions for them are those of the
 //! regressors alone: the noise's memory never carries a training row's noise across the border.
@@ -42,13 +43,17 @@ pub struct Split {
     pub segment: Vec<usize>,
 }
 
-/// The split of a record.
+/// The split of a record; `output`: its readings, where a rate was applied (their outermost rows are then cared for).
 ///
 /// A record of less than three rows a span is cut into spans of three.
 ///
 /// # Errors
 /// Fewer than [`LEAST`] rows, lengths that differ.
-pub fn split(times_s: &[f64], thermometer: &[f64]) -> Result<Split, Unusable> {
+pub fn split(
+    times_s: &[f64],
+    thermometer: &[f64],
+    output: Option<&[f64]>,
+) -> Result<Split, Unusable> {
     let n = times_s.len();
     if thermometer.len() != n {
         return Err(Unusable::NotFinite("the thermometer"));
@@ -69,11 +74,16 @@ pub fn split(times_s: &[f64], thermometer: &[f64]) -> Result<Split, Unusable> {
     };
     let segments = segment.last().map_or(0, |last| last + 1);
     let direction = directions(thermometer);
+    let outermost = output.map(outermost).unwrap_or_default();
     let mut best: Option<(f64, Vec<bool>)> = None;
     for pattern in patterns() {
         let held = held_segments(segments, &pattern);
         let heldout: Vec<bool> = segment.iter().map(|s| held[*s]).collect();
-        let open = left_open(thermometer, &direction, &heldout);
+        let mut open = left_open(thermometer, &direction, &heldout);
+        open += outermost
+            .iter()
+            .map(|rows| lost(rows, &heldout))
+            .sum::<f64>();
         if best.as_ref().is_none_or(|b| open < b.0) {
             best = Some((open, heldout));
         }
@@ -193,6 +203,34 @@ fn gaps(all: &[bool], train: &[bool]) -> f64 {
     sum
 }
 
+/// Outermost readings at each end: this share of the rows, and how many at least; and what it counts, in bins'
+/// squares, if all of them are held out.
+const OUTERMOST: f64 = 0.01;
+const FEW: usize = 4;
+const ALL_LOST: f64 = 30.0;
+
+/// The rows of the lowest and of the highest readings.
+fn outermost(output: &[f64]) -> Vec<Vec<usize>> {
+    let mut sorted: Vec<f64> = output.iter().copied().filter(|v| v.is_finite()).collect();
+    sorted.sort_by(f64::total_cmp);
+    let count = FEW.max((OUTERMOST * sorted.len() as f64) as usize);
+    if sorted.len() < 2 * count {
+        return Vec::new();
+    }
+    let (low, high) = (sorted[count - 1], sorted[sorted.len() - count]);
+    let of = |is: &dyn Fn(f64) -> bool| -> Vec<usize> {
+        let rows = output.iter().enumerate();
+        rows.filter(|(_, v)| is(**v)).map(|(i, _)| i).collect()
+    };
+    vec![of(&|v| v <= low), of(&|v| v >= high)]
+}
+
+/// What it costs to hold out some of them.
+fn lost(rows: &[usize], heldout: &[bool]) -> f64 {
+    let held = rows.iter().filter(|i| heldout[**i]).count();
+    ALL_LOST * (held as f64 / rows.len().max(1) as f64).powi(2)
+}
+
 /// The number of the monotone run of each row, turning points by a tenth of the range.
 fn runs(thermometer: &[f64]) -> Vec<usize> {
     let finite = || thermometer.iter().copied().filter(|v| v.is_finite());
@@ -251,7 +289,7 @@ mod tests {
 
     fn shares(thermometer: &[f64]) -> (f64, usize, Split) {
         let times: Vec<f64> = (0..thermometer.len()).map(|i| i as f64).collect();
-        let split = split(&times, thermometer).unwrap();
+        let split = split(&times, thermometer, None).unwrap();
         let held = split.heldout.iter().filter(|h| **h).count();
         let starts = split.heldout.windows(2).filter(|w| !w[0] && w[1]).count();
         (held as f64 / thermometer.len() as f64, starts, split)
@@ -276,7 +314,33 @@ mod tests {
                 assert!(open < most, "{what}: {open}");
             }
         }
-        assert!(super::split(&[0.0; 10], &[0.0; 10]).is_err());
+        assert!(super::split(&[0.0; 10], &[0.0; 10], None).is_err());
+    }
+
+    #[test]
+    fn a_rate_s_outermost_readings_are_not_held_out_together() {
+        // Four stairs of rate within each of three slow cycles of temperature, the highest one in the same of 15 spans.
+        let n = 450;
+        let times: Vec<f64> = (0..n).map(f64::from).collect();
+        let t: Vec<f64> = times.iter().map(|t| (t / 24.0).sin()).collect();
+        for highest in 0..15 {
+            let output: Vec<f64> = (0..n)
+                .map(|i| {
+                    if i / 30 == highest {
+                        100.0
+                    } else {
+                        f64::from(i % 7)
+                    }
+                })
+                .collect();
+            let lost = |output| {
+                let split = super::split(&times, &t, output).unwrap();
+                split.heldout[30 * highest as usize]
+            };
+            assert!(!lost(Some(output.as_slice())), "{highest}");
+        }
+        let blind = super::split(&times, &t, None).unwrap();
+        assert!((0..15).any(|s| blind.heldout[30 * s]));
     }
 
     #[test]

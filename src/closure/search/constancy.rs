@@ -108,7 +108,7 @@ mod tests {
     use super::*;
     use crate::closure::channels::Channels;
     use crate::closure::effects::{Candidate, Point};
-    use crate::closure::likelihood::blocks::{self, Split};
+    use crate::closure::likelihood::blocks::Split;
     use crate::closure::search::Effort;
     use crate::closure::synthetic::{Random, triangle};
     use std::collections::BTreeMap;
@@ -141,7 +141,7 @@ mod tests {
 
     /// Of the named effect at its first point.
     fn constancy(c: &Channels, effect: &str) -> Option<Constancy> {
-        let split: Split = blocks::split(&c.time_s, &c.u).unwrap();
+        let split: Split = c.split().unwrap();
         let effort = Effort {
             rows: ROWS,
             ..Effort::default()

@@ -148,7 +148,6 @@ impl Search<'_> {
 mod tests {
     use super::*;
     use crate::closure::effects::Point;
-    use crate::closure::likelihood::blocks;
     use crate::closure::search::Effort;
     use crate::closure::synthetic::{Random, triangle};
     use std::collections::BTreeMap;
@@ -166,7 +165,7 @@ mod tests {
             ("die_degc".to_owned(), triangle(rows)),
         ]);
         let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
-        let split = blocks::split(&c.time_s, &c.u).unwrap();
+        let split = c.split().unwrap();
         let search = Search::new(&c, &split, Effort::default(), Vec::new());
         let term = |id: &str, point: Point| Term {
             candidate: search

@@ -20,9 +20,6 @@ const FEW: usize = 2;
 const WORTH: f64 = 20.0;
 const WORTH_WHOLE: f64 = 5.0;
 
-/// How far the held-out error with the steps may lie above the one without.
-const ABOVE: f64 = 1.015;
-
 /// Names that are looked at for spikes; what a quick look may be short of a thorough one.
 const LOOKED: usize = 5;
 const MARGIN: f64 = 4.0;
@@ -59,8 +56,9 @@ impl Search<'_> {
         for _ in 0..ROUNDS {
             model = self.forward(model, &mut found)?;
             let before: Vec<String> = model.terms.iter().map(Term::id).collect();
-            let swept = self.swept(model)?;
-            model = self.proven(self.without_undone(swept)?)?;
+            model = self.swept(model)?;
+            model = self.without_undone(model)?;
+            model = self.proven(model)?;
             if model.terms.iter().map(Term::id).eq(before) {
                 break;
             }
@@ -79,35 +77,8 @@ impl Search<'_> {
         if let Some(stranger) = found.strangers.first() {
             found.left = found.left.or_else(|| self.channel(stranger));
         }
-        self.kept_below(&mut found)?;
-        self.kept_above_rounding(&mut found)?;
+        self.kept_alone(&mut found)?;
         Ok(found)
-    }
-
-    /// Drops names until the held-out error is not above that of the declared model: each of them may lower it
-    /// beside shapes without a name, which are not reported.
-    fn kept_below(&self, found: &mut Found) -> Result<(), Unusable> {
-        let before = self.model(&[])?;
-        let square = |terms: &[Term]| -> Result<f64, Unusable> {
-            let model = self.model(terms)?;
-            Ok(self.heldout_error(&model, &before).square)
-        };
-        let limit = self.heldout_error(&before, &before).square * ABOVE.powi(2);
-        while !found.terms.is_empty() && square(&found.terms)? > limit {
-            let mut least: Option<(usize, f64)> = None;
-            for k in 0..found.terms.len() {
-                let mut others = found.terms.clone();
-                others.remove(k);
-                let square = square(&others)?;
-                if least.is_none_or(|l| square < l.1) {
-                    least = Some((k, square));
-                }
-            }
-            let Some((k, _)) = least else { break };
-            let term = found.terms.remove(k);
-            found.left = found.left.take().or_else(|| self.channel(&term));
-        }
-        Ok(())
     }
 
     /// Steps until nothing is called for.

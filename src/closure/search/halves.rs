@@ -2,6 +2,7 @@
 
 use super::judge::{Judged, PRICE};
 use super::{Model, Search, Term, declared};
+use crate::closure::likelihood::Unusable;
 use crate::closure::likelihood::linear::{Basis, dot};
 use crate::closure::likelihood::random::Stream;
 use crate::closure::likelihood::whiten::Whitener;
@@ -10,6 +11,24 @@ use crate::closure::likelihood::whiten::Whitener;
 const PAIRS: usize = 15;
 
 impl Search<'_> {
+    /// [`Search::selection_frequency`] against everything that is judged beside the other terms, `but` some.
+    ///
+    /// # Errors
+    /// Too few rows.
+    pub fn selected_beside(
+        &self,
+        model: &Model,
+        term: usize,
+        but: &[String],
+    ) -> Result<f64, Unusable> {
+        let mut others = model.terms.clone();
+        others.remove(term);
+        let round = self.round(&self.model(&others)?, 0);
+        let against = round.judged.iter();
+        let against = against.filter(|j| !but.contains(&j.candidate.id()));
+        Ok(self.selection_frequency(model, term, against))
+    }
+
     /// Share of the halves of the record (whole segments, complementary pairs; Meinshausen & Buhlmann 2010,
     /// Shah & Samworth 2013) in which the term explains more than every one of its competitors, the
     /// other terms being in, and more than its price. `competitors`: what was judged beside the other

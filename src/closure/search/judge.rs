@@ -3,7 +3,7 @@
 use super::refine::{self, Bench, Profiled};
 use super::{LEVEL, MOST_RIVALS, Model, Search, tones};
 use crate::closure::channels::Channels;
-use crate::closure::effects::tone::Pickup;
+use crate::closure::effects::tone::{Pickup, returns};
 use crate::closure::effects::{Bias, Candidate, Missing, Point};
 use crate::closure::likelihood::candidates::Group;
 use crate::closure::likelihood::linear::add_scaled;
@@ -124,9 +124,10 @@ impl Search<'_> {
         };
         let tone = tones::strongest(c, fit, &grid);
         if let Some(tone) = tone {
+            let taken = taken.iter().any(|id| id == "periodic_pickup");
             let pickup: Arc<dyn Candidate> = Arc::new(Pickup {
                 frequency_hz: tone.frequency_hz,
-                further: taken.iter().any(|id| id == "periodic_pickup"),
+                further: taken || !returns(c, tone.frequency_hz),
             });
             if !is_out(pickup.id()) {
                 let points = pickup.points(c);

@@ -15,6 +15,7 @@ pub mod heldout;
 pub mod judge;
 mod memo;
 pub mod refine;
+mod reported;
 mod rounding;
 pub mod stairs;
 pub mod structure;

@@ -22,8 +22,7 @@ impl Search<'_> {
             let Some(k) = least.filter(|k| each[*k] < limit) else {
                 break;
             };
-            let term = found.terms.remove(k);
-            found.left = found.left.take().or_else(|| self.channel(&term));
+            let term = self.drop(found, k);
             found.within_rounding.push((term.id(), each[k]));
         }
         Ok(())
@@ -59,7 +58,6 @@ impl Search<'_> {
 mod tests {
     use super::*;
     use crate::closure::channels::Channels;
-    use crate::closure::likelihood::blocks;
     use crate::closure::search::Effort;
     use crate::closure::synthetic::{Random, triangle};
     use std::collections::BTreeMap;
@@ -84,7 +82,7 @@ mod tests {
         let time_s: Vec<f64> = (0..300).map(|k| 10.0 * f64::from(k)).collect();
         let mut c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
         c.rounding_dps = rounding_dps;
-        let split = blocks::split(&c.time_s, &c.u).unwrap();
+        let split = c.split().unwrap();
         Search::new(&c, &split, Effort::default(), Vec::new())
             .run()
             .unwrap()

@@ -94,7 +94,6 @@ mod tests {
     fn taken_back(own: f64, supply_dps: f64) -> Option<usize> {
         use crate::closure::channels::Channels;
         use crate::closure::effects::Candidate;
-        use crate::closure::likelihood::blocks;
         use crate::closure::search::Effort;
         use crate::closure::synthetic::triangle;
         use std::collections::BTreeMap;
@@ -122,7 +121,7 @@ mod tests {
         ]);
         let time_s: Vec<f64> = (0..300).map(|k| 10.0 * f64::from(k)).collect();
         let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
-        let split = blocks::split(&c.time_s, &c.u).unwrap();
+        let split = c.split().unwrap();
         let search = Search::new(&c, &split, Effort::default(), Vec::new());
         let term = |id: &str| {
             let is_it = |c: &&std::sync::Arc<dyn Candidate>| c.id() == id;

@@ -1,8 +1,9 @@
 //! Names that do not hold lose them: what the record cannot tell from chance, from a wander or from an accident.
 
 use super::judge::Judged;
+use super::reported::BEYOND;
 use super::{Found, LEVEL, Model, Search, Term, structure};
-use crate::closure::effects::tone::Pickup;
+use crate::closure::effects::tone::{self, Pickup};
 use crate::closure::likelihood::Unusable;
 use std::sync::Arc;
 
@@ -21,12 +22,11 @@ const UNSEEN: f64 = 0.01;
 /// something else that repeats.
 const OVERTONE: f64 = 0.1;
 
-/// Fewest periods over the record of a tone with a name. What wanders slowly, a channel that was not recorded
-/// say, turns two or three times in a record as well; that it comes back a fourth time is a prediction.
-const NAMED_PERIODS: f64 = 4.0;
+/// Share of a shape's square that a single row may hold: what shows in one row, anything may have made.
+const ONE_ROW: f64 = 0.8;
 
 /// Probability and share of its gain from which on an effect's gain is not one.
-const UNSTEADY: f64 = 1e-3;
+pub(super) const UNSTEADY: f64 = 1e-3;
 const UNSTEADY_SHARE: f64 = 0.05;
 
 /// Least selection frequency of a local shape (Meinshausen & Buhlmann 2010 take 0.6 to 0.9), and of any other.
@@ -109,7 +109,7 @@ impl Search<'_> {
         let mut waves = false;
         for term in terms.iter_mut().filter(|t| t.id() == "periodic_pickup") {
             let frequency_hz = term.point.theta.first().copied().unwrap_or(0.0);
-            if frequency_hz * self.channels.span_s() < NAMED_PERIODS {
+            if !tone::returns(self.channels, frequency_hz) {
                 waves = true;
                 term.candidate = Arc::new(Pickup {
                     frequency_hz,
@@ -124,17 +124,17 @@ impl Search<'_> {
         self.model(&terms)
     }
 
-    /// Without names that a greater nameless shape in the same channel has left over.
+    /// Without names that a nameless shape in the same channel, which came before and explains more, has left over.
     fn without_likenesses(&self, model: Model) -> Result<Model, Unusable> {
+        let mut strangers: Vec<(Option<String>, f64)> = Vec::new();
         let mut terms = model.terms.clone();
-        let strangers: Vec<(Option<String>, f64)> = terms
-            .iter()
-            .filter(|t| !t.candidate.named())
-            .map(|t| (self.channel(t), t.gain))
-            .collect();
         terms.retain(|t| {
             let channel = self.channel(t);
-            !t.candidate.named() || !strangers.iter().any(|(c, g)| *c == channel && *g > t.gain)
+            if !t.candidate.named() {
+                strangers.push((channel, t.gain));
+                return true;
+            }
+            !strangers.iter().any(|(c, g)| *c == channel && *g > t.gain)
         });
         if terms.len() == model.terms.len() {
             return Ok(model);
@@ -142,8 +142,8 @@ impl Search<'_> {
         self.model(&terms)
     }
 
-    /// Without steps that happen once: they are no law of temperature unless everything else is clean,
-    /// for anything may happen once. And without weak names over strong slow noise.
+    /// Without shapes of a single row. Without steps that happen once: they are no law of temperature unless
+    /// everything else is clean, for anything may happen once. And without weak names over strong slow noise.
     fn without_accidents(&self, model: Model, found: &mut Found) -> Result<Model, Unusable> {
         let rows = model.fit.problem.line.used();
         let slow = structure::slowness(model.fit.at.shape, rows);
@@ -152,6 +152,9 @@ impl Search<'_> {
         terms.retain(|t| {
             if !t.candidate.named() {
                 return true;
+            }
+            if self.shows_once(t, &model) {
+                return false;
             }
             let single = t.id() == "stress_jump" && self.switches(t, &model) < 2;
             let accident = single && (more || slow > SLOW);
@@ -182,15 +185,16 @@ impl Search<'_> {
             changed = true;
             let mut others = terms.clone();
             others.remove(k);
-            match self.law_instead(&others, term)? {
-                Some(law) => {
+            let law = self.law_instead(&others, term)?;
+            if law.as_ref().is_none_or(|(_, good)| !good) {
+                found.left = found.left.take().or_else(|| self.channel(term));
+            }
+            match law {
+                Some((law, _)) => {
                     terms[k] = law;
                     k += 1;
                 }
-                None => {
-                    found.left = found.left.take().or_else(|| self.channel(term));
-                    terms = others;
-                }
+                None => terms = others,
             }
         }
         if !changed {
@@ -205,8 +209,9 @@ impl Search<'_> {
             .is_none_or(|c| c.p_value > UNSTEADY || c.share < UNSTEADY_SHARE)
     }
 
-    /// The best law in place of a name that does not hold, if it is as good.
-    fn law_instead(&self, others: &[Term], own: &Term) -> Result<Option<Term>, Unusable> {
+    /// The best law in place of a name that does not hold, and whether it is as good: if not, something is left, and
+    /// it has to be beyond what that may look like.
+    fn law_instead(&self, others: &[Term], own: &Term) -> Result<Option<(Term, bool)>, Unusable> {
         let without = self.model(others)?;
         let round = self.round(&without, self.effort.surrogates);
         let is_own = |j: &&Judged| j.candidate.id() == own.id();
@@ -216,7 +221,8 @@ impl Search<'_> {
         let (Some(law), Some(same)) = (laws, same) else {
             return Ok(None);
         };
-        if law.p_value > LEVEL || law.net < AS_GOOD * same.net {
+        let good = law.net >= AS_GOOD * same.net;
+        if law.p_value > if good { LEVEL } else { BEYOND } {
             return Ok(None);
         }
         let mut term = Term::of(law, round.rivals(law));
@@ -224,12 +230,13 @@ impl Search<'_> {
         let mut terms = others.to_vec();
         terms.push(term.clone());
         let model = self.model(&terms)?;
-        Ok(self.lasts(&model, &term).then_some(term))
+        let holds = self.lasts(&model, &term) && (good || self.recurs(&model, others.len())?);
+        Ok(holds.then_some((term, good)))
     }
 
     /// Whether enough halves of the record select a term beside the other terms. A local shape competes with laws
     /// alone: of two shapes at one temperature each takes halves from the other, and whatever is there
-    /// stays.
+    /// stays. Nor does what is as good and listed count against a name.
     fn recurs(&self, model: &Model, own: usize) -> Result<bool, Unusable> {
         let candidate = &model.terms[own].candidate;
         if candidate.is_whole() {
@@ -239,10 +246,28 @@ impl Search<'_> {
         let mut others = model.terms.clone();
         others.remove(own);
         let round = self.round(&self.model(&others)?, 0);
-        let against = round.judged.iter();
-        let against = against.filter(|j| !(local && j.candidate.is_local()));
+        let rivals = &model.terms[own].rivals;
+        let counts = |j: &&Judged| {
+            let listed = rivals.contains(&j.candidate.id());
+            !listed && !(local && j.candidate.is_local())
+        };
+        let against = round.judged.iter().filter(counts);
         let least = if local { STABLE } else { EVER };
         Ok(self.selection_frequency(model, own, against) >= least)
+    }
+
+    /// Whether one row of the fit holds a term's shape; a clip's rows are measured at a level of their own.
+    fn shows_once(&self, term: &Term, model: &Model) -> bool {
+        let once = |column: &Vec<f64>| {
+            let used = column.iter().zip(&self.used).filter(|(_, u)| **u);
+            let squares = used.map(|(v, _)| v * v);
+            let (sum, most) = squares.fold((0.0, 0.0_f64), |(s, m), v| (s + v, m.max(v)));
+            most > ONE_ROW * sum
+        };
+        let columns = term
+            .candidate
+            .columns(self.channels, &model.bias, &term.point);
+        !term.candidate.is_whole() && !columns.is_empty() && columns.iter().all(once)
     }
 
     /// How often a term's column switches between 0 and 1.

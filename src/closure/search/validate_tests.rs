@@ -2,7 +2,6 @@
 
 use super::*;
 use crate::closure::channels::Channels;
-use crate::closure::likelihood::blocks;
 use crate::closure::search::Effort;
 use crate::closure::synthetic::{Random, triangle};
 use std::collections::BTreeMap;
@@ -48,7 +47,7 @@ fn limited(
     }
     let time_s: Vec<f64> = (0..ROWS).map(|k| 10.0 * k as f64).collect();
     let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
-    let split = blocks::split(&c.time_s, &c.u).unwrap();
+    let split = c.split().unwrap();
     let found = Search::new(&c, &split, Effort::default(), Vec::new())
         .run()
         .unwrap();
@@ -102,5 +101,17 @@ fn a_clip_that_no_held_out_row_shows_stands() {
         assert!(names.is_empty(), "{seed}: {names:?}");
         let (names, _) = limited(seed, &[], |_, _| 0.0, 70.0);
         assert_eq!(names, ["output_saturation"], "{seed}");
+    }
+}
+
+#[test]
+fn one_row_is_an_accident_and_twelve_are_a_transient() {
+    for seed in 0..3 {
+        let first_row = |k: usize, _| if k == 0 { 12.0 } else { 0.0 };
+        let (names, _) = closed(seed, &[], first_row);
+        assert!(names.is_empty(), "{seed}: {names:?}");
+        let decay = |k: usize, _| 12.0 * (-(k as f64) / 12.0).exp();
+        let (names, _) = closed(seed, &[], decay);
+        assert_eq!(names, ["warmup_transient"], "{seed}");
     }
 }

@@ -1,0 +1,118 @@
+//! Found names, with and without something left beside them.
+
+use super::*;
+use crate::closure::channels::Channels;
+use crate::closure::search::Effort;
+use crate::closure::synthetic::{Random, triangle};
+use std::collections::BTreeMap;
+
+const ROWS: usize = 300;
+
+/// Supply and acceleration, each switched in its own way.
+fn switched(k: usize) -> [f64; 2] {
+    [k / 11 % 3 == 1, k / 17 % 2 == 1].map(|on| f64::from(u8::from(on)))
+}
+
+/// Two heatings; the output has the supply times `supply` of the row and the acceleration times `g`, in units of
+/// its noise.
+fn channels(supply: impl Fn(usize) -> f64, g: f64) -> Channels {
+    let mut random = Random::new(5);
+    let degc = [triangle(ROWS / 2), triangle(ROWS / 2)].concat();
+    let output = (0..ROWS).map(|k| {
+        let [on, turned] = switched(k);
+        let added = supply(k) * on + g * turned + random.normal();
+        0.3 - 0.2 * (degc[k] / 35.0 - 1.0) + 0.01 * added
+    });
+    let columns = BTreeMap::from([
+        ("rate_out_dps".to_owned(), output.collect()),
+        (
+            "supply_v".to_owned(),
+            (0..ROWS).map(|k| switched(k)[0]).collect(),
+        ),
+        (
+            "accel_g".to_owned(),
+            (0..ROWS).map(|k| switched(k)[1]).collect(),
+        ),
+        ("die_degc".to_owned(), degc),
+    ]);
+    let time_s: Vec<f64> = (0..ROWS).map(|k| 10.0 * k as f64).collect();
+    Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap()
+}
+
+/// What stays of both names, the supply's with a probability and rivals, and what becomes undecided.
+fn kept(c: &Channels, p_value: f64, rivals: usize, left: bool) -> (Vec<String>, Vec<String>) {
+    let search = Search::new(c, &c.split().unwrap(), Effort::default(), Vec::new());
+    let term = |id: &str, p_value: f64, rivals: usize| {
+        let candidate = search.candidates().iter().find(|c| c.id() == id);
+        let candidate = candidate.unwrap().clone();
+        Term {
+            point: candidate.points(c).remove(0),
+            candidate,
+            p_value,
+            rivals: (0..rivals).map(|k| format!("rival {k}")).collect(),
+            gain: 0.0,
+            beside: Vec::new(),
+        }
+    };
+    let mut found = Found {
+        terms: vec![
+            term("supply_sensitivity", p_value, rivals),
+            term("g_sensitivity", 1e-20, 0),
+        ],
+        strangers: Vec::new(),
+        left: left.then(|| "time_s".to_owned()),
+        first: Vec::new(),
+        missing: Vec::new(),
+        undecided: Vec::new(),
+        within_rounding: Vec::new(),
+    };
+    search.kept_alone(&mut found).unwrap();
+    assert!(found.left.is_some() || !left);
+    let ids = found.terms.iter().map(Term::id).collect();
+    (ids, found.undecided)
+}
+
+const BOTH: [&str; 2] = ["supply_sensitivity", "g_sensitivity"];
+
+#[test]
+fn a_weak_name_stands_where_nothing_else_is_left() {
+    let c = channels(|_| 4.0, 5.0);
+    assert_eq!(kept(&c, 1e-3, 0, false).0, BOTH);
+    assert_eq!(kept(&c, 1e-3, 0, true).0, BOTH[1..]);
+    assert_eq!(kept(&c, 1e-7, 0, true).0, BOTH);
+}
+
+#[test]
+fn a_gain_that_turns_over_is_no_law_where_more_is_left() {
+    let turning = channels(|k| if k < ROWS / 3 { 8.0 } else { 1.0 }, 5.0);
+    assert_eq!(kept(&turning, 1e-20, 0, false).0, BOTH);
+    assert_eq!(kept(&turning, 1e-20, 0, true).0, BOTH[1..]);
+}
+
+#[test]
+fn what_most_halves_do_not_show_is_not_named_where_more_is_left() {
+    // Without anything of the supply its halves cannot select it, however small its probability was beside others.
+    let without = channels(|_| 0.0, 5.0);
+    assert_eq!(kept(&without, 1e-20, 0, true).0, BOTH[1..]);
+}
+
+#[test]
+fn more_than_four_rivals_are_undecided() {
+    let c = channels(|_| 4.0, 5.0);
+    assert_eq!(
+        kept(&c, 1e-20, 4, false),
+        (BOTH.map(str::to_owned).to_vec(), Vec::new())
+    );
+    let (names, undecided) = kept(&c, 1e-20, 5, false);
+    assert_eq!(names, BOTH[1..]);
+    assert_eq!((undecided.len(), undecided[0].as_str()), (6, BOTH[0]));
+}
+
+#[test]
+fn names_that_predict_worse_than_none_are_dropped() {
+    // Its gain changes sign before the rows that are held out are over.
+    let c = channels(|_| 4.0, 5.0);
+    let search_rows = c.split().unwrap().heldout;
+    let against = channels(|k| if search_rows[k] { -9.0 } else { 4.0 }, 5.0);
+    assert_eq!(kept(&against, 1e-20, 0, false).0, BOTH[1..]);
+}
