@@ -187,11 +187,12 @@ impl Step {
     ) -> A::Word {
         // Negative unless there was a reading before and none is asked to restart.
         let one = ar.constant(1, 0);
-        let fresh = ar.is_negative(ar.sub(ar.sub(state.started, restart), one));
+        let first = ar.sub(state.started, one);
+        let [fresh, first] = [ar.sub(first, restart), first].map(|word| ar.is_negative(word));
         state.started = one;
         let mut r = ar.cast(rate, &self.align, &[rate]);
         for term in &self.on_bias {
-            r = ar.sub(r, self.on_bias(ar, state, term, fresh, inputs));
+            r = ar.sub(r, self.on_bias(ar, state, term, (fresh, first), inputs));
         }
         let measured = r;
         for _ in 0..self.passes {
@@ -210,7 +211,7 @@ impl Step {
         ar: &A,
         state: &mut State<A>,
         term: &OnBias,
-        fresh: A::Truth,
+        (fresh, first): (A::Truth, A::Truth),
         inputs: &[A::Word],
     ) -> A::Word {
         let sum = self.formats.sum_fraction_bits;
@@ -237,7 +238,10 @@ impl Step {
                     Followed::Curve(curve) => curve.value(ar, input(curve.input())),
                 };
                 match state.lags.get_mut(lag.slot) {
-                    Some(state) => lag.behind(ar, state, fresh, x),
+                    Some(state) => {
+                        let anew = if lag.kept { first } else { fresh };
+                        lag.behind(ar, state, anew, x)
+                    }
                     None => zero,
                 }
             }

@@ -75,6 +75,7 @@ fn on_bias(plan: &Plan, formats: &Formats, term: &Term) -> f64 {
             gain_dps,
             input,
             tau_s,
+            ..
         } => {
             let from = formats.input_bits(*input);
             2.0 * gain_half + inputs + state(*gain_dps, *tau_s, 1.0, from) + half

@@ -67,6 +67,9 @@ pub enum Term {
         input: usize,
         /// tau, s.
         tau_s: f64,
+        /// y = x at the very first reading only: the state outlives a restart, as the gyro's own
+        /// temperature does that of its firmware. The time without power counts as one period.
+        kept: bool,
     },
     /// The same of c(x), the curve through equidistant knots over -1 ..= 1, linear between them.
     LagOfCurve {
@@ -78,6 +81,8 @@ pub enum Term {
         values: Vec<f64>,
         /// tau, s.
         tau_s: f64,
+        /// As in [`Term::Lag`].
+        kept: bool,
     },
     /// gain * (x now - x `rows` readings ago) / (rows * period); 0 at the first reading.
     Slope {

@@ -69,12 +69,14 @@ pub fn plan(seed: u64, inputs: usize, relays: bool) -> Plan {
                 gain_dps: unit(&mut lcg),
                 input: any,
                 tau_s,
+                kept: unit(&mut lcg) > 0.3,
             },
             7 => Term::LagOfCurve {
                 gain_dps: unit(&mut lcg),
                 input: any,
                 values: knots(&mut lcg, n),
                 tau_s,
+                kept: unit(&mut lcg) > 0.3,
             },
             8 => Term::Slope {
                 gain_dps_s: period_s * unit(&mut lcg),
@@ -171,9 +173,9 @@ fn knot(values: &[f64], x: f64) -> f64 {
 
 /// The plan in real numbers, straight from its definition, without relays, the errors on the rate taken off
 /// in so many passes. Lags are sums over all
-/// steps since power-on: y_n = sum of the responses to the straight pieces of the input.
+/// steps since power-on, or ever: y_n = sum of the responses to the straight pieces of the input.
 pub fn evaluate(plan: &Plan, passes: usize, readings: &[Reading]) -> Vec<f64> {
-    let mut past: Vec<Vec<f64>> = Vec::new();
+    let (mut past, mut ever): (Vec<Vec<f64>>, Vec<Vec<f64>>) = Default::default();
     let mut result = Vec::new();
     for (reading, steps) in readings.iter().zip(schedule(plan.period_s, readings)) {
         if steps.restart {
@@ -183,8 +185,12 @@ pub fn evaluate(plan: &Plan, passes: usize, readings: &[Reading]) -> Vec<f64> {
         let x: Vec<f64> = reading.inputs.iter().zip(&plan.inputs).map(of).collect();
         for _ in 0..steps.count {
             past.push(x.clone());
+            ever.push(x.clone());
         }
-        let series = |input: usize| past.iter().map(|x| x[input]).collect::<Vec<_>>();
+        let series = |input: usize, kept: bool| -> Vec<f64> {
+            let steps = if kept { &ever } else { &past };
+            steps.iter().map(|x| x[input]).collect()
+        };
         let mut r = reading.rate_out_dps;
         for term in &plan.terms {
             r -= match term {
@@ -195,14 +201,17 @@ pub fn evaluate(plan: &Plan, passes: usize, readings: &[Reading]) -> Vec<f64> {
                     gain_dps,
                     input,
                     tau_s,
-                } => gain_dps * behind(&series(*input), plan.period_s / tau_s),
+                    kept,
+                } => gain_dps * behind(&series(*input, *kept), plan.period_s / tau_s),
                 Term::LagOfCurve {
                     gain_dps,
                     input,
                     values,
                     tau_s,
+                    kept,
                 } => {
-                    let c: Vec<f64> = series(*input).iter().map(|x| knot(values, *x)).collect();
+                    let x = series(*input, *kept);
+                    let c: Vec<f64> = x.iter().map(|x| knot(values, *x)).collect();
                     gain_dps * behind(&c, plan.period_s / tau_s)
                 }
                 Term::Slope {

@@ -88,6 +88,8 @@ pub struct Lag {
     pub slot: usize,
     /// x.
     pub of: Followed,
+    /// Whether the state outlives a restart.
+    pub kept: bool,
     /// The least and the largest state, raw: those of x.
     pub limits: (i128, i128),
     /// The input to the state's fraction bits.
@@ -118,6 +120,7 @@ impl Lag {
         Lag {
             slot,
             of: what.of,
+            kept: false,
             align: exact("correction.lag_input", what.from, state),
             approach,
             update: exact("correction.lag", state + approach.fraction_bits, state),

@@ -112,6 +112,7 @@ impl OnBias {
                 gain_dps,
                 input,
                 tau_s,
+                kept,
             } => {
                 let from = formats.input_bits(*input);
                 let followed = Following {
@@ -121,7 +122,8 @@ impl OnBias {
                     size: 1.0,
                 };
                 let slot = next(&mut slots.lags);
-                let lag = Lag::new(plan, formats, followed, *gain_dps, *tau_s, slot);
+                let mut lag = Lag::new(plan, formats, followed, *gain_dps, *tau_s, slot);
+                lag.kept = *kept;
                 OnBias::Lag(Box::new(lag))
             }
             Term::LagOfCurve {
@@ -129,6 +131,7 @@ impl OnBias {
                 input,
                 values,
                 tau_s,
+                kept,
             } => {
                 let size = values.iter().fold(0.0f64, |m, v| m.max(v.abs()));
                 let from = lagged_curve_bits(formats, *gain_dps);
@@ -142,7 +145,8 @@ impl OnBias {
                     size,
                 };
                 let slot = next(&mut slots.lags);
-                let lag = Lag::new(plan, formats, followed, *gain_dps, *tau_s, slot);
+                let mut lag = Lag::new(plan, formats, followed, *gain_dps, *tau_s, slot);
+                lag.kept = *kept;
                 OnBias::Lag(Box::new(lag))
             }
             Term::Slope {

@@ -52,6 +52,7 @@ fn the_float_twin_follows_closed_formulas() {
         gain_dps: 3.0,
         input: 0,
         tau_s: 60.0,
+        kept: false,
     }]);
     let c = Correction::auto(&lag).unwrap();
     let got = c.run_float(&readings_of(400, 10.0, ramp));
@@ -122,6 +123,36 @@ fn the_float_twin_follows_closed_formulas() {
     };
     // The passes leave at most a sixteenth of the noise, 1e-3 deg/s, at full scale.
     assert_close(&got, at, 2e-5 + 1e-3 / 16.0);
+}
+
+#[test]
+fn a_kept_lag_goes_on_after_a_restart_and_another_begins_anew() {
+    let correction = |kept: bool| {
+        let lag = Term::Lag {
+            gain_dps: 3.0,
+            input: 0,
+            tau_s: 60.0,
+            kept,
+        };
+        Correction::auto(&one(vec![lag])).unwrap()
+    };
+    // A ramp, then the same input after a restart.
+    let mut readings = readings_of(200, 0.0, |t| -0.5 + t / 1000.0);
+    let last = readings[199].inputs.clone();
+    let mut again = readings_of(30, 0.0, |_| 0.0);
+    for reading in &mut again {
+        reading.inputs.clone_from(&last);
+    }
+    readings.append(&mut again);
+    for (kept, share) in [(true, 1.0), (false, 0.0)] {
+        let c = correction(kept);
+        for got in [c.run(&readings), c.run_float(&readings)] {
+            // As far behind as after 398 s of a ramp, by exp(-t / tau) of it afterwards.
+            let behind = 3.0 * 0.06 * (1.0 - (-398.0f64 / 60.0).exp());
+            let due = |n: usize| -share * behind * (-2.0 * (n + 1) as f64 / 60.0).exp();
+            assert_close(&got[200..], due, c.bound_dps());
+        }
+    }
 }
 
 #[test]
@@ -217,6 +248,7 @@ fn firmware_adds_nothing_visible_to_the_noise() {
             gain_dps: 8.0,
             input: 0,
             tau_s: 600.0,
+            kept: false,
         },
         Term::Decay {
             gain_dps: 0.7,
@@ -280,6 +312,7 @@ fn a_wrong_constant_leaves_the_bound() {
             gain_dps: 1.0,
             input: 0,
             tau_s: 300.0,
+            kept: false,
         },
         Term::Product {
             gain_dps: 5.0,
@@ -372,6 +405,7 @@ fn plans_that_cannot_become_firmware_are_refused_with_the_rule() {
         gain_dps: 1.0,
         input: 0,
         tau_s,
+        kept: false,
     };
     let power = |p: u32| Term::Product {
         gain_dps: 1.0,

@@ -65,14 +65,20 @@ fn keys(term: &Term) -> String {
             gain_dps,
             input,
             tau_s,
-        } => format!("gain_dps = {gain_dps:?}, input = {input}, tau_s = {tau_s:?}"),
+            kept,
+        } => format!(
+            "gain_dps = {gain_dps:?}, input = {input}, tau_s = {tau_s:?}, kept = {}",
+            yes(*kept)
+        ),
         Term::LagOfCurve {
             gain_dps,
             input,
             values,
             tau_s,
+            kept,
         } => format!(
-            "gain_dps = {gain_dps:?}, input = {input}, tau_s = {tau_s:?}, values = {values:?}"
+            "gain_dps = {gain_dps:?}, input = {input}, tau_s = {tau_s:?}, kept = {}, values = {values:?}",
+            yes(*kept)
         ),
         Term::Slope {
             gain_dps_s,

@@ -63,20 +63,22 @@ fn term(value: &Value) -> Result<Term> {
     match kind {
         "product" => read.product(),
         "lag" => {
-            read.only(&["gain_dps", "input", "tau_s"])?;
+            read.only(&["gain_dps", "input", "tau_s", "kept"])?;
             Ok(Term::Lag {
                 gain_dps: read.real("gain_dps")?,
                 input: read.input()?,
                 tau_s: read.real("tau_s")?,
+                kept: read.kept()?,
             })
         }
         "lag_of_curve" => {
-            read.only(&["gain_dps", "input", "values", "tau_s"])?;
+            read.only(&["gain_dps", "input", "values", "tau_s", "kept"])?;
             Ok(Term::LagOfCurve {
                 gain_dps: read.real("gain_dps")?,
                 input: read.input()?,
                 values: read.reals("values")?,
                 tau_s: read.real("tau_s")?,
+                kept: read.kept()?,
             })
         }
         "slope" => {
@@ -148,6 +150,11 @@ impl Keys<'_> {
     fn flag(&self, key: &str) -> Result<bool> {
         let value = self.table.need(key)?;
         value.choice(&[("yes", true), ("no", false)])
+    }
+
+    fn kept(&self) -> Result<bool> {
+        let choices = [("yes", true), ("no", false)];
+        self.table.take("kept", Some(false), |v| v.choice(&choices))
     }
 
     fn product(&self) -> Result<Term> {

@@ -6,9 +6,8 @@ use super::{
 };
 use crate::closure::channels::{Channels, lag, slope};
 use crate::closure::firmware::{Words, knots};
-use crate::closure::likelihood::linear::{add_scaled, dot};
+use crate::closure::likelihood::linear::{Basis, add_scaled, dot};
 use crate::correction::Term;
-use std::collections::BTreeMap;
 
 /// All of this file.
 pub fn all() -> Vec<Box<dyn Candidate>> {
@@ -88,24 +87,32 @@ impl Candidate for ThermalLag {
     fn correction(&self, c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
         let (gain_dps, tau_s) = (*e.beta.first()?, tau_s(c, &e.point));
         let input = f.thermometer()?;
-        if e.point.form == 1 {
-            return Some(vec![Term::Lag {
-                gain_dps,
-                input,
-                tau_s,
-            }]);
-        }
         let bias = f.bias.clone();
         let curve = |u: f64| match e.point.form {
             0 => bias.at(u),
             _ => c.tangent_at(u),
         };
-        Some(vec![Term::LagOfCurve {
-            gain_dps,
-            input,
-            values: knots(65).map(curve).collect(),
-            tau_s,
-        }])
+        let values: Vec<f64> = knots(65).map(curve).collect();
+        let term = |share: f64, tau_s: f64, kept: bool| match e.point.form {
+            1 => Term::Lag {
+                gain_dps: share * gain_dps,
+                input,
+                tau_s,
+                kept,
+            },
+            _ => Term::LagOfCurve {
+                gain_dps: share * gain_dps,
+                input,
+                values: values.clone(),
+                tau_s,
+                kept,
+            },
+        };
+        let wanted = self.columns(c, &f.bias, &e.point).pop()?;
+        let wanted = map(&wanted, |v| gain_dps * v);
+        Some(
+            past_lags(c, f, tau_s, &wanted, &term).unwrap_or_else(|| vec![term(1.0, tau_s, false)]),
+        )
     }
 
     fn report(&self, c: &Channels, e: &Estimate) -> Reported {
@@ -116,6 +123,55 @@ impl Candidate for ThermalLag {
         };
         [per_k, from_log("tau_s", e, 0)].into_iter().collect()
     }
+}
+
+/// Time constants, in periods of the firmware, of a second lag beside a lag.
+const SHORTER: [f64; 6] = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
+
+/// The lags that come nearest to the wanted part of the output, deg/s; `term`: of a share of the gain, a time constant
+/// and whether its state outlives a restart.
+///
+/// The difference of a noisy reading and its lag has the reading's noise; less the one to a short lag it has that of a
+/// smoothed reading. And where the power was off for less than the lag, the gyro has kept its own state.
+fn past_lags(
+    c: &Channels,
+    f: &Words,
+    tau_s: f64,
+    wanted: &[f64],
+    term: &impl Fn(f64, f64, bool) -> Term,
+) -> Option<Vec<Term>> {
+    let trial = f.trial(c)?;
+    let most_dps = wanted.iter().fold(1e-3, |m: f64, v| m.max(4.0 * v.abs()));
+    let taken = |tau_s: f64, kept: bool| trial.taken_off(&[term(1.0, tau_s, kept)], most_dps);
+    let restarts = c.on_s.windows(2).any(|w| w[1] < w[0]);
+    let mut best: Option<(f64, Vec<Term>)> = None;
+    for kept in [false, true].into_iter().take(1 + usize::from(restarts)) {
+        let long = taken(tau_s, kept)?;
+        let mut left = wanted.to_vec();
+        add_scaled(&mut left, -1.0, &long);
+        let off = dot(&left, &left);
+        if best.as_ref().is_none_or(|b| off < b.0) {
+            best = Some((off, vec![term(1.0, tau_s, kept)]));
+        }
+        let shorter = SHORTER.iter().map(|periods| periods * f.period_s);
+        for short_s in shorter.take_while(|short_s| *short_s < 0.5 * tau_s) {
+            let basis = Basis::new(&[long.clone(), taken(short_s, kept)?]);
+            let mut left = wanted.to_vec();
+            let z = basis.project_off(&mut left);
+            let off = dot(&left, &left);
+            let better = |b: &(f64, Vec<Term>)| off < (1.0 - WORTH_A_TERM) * b.0;
+            if let [of_long, of_short] = basis.solve(&z)[..]
+                && best.as_ref().is_none_or(better)
+            {
+                let pair = [(of_long, tau_s), (of_short, short_s)];
+                best = Some((
+                    off,
+                    pair.map(|(share, tau_s)| term(share, tau_s, kept)).to_vec(),
+                ));
+            }
+        }
+    }
+    best.map(|b| b.1)
 }
 
 /// The time constant of a lag: shorter ones are a rate of change, longer ones a drift in time.
@@ -188,10 +244,15 @@ impl Candidate for TemperatureRate {
 /// Rows that a difference of the firmware looks back.
 const PAST: [u32; 9] = [1, 2, 3, 4, 5, 7, 9, 12, 16];
 
-/// The slopes that firmware can take and that come nearest to the wanted part of the output, deg/s.
+/// Share of the square that a further term of firmware has to take off for its words.
+const WORTH_A_TERM: f64 = 0.05;
+
+/// The slopes that firmware can take and that together come nearest to the wanted part of the output, deg/s.
 ///
-/// Firmware has no readings to come, only differences to past ones. Twice the difference over k readings less that
-/// over 2 k is late in second order only, and noisier. What each makes of the record is the block's own doing.
+/// Firmware has no readings to come, only differences to past ones: short ones are noisy, long ones late. Shares of
+/// several that sum to one follow a steady rise exactly, and extrapolate (twice the difference over k readings
+/// less that over 2 k is late in second order only) or average; least squares over the record chooses. What
+/// each makes of the record is the block's own doing.
 fn past_slopes(c: &Channels, f: &Words, gain_dps_s: f64, wanted: &[f64]) -> Option<Vec<Term>> {
     let (input, trial) = (f.thermometer()?, f.trial(c)?);
     let term = |share: f64, rows: u32| Term::Slope {
@@ -199,44 +260,65 @@ fn past_slopes(c: &Channels, f: &Words, gain_dps_s: f64, wanted: &[f64]) -> Opti
         input,
         rows,
     };
-    let mut taken: BTreeMap<u32, Option<Vec<f64>>> = BTreeMap::new();
-    let mut off = |parts: &[(f64, u32)]| -> Option<f64> {
-        let mut left = wanted.to_vec();
-        for (share, rows) in parts {
-            let values = taken.entry(*rows).or_insert_with(|| {
-                // As much as a jump of the thermometer over its range would make.
-                let most_dps = 6.0 * gain_dps_s.abs() / (f64::from(*rows) * f.period_s);
-                trial.taken_off(&[term(1.0, *rows)], most_dps.max(1e-3))
-            });
-            add_scaled(&mut left, -share, values.as_ref()?);
-        }
-        Some(dot(&left, &left))
-    };
     let finer = (c.period_s() / f.period_s).round().max(1.0) as u32;
+    // Until `MOST_SLOPE_ROWS`.
+    let each = PAST.iter().map_while(|rows| {
+        let rows = rows * finer;
+        // As much as a jump of the thermometer over its range would make.
+        let most_dps = 6.0 * gain_dps_s.abs() / (f64::from(rows) * f.period_s);
+        let values = trial.taken_off(&[term(1.0, rows)], most_dps.max(1e-3))?;
+        Some((rows, values))
+    });
+    let each: Vec<(u32, Vec<f64>)> = each.collect();
     let mut best: Option<(f64, Vec<(f64, u32)>)> = None;
-    for combined in [false, true] {
-        // Noise falls with the distance, lateness grows: two that are worse than one before, and so are all
-        // beyond them.
-        let (mut least, mut worse) = (f64::INFINITY, 0);
-        for rows in PAST.map(|rows| rows * finer) {
-            let parts = match combined {
-                false => vec![(1.0, rows)],
-                true => vec![(2.0, rows), (-1.0, 2 * rows)],
+    for count in 1..=3 {
+        for chosen in subsets(each.len(), count) {
+            let chosen: Vec<&(u32, Vec<f64>)> = chosen.iter().map(|k| &each[*k]).collect();
+            let Some((off, shares)) = mixed(&chosen, wanted) else {
+                continue;
             };
-            // Beyond `MOST_SLOPE_ROWS`.
-            let Some(off) = off(&parts) else { break };
-            worse = if off < least { 0 } else { worse + 1 };
-            least = least.min(off);
-            if best.as_ref().is_none_or(|b| off < b.0) {
-                best = Some((off, parts));
-            }
-            if worse == 2 {
-                break;
+            let better = |b: &(f64, Vec<_>)| {
+                let more = if b.1.len() < count { WORTH_A_TERM } else { 0.0 };
+                off < (1.0 - more) * b.0
+            };
+            if best.as_ref().is_none_or(better) {
+                let rows = chosen.iter().map(|c| c.0);
+                best = Some((off, shares.into_iter().zip(rows).collect()));
             }
         }
     }
     let (_, parts) = best?;
     Some(parts.iter().map(|(share, k)| term(*share, *k)).collect())
+}
+
+/// All choices of `count` of the first numbers, each ascending.
+fn subsets(of: usize, count: usize) -> Vec<Vec<usize>> {
+    let mut all = vec![Vec::new()];
+    for _ in 0..count {
+        let longer = |begun: &Vec<usize>| -> Vec<Vec<usize>> {
+            let next = begun.last().map_or(0, |last| last + 1);
+            (next..of)
+                .map(|k| [begun.as_slice(), &[k]].concat())
+                .collect()
+        };
+        all = all.iter().flat_map(longer).collect();
+    }
+    all
+}
+
+/// The shares, one in sum, with which columns come nearest to the wanted one, and the square that is left.
+fn mixed(columns: &[&(u32, Vec<f64>)], wanted: &[f64]) -> Option<(f64, Vec<f64>)> {
+    let (first, others) = columns.split_first()?;
+    let against = |column: &[f64]| -> Vec<f64> {
+        let pairs = column.iter().zip(&first.1);
+        pairs.map(|(v, f)| v - f).collect()
+    };
+    let basis = Basis::new(&others.iter().map(|o| against(&o.1)).collect::<Vec<_>>());
+    let mut left = against(wanted);
+    let z = basis.project_off(&mut left);
+    let mut shares = basis.solve(&z);
+    shares.insert(0, 1.0 - shares.iter().sum::<f64>());
+    (shares.len() == columns.len()).then(|| (dot(&left, &left), shares))
 }
 
 /// Rows to each side of a slope.

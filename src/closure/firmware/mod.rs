@@ -37,7 +37,7 @@ pub fn knots(count: usize) -> impl Iterator<Item = f64> {
 
 /// The inputs of a correction while its terms are collected.
 pub struct Words {
-    /// The declared bias in u.
+    /// The declared bias in u that effects act on ([`Model::acting`]).
     pub bias: Bias,
     /// Of the firmware, s.
     pub period_s: f64,
@@ -161,7 +161,7 @@ pub fn plan(
     estimates: &[Estimate],
     full_scale_dps: f64,
 ) -> Option<Plan> {
-    let mut words = Words::new(c, &model.bias, model.fit.noise.white_rms_dps);
+    let mut words = Words::new(c, &model.acting, model.fit.noise.white_rms_dps);
     let order = model.bias.coefficients_dps.len();
     let thermometer = words.thermometer();
     if order > 1 && thermometer.is_none() {

@@ -32,7 +32,7 @@ impl Tangent {
     }
 
     fn of(c: &Channels, model: &Model, term: &Term, first: usize) -> Self {
-        let columns = term.candidate.columns(c, &model.bias, &term.point);
+        let columns = term.candidate.columns(c, &model.acting, &term.point);
         let own = first..first + columns.len();
         let beta = model.beta.get(own.clone()).unwrap_or(&[]);
         let moved = |parameter: usize, by: f64| {
@@ -41,7 +41,7 @@ impl Tangent {
                 *theta += by;
             }
             let mut sum = vec![0.0; c.len()];
-            let columns = term.candidate.columns(c, &model.bias, &point);
+            let columns = term.candidate.columns(c, &model.acting, &point);
             for (column, b) in columns.iter().zip(beta) {
                 add_scaled(&mut sum, *b, column);
             }

@@ -44,7 +44,7 @@ impl Search<'_> {
         let reduce = |columns: Vec<Vec<f64>>| -> Vec<Vec<f64>> {
             columns.iter().map(|c| fit.reduce(c)).collect()
         };
-        let of = |t: &Term| reduce(t.candidate.columns(c, &model.bias, &t.point));
+        let of = |t: &Term| reduce(t.candidate.columns(c, &model.acting, &t.point));
         let mut base = reduce(declared(c));
         for (k, other) in model.terms.iter().enumerate() {
             if k != term {

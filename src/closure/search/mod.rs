@@ -107,6 +107,8 @@ pub struct Model {
     pub fit: Fit,
     /// The declared coefficients for prediction ([`Model::beta`]).
     pub bias: Bias,
+    /// The bias that the columns of the terms act on: that of the last pass but one.
+    pub acting: Bias,
     /// Coefficients for prediction: those of the terms are the fit's; the declared ones are ordinary
     /// (weighted) least squares of what the terms leave. Under a walk, generalised least squares
     /// ties the constant to the first rows; a mean over all rows predicts held-out ones.
@@ -288,7 +290,7 @@ impl<'a> Search<'a> {
     fn model_once(
         &self,
         terms: &[Term],
-        bias: &Bias,
+        acting: &Bias,
         options: &reml::Options,
     ) -> Result<Model, Unusable> {
         let c = self.channels;
@@ -301,13 +303,13 @@ impl<'a> Search<'a> {
                 (_, true) => Kind::Whole,
                 _ => Kind::Free,
             };
-            for column in term.candidate.columns(c, bias, &term.point) {
+            for column in term.candidate.columns(c, acting, &term.point) {
                 columns.push(column);
                 kinds.push(kind);
             }
         }
         let unclipped = columns.clone();
-        let clipped = clip(c, bias, &mut columns, &kinds);
+        let clipped = clip(c, acting, &mut columns, &kinds);
         let mut y = c.error_dps.clone();
         let mut free = Vec::new();
         for (column, kind) in columns.iter().zip(&kinds) {
@@ -353,6 +355,7 @@ impl<'a> Search<'a> {
             terms: terms.to_vec(),
             value: fit.loglik_ml + spikes as f64 * accident,
             fit,
+            acting: acting.clone(),
             bias,
             beta,
             columns,

@@ -35,7 +35,7 @@ impl Search<'_> {
         let declared = declared(c);
         let mut next = declared.len();
         let own = |term: &super::Term| {
-            let count = term.candidate.columns(c, &model.bias, &term.point).len();
+            let count = term.candidate.columns(c, &model.acting, &term.point).len();
             let mut sum = vec![0.0; c.len()];
             for k in next..next + count {
                 if let (Some(column), Some(b)) = (model.columns.get(k), model.beta.get(k)) {

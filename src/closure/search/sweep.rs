@@ -101,7 +101,7 @@ impl Search<'_> {
             if j == k {
                 continue;
             }
-            for column in other.candidate.columns(c, &model.bias, &other.point) {
+            for column in other.candidate.columns(c, &model.acting, &other.point) {
                 let column = model.fit.reduce(&column);
                 if other.candidate.is_whole() {
                     add_scaled(&mut problem.y, -1.0, &column);

@@ -59,7 +59,7 @@ impl Search<'_> {
         let reduced: Vec<Vec<f64>> = declared.iter().map(|d| fit.reduce(d)).collect();
         let basis = Basis::new(&whitener.apply_all(&reduced));
         let part = |term: &Term| {
-            let count = term.candidate.columns(c, &model.bias, &term.point).len();
+            let count = term.candidate.columns(c, &model.acting, &term.point).len();
             let mut sum = vec![0.0; c.len()];
             for k in next..next + count {
                 if let (Some(column), Some(b)) = (model.columns.get(k), model.beta.get(k)) {

@@ -92,7 +92,7 @@ impl Search<'_> {
     fn unseen(&self, model: &Model, term: &Term) -> bool {
         let columns = term
             .candidate
-            .columns(self.channels, &model.bias, &term.point);
+            .columns(self.channels, &model.acting, &term.point);
         let square = |column: &Vec<f64>, rows: &[bool]| -> f64 {
             let pairs = column.iter().zip(rows);
             pairs.filter(|(_, row)| **row).map(|(v, _)| v * v).sum()
@@ -266,7 +266,7 @@ impl Search<'_> {
         };
         let columns = term
             .candidate
-            .columns(self.channels, &model.bias, &term.point);
+            .columns(self.channels, &model.acting, &term.point);
         !term.candidate.is_whole() && !columns.is_empty() && columns.iter().all(once)
     }
 
@@ -274,7 +274,7 @@ impl Search<'_> {
     fn switches(&self, term: &Term, model: &Model) -> usize {
         let columns = term
             .candidate
-            .columns(self.channels, &model.bias, &term.point);
+            .columns(self.channels, &model.acting, &term.point);
         let count = |c: &Vec<f64>| c.windows(2).filter(|w| w[0] != w[1]).count();
         columns.iter().map(count).max().unwrap_or(0)
     }
