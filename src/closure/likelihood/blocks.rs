@@ -10,8 +10,8 @@
 //!    extrapolated).
 //! 3. Of the 35 ways to do that, the one is taken whose training rows leave the narrowest gaps in the
 //!    thermometer's range, taken as a whole and on the way up and down, and, where a rate was applied, hold
-//!    out least of the highest and of the lowest readings, the first among equals: held-out error is
-//!    about interpolation, and a clip shows in few rows.
+//!    out no more than a third of the highest and of the lowest readings, the first among equals:
+//!    held-out error is about interpolation, and a clip shows in few rows.
 //!
 //! Held-out rows are not used in any estimate, and predictions for them are those of the
 //! regressors alone: the noise's memory never carries a training row's noise across the border.
@@ -203,10 +203,11 @@ fn gaps(all: &[bool], train: &[bool]) -> f64 {
     sum
 }
 
-/// Outermost readings at each end: this share of the rows, and how many at least; and what it counts, in bins'
-/// squares, if all of them are held out.
+/// Outermost readings at each end: this share of the rows, and how many at least; which share of them may be held out,
+/// and what it counts, in bins' squares, if all of them are.
 const OUTERMOST: f64 = 0.01;
 const FEW: usize = 4;
+const FAIR: f64 = 1.0 / 3.0;
 const ALL_LOST: f64 = 30.0;
 
 /// The rows of the lowest and of the highest readings.
@@ -225,10 +226,11 @@ fn outermost(output: &[f64]) -> Vec<Vec<usize>> {
     vec![of(&|v| v <= low), of(&|v| v >= high)]
 }
 
-/// What it costs to hold out some of them.
+/// What it costs to hold out more of them than of all rows.
 fn lost(rows: &[usize], heldout: &[bool]) -> f64 {
     let held = rows.iter().filter(|i| heldout[**i]).count();
-    ALL_LOST * (held as f64 / rows.len().max(1) as f64).powi(2)
+    let share = held as f64 / rows.len().max(1) as f64;
+    ALL_LOST * ((share - FAIR).max(0.0) / (1.0 - FAIR)).powi(2)
 }
 
 /// The number of the monotone run of each row, turning points by a tenth of the range.

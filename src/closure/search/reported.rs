@@ -22,8 +22,14 @@ impl Search<'_> {
     pub(super) fn kept_alone(&self, found: &mut Found) -> Result<(), Unusable> {
         self.kept_decided(found);
         self.kept_above_rounding(found)?;
-        self.kept_stable(found)?;
-        self.kept_below(found)
+        loop {
+            self.kept_stable(found)?;
+            let stable = found.terms.len();
+            self.kept_below(found)?;
+            if found.terms.len() == stable {
+                return Ok(());
+            }
+        }
     }
 
     /// Names with too many rivals become undecided.

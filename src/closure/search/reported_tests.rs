@@ -41,6 +41,15 @@ fn channels(supply: impl Fn(usize) -> f64, g: f64) -> Channels {
 
 /// What stays of both names, the supply's with a probability and rivals, and what becomes undecided.
 fn kept(c: &Channels, p_value: f64, rivals: usize, left: bool) -> (Vec<String>, Vec<String>) {
+    kept_of(c, [p_value, 1e-20], rivals, left)
+}
+
+fn kept_of(
+    c: &Channels,
+    p_values: [f64; 2],
+    rivals: usize,
+    left: bool,
+) -> (Vec<String>, Vec<String>) {
     let search = Search::new(c, &c.split().unwrap(), Effort::default(), Vec::new());
     let term = |id: &str, p_value: f64, rivals: usize| {
         let candidate = search.candidates().iter().find(|c| c.id() == id);
@@ -56,8 +65,8 @@ fn kept(c: &Channels, p_value: f64, rivals: usize, left: bool) -> (Vec<String>, 
     };
     let mut found = Found {
         terms: vec![
-            term("supply_sensitivity", p_value, rivals),
-            term("g_sensitivity", 1e-20, 0),
+            term("supply_sensitivity", p_values[0], rivals),
+            term("g_sensitivity", p_values[1], 0),
         ],
         strangers: Vec::new(),
         left: left.then(|| "time_s".to_owned()),
@@ -115,4 +124,6 @@ fn names_that_predict_worse_than_none_are_dropped() {
     let search_rows = c.split().unwrap().heldout;
     let against = channels(|k| if search_rows[k] { -9.0 } else { 4.0 }, 5.0);
     assert_eq!(kept(&against, 1e-20, 0, false).0, BOTH[1..]);
+    // What was dropped is left, and the other name too weak beside it.
+    assert!(kept_of(&against, [1e-20, 1e-3], 0, false).0.is_empty());
 }
