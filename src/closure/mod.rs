@@ -42,6 +42,8 @@ mod clip_tests;
 #[cfg(test)]
 mod intake_tests;
 #[cfg(test)]
+mod lag_tests;
+#[cfg(test)]
 mod lego_tests;
 #[cfg(test)]
 pub(crate) mod synthetic;

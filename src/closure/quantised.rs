@@ -91,6 +91,9 @@ fn cells(c: &Channels, design: &Design, raw: &[f64], step: f64) -> Vec<(f64, f64
     raw.iter().map(cell).collect()
 }
 
+/// Share of the rows that move by one step from which on it is a ramp's own, and no rounding.
+const EVENLY: f64 = 0.9;
+
 /// The step of readings that take few values, evenly spaced; `None` for others.
 fn step_of(readings: &[f64]) -> Option<f64> {
     let mut levels = readings.to_vec();
@@ -107,6 +110,11 @@ fn step_of(readings: &[f64]) -> Option<f64> {
         (steps - steps.round()).abs() < 0.05 && steps.round() >= 1.0
     };
     let on_grid = gaps.iter().filter(whole).count();
+    let as_one = readings.windows(2).map(|w| (w[1] - w[0]).abs());
+    let as_one = as_one.filter(|d| (d - step).abs() < 0.05 * step).count();
+    if as_one as f64 > EVENLY * readings.len() as f64 {
+        return None;
+    }
     (step > 0.0 && on_grid as f64 >= ON_GRID * gaps.len() as f64).then_some(step)
 }
 
@@ -308,5 +316,10 @@ mod tests {
         let printed: Vec<f64> = noise.iter().map(|v| (v * 1000.0).round() / 100.0).collect();
         assert_eq!(step_of(&printed), None);
         assert_eq!(step_of(&[1.0; 50]), None);
+        // A chamber's even ramps, without noise; and the same rounded to what it does in three rows.
+        let ramps: Vec<f64> = (0..600).map(|k| 0.4 * f64::from(k % 75)).collect();
+        assert_eq!(step_of(&ramps), None);
+        let rounded: Vec<f64> = ramps.iter().map(|v| (v / 1.2).round() * 1.2).collect();
+        assert!(step_of(&rounded).is_some_and(|s| (s - 1.2).abs() < 1e-9));
     }
 }

@@ -461,3 +461,27 @@ impl Candidate for Ageing {
         .collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slopes_are_mixed_to_follow_what_rises_faster_and_faster() {
+        // Of t^2, over one and over two periods, against 2 t.
+        let t: Vec<f64> = (0..20).map(f64::from).collect();
+        let over = |k: f64| map(&t, |t| 2.0 * t - k);
+        let (one, two, three) = ((1, over(1.0)), (2, over(2.0)), (3, over(3.0)));
+        let (off, shares) = mixed(&[&one, &two], &over(0.0)).unwrap();
+        assert!(
+            off < 1e-18 && (shares[0] - 2.0).abs() < 1e-9,
+            "{off} {shares:?}"
+        );
+        let (_, shares) = mixed(&[&one, &three], &over(2.0)).unwrap();
+        assert!((shares[0] - 0.5).abs() < 1e-9 && (shares[1] - 0.5).abs() < 1e-9);
+        // One alone has no choice: a steady rise is followed exactly.
+        assert_eq!(mixed(&[&two], &over(0.0)).unwrap(), (80.0, vec![1.0]));
+        assert_eq!(subsets(9, 3).len(), 84);
+        assert_eq!(subsets(3, 2), [[0, 1], [0, 2], [1, 2]]);
+    }
+}

@@ -29,8 +29,8 @@ impl Search<'_> {
         for _ in 0..POLISHES {
             let before: Vec<Point> = model.terms.iter().map(|t| t.point.clone()).collect();
             model = self.polished_once(model)?;
-            // A clip's level and the bias move each other; smooth shapes are done at once.
-            let acting = model.terms.iter().any(|t| t.candidate.is_last());
+            // What acts on the bias and the bias move each other; other shapes are done at once.
+            let acting = model.terms.iter().any(|t| t.candidate.acts_on_bias());
             if !acting || model.terms.iter().map(|t| &t.point).eq(before.iter()) {
                 break;
             }

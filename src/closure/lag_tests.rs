@@ -1,0 +1,84 @@
+//! A part of the bias that lags, closed: what firmware makes of it.
+
+use super::channels::lag;
+use super::close::{Closed, close};
+use super::search::{Effort, Search};
+use super::synthetic::{self, Random, triangle};
+use crate::correction::Term;
+use crate::design::reader;
+
+const ROWS: usize = 600;
+const TAU_S: f64 = 60.0;
+
+/// deg/s at a temperature, degC.
+fn bias_dps(degc: f64) -> f64 {
+    let u = degc / 35.0 - 1.0;
+    8.0 - 3.0 * u + 1.0 * u * u
+}
+
+/// Four heatings, `share` of the bias follows with its lag; noise of 0.01 deg/s, power-ons at these rows.
+fn closed(share: f64, power_ons: &[usize]) -> Closed {
+    let mut random = Random::new(8);
+    let degc: Vec<f64> = [triangle(ROWS / 4), triangle(ROWS / 4)].concat().repeat(2);
+    let time_s: Vec<f64> = (0..ROWS).map(|k| k as f64).collect();
+    let now: Vec<f64> = degc.iter().map(|t| bias_dps(*t)).collect();
+    let late = lag(&time_s, &now, TAU_S);
+    let output: Vec<f64> = now
+        .iter()
+        .zip(&late)
+        .map(|(now, late)| now + share * (now - late) + 0.01 * random.normal())
+        .collect();
+    let mut record = synthetic::record("die_degc", &degc, &output);
+    if !power_ons.is_empty() {
+        let on = |k: usize| power_ons.iter().rev().find(|p| **p <= k).unwrap_or(&0);
+        let on_s = (0..ROWS).map(|k| (k - on(k)) as f64).collect();
+        let name = "time_since_power_on_s".to_owned();
+        record.columns.insert(name, on_s);
+    }
+    let design = reader::read(None).unwrap();
+    close(&record, Vec::new(), &design, "test", Effort::default()).unwrap()
+}
+
+fn firmware_over_float(closed: &Closed) -> f64 {
+    let fixed = closed.closure.firmware.heldout_rms;
+    let fixed = fixed.unwrap_or_else(|| panic!("{:?}", closed.closure.warnings));
+    fixed / closed.closure.after.heldout_rms
+}
+
+fn lags(closed: &Closed) -> Vec<bool> {
+    let plan = &closed.correction.as_ref().unwrap().plan;
+    let kept = |term: &Term| match term {
+        Term::Lag { kept, .. } | Term::LagOfCurve { kept, .. } => Some(*kept),
+        _ => None,
+    };
+    plan.terms.iter().filter_map(kept).collect()
+}
+
+#[test]
+fn a_lag_of_nearly_the_whole_bias_is_the_same_in_firmware_and_its_gain_is_looked_at() {
+    let closed = closed(0.9, &[]);
+    let step = &closed.closure.steps[0];
+    assert_eq!(step.effect, "thermal_lag");
+    assert!(step.parameters.contains_key("share_of_bias"), "{step:?}");
+    let ratio = firmware_over_float(&closed);
+    assert!(ratio < 1.02, "{ratio}");
+    let effort = Effort::default();
+    let search = Search::new(&closed.channels, &closed.split, effort, Vec::new());
+    let constancy = search.constancy(&closed.after, &closed.after.terms[0]);
+    assert!(constancy.is_some());
+}
+
+#[test]
+fn a_lag_that_restarts_do_not_interrupt_keeps_its_state_over_them() {
+    let closed = closed(0.3, &[0, 160, 300, 470]);
+    assert_eq!(closed.closure.steps[0].effect, "thermal_lag");
+    let kept = lags(&closed);
+    assert!(!kept.is_empty() && kept.iter().all(|k| *k), "{kept:?}");
+    let ratio = firmware_over_float(&closed);
+    assert!(ratio < 1.02, "{ratio}");
+}
+
+#[test]
+fn without_restarts_nothing_has_to_be_kept() {
+    assert!(lags(&closed(0.3, &[])).iter().all(|kept| !kept));
+}
