@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::closure::channels::Channels;
+use crate::closure::effects::{Candidate, Point};
 use crate::closure::search::Effort;
 use crate::closure::synthetic::{Random, triangle};
 use std::collections::BTreeMap;
@@ -105,7 +106,36 @@ fn a_clip_that_no_held_out_row_shows_stands() {
 }
 
 #[test]
-fn one_row_is_an_accident_and_twelve_are_a_transient() {
+fn a_transient_of_one_row_is_an_accident_and_one_of_twelve_is_none() {
+    let mut random = Random::new(2);
+    let degc = [triangle(ROWS / 2), triangle(ROWS / 2)].concat();
+    let output = (0..ROWS).map(|_| 0.01 * random.normal()).collect();
+    let columns = BTreeMap::from([
+        ("rate_out_dps".to_owned(), output),
+        ("die_degc".to_owned(), degc),
+    ]);
+    let time_s: Vec<f64> = (0..ROWS).map(|k| 10.0 * k as f64).collect();
+    let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+    let split = c.split().unwrap();
+    let search = Search::new(&c, &split, Effort::default(), Vec::new());
+    let is_it = |c: &&Arc<dyn Candidate>| c.id() == "warmup_transient";
+    let candidate = search.candidates().iter().find(is_it).unwrap();
+    for (tau_s, once) in [(4.4, true), (11.0, true), (14.0, false), (120.0, false)] {
+        let term = Term {
+            candidate: candidate.clone(),
+            point: Point::at(0, &[f64::ln(tau_s)]),
+            p_value: 1e-9,
+            rivals: Vec::new(),
+            gain: 20.0,
+            beside: Vec::new(),
+        };
+        let model = search.model(std::slice::from_ref(&term)).unwrap();
+        assert_eq!(search.shows_once(&term, &model), once, "{tau_s}");
+    }
+}
+
+#[test]
+fn a_spike_is_no_transient_and_twelve_rows_are_one() {
     for seed in 0..3 {
         let first_row = |k: usize, _| if k == 0 { 12.0 } else { 0.0 };
         let (names, _) = closed(seed, &[], first_row);
