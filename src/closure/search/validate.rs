@@ -249,7 +249,7 @@ impl Search<'_> {
         let rivals = &model.terms[own].rivals;
         let counts = |j: &&Judged| {
             let listed = rivals.contains(&j.candidate.id());
-            !listed && !(local && j.candidate.is_local())
+            !(listed || local && j.candidate.is_local())
         };
         let against = round.judged.iter().filter(counts);
         let least = if local { STABLE } else { EVER };
