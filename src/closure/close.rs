@@ -304,6 +304,7 @@ impl Told<'_> {
             };
             out.push(without(candidate, fate, remark));
         }
+        out.extend(self.wave(&out));
         let listed: Vec<String> = out.iter().map(|e| e.effect.clone()).collect();
         for candidate in self.search.candidates() {
             if candidate.named() && !listed.contains(&candidate.id()) {
@@ -312,6 +313,23 @@ impl Told<'_> {
             }
         }
         out
+    }
+
+    /// What is said of `periodic_pickup` where the strongest sinusoid comes back too seldom for its name.
+    fn wave(&self, listed: &[Evidence]) -> Option<Evidence> {
+        const NAME: &str = "periodic_pickup";
+        let mut judged = self.found.first.iter();
+        let wave = judged.find(|j| j.candidate.id() == "outside:tone")?;
+        let absent = listed.iter().all(|e| e.effect != NAME);
+        let remark =
+            "the strongest sinusoid has fewer than four periods in this record, as a wander has";
+        absent.then(|| Evidence {
+            effect: NAME.to_owned(),
+            fate: Fate::Rejected,
+            p_value: Some(wave.p_value),
+            gain: Some(wave.gain),
+            remark: remark.to_owned(),
+        })
     }
 
     fn warn(&self, warnings: &mut Vec<Warning>) {
