@@ -226,7 +226,7 @@ fn outermost(output: &[f64]) -> Vec<Vec<usize>> {
     vec![of(&|v| v <= low), of(&|v| v >= high)]
 }
 
-/// What it costs to hold out more of them than of all rows.
+/// What it costs to hold out more than their fair share.
 fn lost(rows: &[usize], heldout: &[bool]) -> f64 {
     let held = rows.iter().filter(|i| heldout[**i]).count();
     let share = held as f64 / rows.len().max(1) as f64;
@@ -321,7 +321,7 @@ mod tests {
 
     #[test]
     fn a_rate_s_outermost_readings_are_not_held_out_together() {
-        // Four stairs of rate within each of three slow cycles of temperature, the highest one in the same of 15 spans.
+        // Three slow cycles of temperature; the highest rate in one of the 15 spans alone.
         let n = 450;
         let times: Vec<f64> = (0..n).map(f64::from).collect();
         let t: Vec<f64> = times.iter().map(|t| (t / 24.0).sin()).collect();

@@ -119,7 +119,7 @@ fn more_than_four_rivals_are_undecided() {
 
 #[test]
 fn names_that_predict_worse_than_none_are_dropped() {
-    // Its gain changes sign before the rows that are held out are over.
+    // Its gain has the other sign in the rows that are held out.
     let c = channels(|_| 4.0, 5.0);
     let search_rows = c.split().unwrap().heldout;
     let against = channels(|k| if search_rows[k] { -9.0 } else { 4.0 }, 5.0);
