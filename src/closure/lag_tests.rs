@@ -6,6 +6,7 @@ use super::search::{Effort, Search};
 use super::synthetic::{self, Random, triangle};
 use crate::correction::Term;
 use crate::design::reader;
+use std::ops::Range;
 
 const ROWS: usize = 600;
 const TAU_S: f64 = 60.0;
@@ -16,8 +17,8 @@ fn bias_dps(degc: f64) -> f64 {
     8.0 - 3.0 * u + 1.0 * u * u
 }
 
-/// Four heatings, `share` of the bias follows with its lag; noise of 0.01 deg/s, power-ons at these rows.
-fn closed(share: f64, power_ons: &[usize]) -> Closed {
+/// Four heatings, `share` of the bias follows with its lag; noise of 0.01 deg/s, no power in these rows.
+fn closed(share: f64, without_power: &[Range<usize>]) -> Closed {
     let mut random = Random::new(8);
     let degc: Vec<f64> = [triangle(ROWS / 4), triangle(ROWS / 4)].concat().repeat(2);
     let time_s: Vec<f64> = (0..ROWS).map(|k| k as f64).collect();
@@ -29,11 +30,20 @@ fn closed(share: f64, power_ons: &[usize]) -> Closed {
         .map(|(now, late)| now + share * (now - late) + 0.01 * random.normal())
         .collect();
     let mut record = synthetic::record("die_degc", &degc, &output);
-    if !power_ons.is_empty() {
-        let on = |k: usize| power_ons.iter().rev().find(|p| **p <= k).unwrap_or(&0);
+    if !without_power.is_empty() {
+        let on = |k: usize| {
+            let ends = without_power.iter().map(|off| off.end);
+            ends.filter(|end| *end <= k).max().unwrap_or(0)
+        };
         let on_s = (0..ROWS).map(|k| (k - on(k)) as f64).collect();
         let name = "time_since_power_on_s".to_owned();
         record.columns.insert(name, on_s);
+        let logged = |k: &usize| without_power.iter().all(|off| !off.contains(k));
+        let kept = |column: &Vec<f64>| (0..ROWS).filter(logged).map(|k| column[k]).collect();
+        record.time_s = kept(&record.time_s);
+        for column in record.columns.values_mut() {
+            *column = kept(column);
+        }
     }
     let design = reader::read(None).unwrap();
     close(&record, Vec::new(), &design, "test", Effort::default()).unwrap()
@@ -70,12 +80,18 @@ fn a_lag_of_nearly_the_whole_bias_is_the_same_in_firmware_and_its_gain_is_looked
 
 #[test]
 fn a_lag_that_restarts_do_not_interrupt_keeps_its_state_over_them() {
-    let closed = closed(0.3, &[0, 160, 300, 470]);
-    assert_eq!(closed.closure.steps[0].effect, "thermal_lag");
-    let kept = lags(&closed);
-    assert!(!kept.is_empty() && kept.iter().all(|k| *k), "{kept:?}");
-    let ratio = firmware_over_float(&closed);
-    assert!(ratio < 1.02, "{ratio}");
+    // Interrupted, and off for half the lag and for all of it, in which the temperature goes on as before.
+    for off in [
+        [160..160, 300..300, 470..470],
+        [160..190, 305..365, 470..475],
+    ] {
+        let closed = closed(0.3, &off);
+        assert_eq!(closed.closure.steps[0].effect, "thermal_lag");
+        let kept = lags(&closed);
+        assert!(!kept.is_empty() && kept.iter().all(|k| *k), "{kept:?}");
+        let ratio = firmware_over_float(&closed);
+        assert!(ratio < 1.02, "{off:?}: {ratio}");
+    }
 }
 
 #[test]

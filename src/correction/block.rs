@@ -4,10 +4,10 @@
 //! The state needs no preparation beyond zeros: a step before which there was none restarts by itself.
 
 use super::formats::Formats;
-use super::plan::{MOST_INPUTS, MOST_OF_A_KIND, Plan};
+use super::plan::{MOST_INPUTS, MOST_OF_A_KIND, Plan, Term};
 use super::rate_terms::{OnRate, passes};
 use super::states::Followed;
-use super::terms::{OnBias, Slots, exact};
+use super::terms::{OnBias, Slots, exact, raw};
 use crate::error::Result;
 use crate::numeric::arithmetic::{Arithmetic, Block, Port, StateVisitor};
 use crate::numeric::cast::{Cast, Label};
@@ -52,6 +52,8 @@ pub struct Step {
     on_bias: Vec<OnBias>,
     on_rate: Vec<OnRate>,
     passes: usize,
+    /// The full scale, raw in the sum's unit.
+    most: i128,
     formats: Formats,
     align: Cast,
     output: Cast,
@@ -97,7 +99,11 @@ impl Step {
         let on_bias = terms.filter_map(|t| OnBias::new(plan, formats, t, &mut slots));
         let mut step = Step {
             on_bias: on_bias.collect(),
-            passes: passes(plan, formats),
+            passes: match plan.terms.iter().any(Term::is_on_rate) {
+                true => passes(plan, formats),
+                false => 0,
+            },
+            most: raw(plan.full_scale_dps, formats.sum_fraction_bits),
             on_rate: plan
                 .terms
                 .iter()
@@ -196,9 +202,11 @@ impl Step {
         }
         let measured = r;
         for _ in 0..self.passes {
+            // A pass from beyond the full scale would lead away from it.
+            let held = ar.limit(r, -self.most, self.most, self.formats.sum_fraction_bits);
             let mut next = measured;
             for term in &self.on_rate {
-                next = ar.sub(next, term.error(ar, r, inputs));
+                next = ar.sub(next, term.error(ar, held, inputs));
             }
             r = next;
         }

@@ -12,9 +12,9 @@
 //! | curve | slope d + h (knots) + h (between them) |
 //! | slope | 2 g + 2 abs(gain) d + h |
 //! | decay | g + abs(gain) (s / a + q / a + 2^-31) + h |
-//! | on the rate, error k r | in each pass R (error of k) + h, R the largest rate, and 3 K times what the pass before it was off by, K the largest k |
+//! | on the rate, error k r | in each pass R (error of k) + h, R the full scale, and 3 K times what the pass before it was off by, K the largest k |
 
-use super::formats::{Formats, PRODUCT_BITS, largest_bias_dps, slope_dps, steepest};
+use super::formats::{Formats, PRODUCT_BITS, slope_dps, steepest};
 use super::plan::{Plan, Term};
 use super::rate_terms::{constant, share_bits};
 use super::states::{Approach, lagged_curve_bits};
@@ -31,7 +31,7 @@ pub(super) fn bound_dps(plan: &Plan, formats: &Formats) -> f64 {
     for term in &plan.terms {
         bound += on_bias(plan, formats, term);
     }
-    let largest = pow2(formats.rate_exponent()) + largest_bias_dps(plan);
+    let largest = plan.full_scale_dps;
     let measured = bound;
     for _ in 0..formats.passes(plan) {
         let mut next = measured;

@@ -22,9 +22,9 @@ pub const HIGHEST_POWER: u32 = 9;
 ///
 /// With the scaled inputs x (each held within -1 ..= 1) and the reading r, deg/s, first
 /// m = r - (sum of the terms on the bias), then the true rate from m, which has the errors of the terms on
-/// the rate ([`Term::ScaleBy`], [`Term::Cubic`], [`Term::Even`]) on it: r = m - sum of errors(r), by as
-/// many substitutions from r = m as it takes ([`super::Formats::passes`]). Wherever they stand in [`Plan::terms`], terms
-/// on the rate come after those on the bias.
+/// the rate ([`Term::ScaleBy`], [`Term::Cubic`], [`Term::Even`]) on it: r = m - sum of errors(r), r held within
+/// the full scale in these, by as many substitutions from r = m as it takes ([`super::Formats::passes`]).
+/// Wherever they stand in [`Plan::terms`], terms on the rate come after those on the bias.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
     /// Nominal time between readings, s.
@@ -68,7 +68,8 @@ pub enum Term {
         /// tau, s.
         tau_s: f64,
         /// y = x at the very first reading only: the state outlives a restart, as the gyro's own
-        /// temperature does that of its firmware. The time without power counts as one period.
+        /// temperature does that of its firmware, and goes on through the time without power
+        /// ([`super::schedule`]); where nobody tells that, it counts as one period.
         kept: bool,
     },
     /// The same of c(x), the curve through equidistant knots over -1 ..= 1, linear between them.
@@ -185,6 +186,14 @@ impl Term {
         )
     }
 
+    /// True for a term whose state outlives a restart.
+    pub fn is_kept(&self) -> bool {
+        matches!(
+            self,
+            Term::Lag { kept: true, .. } | Term::LagOfCurve { kept: true, .. }
+        )
+    }
+
     /// The inputs that it reads.
     pub fn inputs(&self) -> Vec<usize> {
         match self {
@@ -201,6 +210,11 @@ impl Term {
 }
 
 impl Plan {
+    /// True if a lag's state outlives a restart.
+    pub fn keeps(&self) -> bool {
+        self.terms.iter().any(Term::is_kept)
+    }
+
     /// Checks every number.
     ///
     /// # Errors

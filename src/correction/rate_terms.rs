@@ -1,7 +1,7 @@
 //! The terms on the rate itself: their errors are functions of the true rate, and what comes in is the
 //! true rate with the errors on it. So the rate is the fixed point of r = m - sum of cast(r k), k a term's
 //! relative error and m what the terms on the bias leave, reached in a fixed number of passes
-//! ([`passes`]) from r = m.
+//! ([`passes`]) from r = m; errors are those of r held within the full scale.
 //!
 //! | term | k |
 //! |---|---|
@@ -75,8 +75,11 @@ const MOST_PASSES: usize = 8;
 /// What the passes may leave of the errors at full scale, of the noise.
 const LEFT_SHARE: f64 = 1.0 / 16.0;
 
-/// Contraction from which on passes are no longer worth it.
+/// Contraction at full scale from which on the passes are tried one by one.
 const SLOW: f64 = 0.5;
+
+/// Rates at which they are, from rest to full scale.
+const TRIED: usize = 32;
 
 /// The error of a term at a rate of `rate_dps`, and its slope there, at most: deg/s and 1.
 fn at_most(term: &Term, rate_dps: f64) -> (f64, f64) {
@@ -98,9 +101,28 @@ fn at_most(term: &Term, rate_dps: f64) -> (f64, f64) {
     (rate_dps * share, power * share)
 }
 
+/// The error of a term on the rate, deg/s, with its input at `x`.
+fn error_dps(term: &Term, rate_dps: f64, x: f64) -> f64 {
+    let over = |rate_max_dps: &f64| rate_dps / rate_max_dps;
+    match term {
+        Term::ScaleBy { input, s0, s1 } => rate_dps * (s0 + input.map_or(0.0, |_| s1 * x)),
+        Term::Even {
+            ppm,
+            absolute: true,
+            ..
+        } => ppm * 1e-6 * rate_dps.abs(),
+        Term::Even {
+            ppm, rate_max_dps, ..
+        } => ppm * 1e-6 * rate_dps * over(rate_max_dps),
+        Term::Cubic { ppm, rate_max_dps } => ppm * 1e-6 * rate_dps * over(rate_max_dps).powi(2),
+        _ => 0.0,
+    }
+}
+
 /// How often the errors are taken off: each pass leaves at most the errors' slope times what the one
-/// before it left, and what is left at full scale in the end is far below the noise. One pass where the
-/// slope is so large that more would not help.
+/// before it left, and what is left at full scale in the end is far below the noise. Where that slope is large, as
+/// often as leaves least of any reading within the full scale: the slope at the true rate, which is less than the
+/// reading, may be smaller.
 pub(super) fn passes(plan: &Plan, formats: &Formats) -> usize {
     let full_scale = plan.full_scale_dps;
     let sum = |(e, q), term| {
@@ -108,16 +130,45 @@ pub(super) fn passes(plan: &Plan, formats: &Formats) -> usize {
         (e + error, q + slope)
     };
     let (error, slope) = plan.terms.iter().fold((0.0, 0.0), sum);
+    let enough = LEFT_SHARE * formats.noise_dps;
     if slope >= SLOW {
-        return 1;
+        return tried(plan, enough);
     }
     let mut left = error * slope;
     let mut passes = 1;
-    while left > LEFT_SHARE * formats.noise_dps && passes < MOST_PASSES {
+    while left > enough && passes < MOST_PASSES {
         left *= slope;
         passes += 1;
     }
     passes
+}
+
+/// The fewest passes that leave no more than `enough`, deg/s, else those that leave least: over readings within the
+/// full scale, every input at either end.
+fn tried(plan: &Plan, enough: f64) -> usize {
+    let most = plan.full_scale_dps;
+    let errors = |rate_dps: f64, x: f64| -> f64 {
+        let held = rate_dps.clamp(-most, most);
+        plan.terms.iter().map(|t| error_dps(t, held, x)).sum()
+    };
+    let mut worst = [0.0f64; MOST_PASSES];
+    for x in [-1.0, 1.0] {
+        for k in 0..=2 * TRIED {
+            let true_dps = most * (k as f64 / TRIED as f64 - 1.0);
+            let measured = true_dps + errors(true_dps, x);
+            if measured.abs() > most {
+                continue;
+            }
+            let mut rate_dps = measured;
+            for left in &mut worst {
+                rate_dps = measured - errors(rate_dps, x);
+                *left = left.max((rate_dps - true_dps).abs());
+            }
+        }
+    }
+    let least = worst.iter().fold(f64::INFINITY, |m: f64, l| m.min(*l));
+    let first = worst.iter().position(|left| *left <= enough.max(least));
+    first.map_or(1, |k| k + 1)
 }
 
 impl OnRate {

@@ -62,36 +62,54 @@ pub fn readings(plan: &Plan, record: &ThermalRecord) -> Result<Vec<Reading>> {
 /// Steps that a reading takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Steps {
-    /// The first of them restarts.
+    /// Before the others, without a restart: for the time without power.
+    pub unpowered: u64,
+    /// The first of the `count` restarts.
     pub restart: bool,
     /// At least 1.
     pub count: u64,
 }
 
+impl Steps {
+    /// Whether each of them restarts, in their order.
+    pub fn restarts(self) -> impl Iterator<Item = bool> {
+        let all = self.unpowered + self.count;
+        (0..all).map(move |n| self.restart && n == self.unpowered)
+    }
+}
+
 /// When the correction steps: so often that the number of steps since power-on is the time since then
 /// in nominal periods, rounded; at least once and at most [`MOST_STEPS`] times a reading, which steps with
 /// the same words each time. A reading at power-on takes one step, a first reading later than that
-/// takes those that would have come before it.
-pub fn schedule(period_s: f64, readings: &[Reading]) -> Vec<Steps> {
+/// takes those that would have come before it. If a state outlives restarts ([`Plan::keeps`]), the time without power
+/// is stepped through as well, as far as `time_s` tells it, the restart being the last of these steps.
+pub fn schedule(plan: &Plan, readings: &[Reading]) -> Vec<Steps> {
     // Steps after the restart, and the clock they are counted by.
     let mut done = 0u64;
     let mut clock_at_restart_s = 0.0;
-    let mut before: Option<f64> = None;
+    let mut before: Option<(f64, f64)> = None;
+    let periods = |time_s: f64| (time_s / plan.period_s).round().max(0.0) as u64;
     let one = |reading: &Reading| {
         let now = reading.time_since_power_on_s.unwrap_or(reading.time_s);
         // A clock that falls has restarted. A record without the second clock has one power-on.
-        let restart = before.is_none_or(|before| now < before);
-        before = Some(now);
+        let restart = before.is_none_or(|(on_s, _)| now < on_s);
+        let since = before.replace((now, reading.time_s));
+        let mut unpowered = 0;
         if restart {
             done = 0;
             clock_at_restart_s = now.min(0.0);
+            if let (Some((_, time_s)), true) = (since, plan.keeps()) {
+                let without = reading.time_s - (now - clock_at_restart_s) - time_s;
+                unpowered = periods(without).saturating_sub(1);
+            }
         }
-        let due = ((now - clock_at_restart_s) / period_s).round().max(0.0) as u64;
+        let due = periods(now - clock_at_restart_s);
         let least = if restart { 0 } else { done + 1 };
         let target = due.max(least);
         let count = target - done + u64::from(restart);
         done = target;
         Steps {
+            unpowered: unpowered.min(MOST_STEPS),
             restart,
             count: count.clamp(1, MOST_STEPS),
         }
@@ -165,14 +183,14 @@ impl Correction {
     pub fn calls(&self, readings: &[Reading]) -> (Vec<Vec<i128>>, Vec<usize>) {
         let (mut calls, mut last) = (Vec::new(), Vec::new());
         let mut held = vec![0; self.plan.inputs.len()];
-        for (reading, steps) in readings.iter().zip(schedule(self.plan.period_s, readings)) {
+        for (reading, steps) in readings.iter().zip(schedule(&self.plan, readings)) {
             for (k, (word, value)) in held.iter_mut().zip(&reading.inputs).enumerate() {
                 if !value.is_nan() {
                     *word = self.input_raw(k, *value);
                 }
             }
-            for n in 0..steps.count {
-                let mut words = vec![i128::from(steps.restart && n == 0)];
+            for restart in steps.restarts() {
+                let mut words = vec![i128::from(restart)];
                 words.extend(&held);
                 words.push(self.rate_raw(reading.rate_out_dps));
                 calls.push(words);
@@ -210,7 +228,7 @@ impl Correction {
     pub fn run_float(&self, readings: &[Reading]) -> Vec<f64> {
         let mut state: State<Float> = self.step.state();
         let mut held = vec![0.0; self.plan.inputs.len()];
-        let steps = schedule(self.plan.period_s, readings);
+        let steps = schedule(&self.plan, readings);
         let mut results = Vec::with_capacity(readings.len());
         for (reading, steps) in readings.iter().zip(steps) {
             for (k, (x, value)) in held.iter_mut().zip(&reading.inputs).enumerate() {
@@ -220,8 +238,8 @@ impl Correction {
                 }
             }
             let mut result = f64::NAN;
-            for n in 0..steps.count {
-                let restart = f64::from(u8::from(steps.restart && n == 0));
+            for restart in steps.restarts() {
+                let restart = f64::from(u8::from(restart));
                 let rate = reading.rate_out_dps;
                 result = self.step.run(&Float, &mut state, restart, &held, rate);
             }

@@ -129,6 +129,7 @@ pub fn record(plan: &Plan, rows: usize, seed: u64) -> Vec<Reading> {
         }
         if below(&mut lcg, 400) == 0 {
             on_s = 0.0;
+            time_s += 20.0 * plan.period_s * (1.0 + unit(&mut lcg));
         }
         for x in &mut x {
             *x = (*x + 0.05 * unit(&mut lcg)).clamp(-0.99, 0.99);
@@ -177,12 +178,15 @@ fn knot(values: &[f64], x: f64) -> f64 {
 pub fn evaluate(plan: &Plan, passes: usize, readings: &[Reading]) -> Vec<f64> {
     let (mut past, mut ever): (Vec<Vec<f64>>, Vec<Vec<f64>>) = Default::default();
     let mut result = Vec::new();
-    for (reading, steps) in readings.iter().zip(schedule(plan.period_s, readings)) {
+    for (reading, steps) in readings.iter().zip(schedule(plan, readings)) {
         if steps.restart {
             past.clear();
         }
         let of = |(value, i): (&f64, &Input)| ((value - i.offset) / i.scale).clamp(-1.0, 1.0);
         let x: Vec<f64> = reading.inputs.iter().zip(&plan.inputs).map(of).collect();
+        for _ in 0..steps.unpowered {
+            ever.push(x.clone());
+        }
         for _ in 0..steps.count {
             past.push(x.clone());
             ever.push(x.clone());
@@ -232,7 +236,8 @@ pub fn evaluate(plan: &Plan, passes: usize, readings: &[Reading]) -> Vec<f64> {
         }
         let measured = r;
         for _ in 0..passes {
-            let errors = plan.terms.iter().map(|t| error_on_rate(t, r, &x));
+            let held = r.clamp(-plan.full_scale_dps, plan.full_scale_dps);
+            let errors = plan.terms.iter().map(|t| error_on_rate(t, held, &x));
             r = measured - errors.sum::<f64>();
         }
         result.push(r);

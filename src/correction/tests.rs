@@ -305,6 +305,36 @@ fn errors_on_the_rate_are_functions_of_the_true_rate() {
 }
 
 #[test]
+fn a_tenth_of_the_rate_is_taken_off_where_the_full_scale_is_far_above_it() {
+    // At twice the rate of the record the error's slope is 1.2, at the true rates of such readings 0.7.
+    let error = |r: f64| 0.1 * r * (r / 100.0_f64).powi(2);
+    let mut plan = one(vec![Term::Cubic {
+        ppm: 1e5,
+        rate_max_dps: 100.0,
+    }]);
+    plan.full_scale_dps = 200.0;
+    let formats = Formats::choose(&plan, 0.1).unwrap();
+    assert_eq!(formats.passes(&plan), 8);
+    let correction = Correction::new(&plan, &formats).unwrap();
+    for k in -10..=10 {
+        let true_dps = 10.0 * f64::from(k);
+        let readings = readings_of(2, true_dps + error(true_dps), |_| 0.0);
+        let got = correction.run(&readings)[1];
+        assert!((got - true_dps).abs() < 0.01, "{true_dps}: {got}");
+    }
+    // Beyond the full scale, where substitution alone would lead away, it stays below the reading.
+    let beyond = correction.run(&readings_of(2, 240.0, |_| 0.0))[1];
+    assert!((120.0..240.0).contains(&beyond), "{beyond}");
+    // An error that turns the output back is taken off once, at best.
+    plan.terms = vec![Term::Cubic {
+        ppm: -1e5,
+        rate_max_dps: 100.0,
+    }];
+    plan.full_scale_dps = 1000.0;
+    assert!(formats.passes(&plan) >= 1);
+}
+
+#[test]
 fn a_wrong_constant_leaves_the_bound() {
     let readings = |plan: &Plan| record(plan, 400, 3);
     let good = one(vec![
@@ -347,7 +377,9 @@ fn steps_follow_the_clock() {
         times.iter().map(at).collect()
     };
     let counts = |t: &[f64]| -> Vec<(bool, u64)> {
-        let steps = schedule(10.0, &times(t));
+        let mut plan = one(Vec::new());
+        plan.period_s = 10.0;
+        let steps = schedule(&plan, &times(t));
         steps.iter().map(|s| (s.restart, s.count)).collect()
     };
     // Power-on, even, gap, late; a repeated time is a step that the next one saves.
@@ -378,6 +410,50 @@ fn steps_follow_the_clock() {
             (false, MOST_STEPS)
         ]
     );
+}
+
+#[test]
+fn a_state_that_is_kept_goes_on_without_power() {
+    let lag = |kept: bool| {
+        let mut plan = one(vec![Term::Lag {
+            gain_dps: 1.0,
+            input: 0,
+            tau_s: 300.0,
+            kept,
+        }]);
+        plan.period_s = 10.0;
+        plan
+    };
+    let rows = [
+        (0.0, 0.0),
+        (10.0, 10.0),
+        (95.0, 5.0),
+        (105.0, 15.0),
+        (105.0, 0.0),
+    ];
+    let readings = rows.map(|(time_s, on_s)| Reading {
+        time_s,
+        time_since_power_on_s: Some(on_s),
+        inputs: vec![0.0],
+        rate_out_dps: 0.0,
+    });
+    let steps = |kept: bool| -> Vec<(u64, u64)> {
+        let steps = schedule(&lag(kept), &readings);
+        steps.iter().map(|s| (s.unpowered, s.count)).collect()
+    };
+    assert_eq!(steps(false), [(0, 1), (0, 1), (0, 2), (0, 1), (0, 1)]);
+    // On again 80 s after the last reading: seven steps and the restart. At once: the restart alone.
+    assert_eq!(steps(true), [(0, 1), (0, 1), (7, 2), (0, 1), (0, 1)]);
+    let restarts: Vec<bool> = schedule(&lag(true), &readings)[2].restarts().collect();
+    assert_eq!(restarts, [[false; 7].as_slice(), &[true, false]].concat());
+    let long = [
+        readings[1].clone(),
+        Reading {
+            time_s: 1e9,
+            ..readings[0].clone()
+        },
+    ];
+    assert_eq!(schedule(&lag(true), &long)[1].unpowered, MOST_STEPS);
 }
 
 #[test]

@@ -28,22 +28,19 @@ pub fn period_s(on_s: &[f64], rows_s: f64) -> f64 {
 }
 
 /// The readings with those between them that fall on the firmware's grid (their rate is not known: NaN), and
-/// where the given ones are.
-pub fn with_between(period_s: f64, readings: &[Reading]) -> (Vec<Reading>, Vec<usize>) {
+/// where the given ones are. `through_off`: also those that firmware makes up for when power returns, for
+/// states that go on without it.
+pub fn with_between(
+    period_s: f64,
+    readings: &[Reading],
+    through_off: bool,
+) -> (Vec<Reading>, Vec<usize>) {
     let mut all: Vec<Reading> = Vec::with_capacity(readings.len());
     let mut places = Vec::with_capacity(readings.len());
-    let on = |r: &Reading| r.time_since_power_on_s.unwrap_or(r.time_s);
-    let grid = |r: &Reading| (on(r) / period_s).round();
     for (k, reading) in readings.iter().enumerate() {
         let before = k.checked_sub(1).map(|b| &readings[b]);
-        if let Some(before) = before.filter(|b| on(b) < on(reading)) {
-            let steps = (grid(reading) - grid(before)).max(0.0) as u64;
-            if (2..=MOST_BETWEEN).contains(&steps) {
-                for j in 1..steps {
-                    let at = (grid(before) + j as f64) * period_s;
-                    all.push(between(before, reading, at - on(before)));
-                }
-            }
+        for at_s in before.map_or(Vec::new(), |b| moments(period_s, b, reading, through_off)) {
+            all.extend(before.map(|b| between(b, reading, at_s)));
         }
         places.push(all.len());
         all.push(reading.clone());
@@ -51,10 +48,39 @@ pub fn with_between(period_s: f64, readings: &[Reading]) -> (Vec<Reading>, Vec<u
     (all, places)
 }
 
+/// Time since power-on, s.
+fn on_s(reading: &Reading) -> f64 {
+    reading.time_since_power_on_s.unwrap_or(reading.time_s)
+}
+
+/// When firmware steps between two rows, s after the first: on its grid since power-on, or, across an
+/// interruption, once a period until the restart, which is a step of its own.
+fn moments(period_s: f64, a: &Reading, b: &Reading, through_off: bool) -> Vec<f64> {
+    let grid = |on_s: f64| (on_s / period_s).round();
+    let (from_s, steps) = if on_s(a) < on_s(b) {
+        let offset = grid(on_s(a)) * period_s - on_s(a);
+        (offset, grid(on_s(b)) - grid(on_s(a)))
+    } else if through_off {
+        (0.0, grid(b.time_s - on_s(b) - a.time_s))
+    } else {
+        return Vec::new();
+    };
+    let steps = steps.max(0.0) as u64;
+    if !(2..=MOST_BETWEEN).contains(&steps) {
+        return Vec::new();
+    }
+    (1..steps).map(|j| from_s + j as f64 * period_s).collect()
+}
+
 /// `after_s` later than `a`, on the line from `a` to `b`.
 fn between(a: &Reading, b: &Reading, after_s: f64) -> Reading {
-    let on = |r: &Reading| r.time_since_power_on_s.unwrap_or(r.time_s);
-    let share = (after_s / (on(b) - on(a))).clamp(0.0, 1.0);
+    let powered = on_s(a) < on_s(b);
+    let span_s = if powered {
+        on_s(b) - on_s(a)
+    } else {
+        b.time_s - a.time_s
+    };
+    let share = (after_s / span_s).clamp(0.0, 1.0);
     let pairs = a.inputs.iter().zip(&b.inputs);
     Reading {
         time_s: a.time_s + after_s,
@@ -100,7 +126,7 @@ mod tests {
             reading(0.0, 9.0),
             reading(20.0, 8.0),
         ];
-        let (all, places) = with_between(20.0, &rows);
+        let (all, places) = with_between(20.0, &rows, false);
         assert_eq!(places, [0, 3, 4, 5]);
         assert_eq!(all[1].inputs, [2.0]);
         assert_eq!(all[2].inputs, [3.0]);
@@ -112,5 +138,22 @@ mod tests {
         for (row, place) in rows.iter().zip(&places) {
             assert_eq!(row.rate_out_dps, all[*place].rate_out_dps);
         }
+    }
+
+    #[test]
+    fn across_a_power_on_it_lies_on_the_line_up_to_the_restart() {
+        // Off at 160 s, on again at 240 s, first read 10 s later.
+        let mut rows = [reading(60.0, 1.0), reading(10.0, 10.0)];
+        rows[1].time_s = 250.0;
+        let (all, places) = with_between(20.0, &rows, true);
+        assert_eq!(places, [0, 4]);
+        let times: Vec<f64> = all.iter().map(|r| r.time_s).collect();
+        assert_eq!(times, [160.0, 180.0, 200.0, 220.0, 250.0]);
+        let inputs: Vec<f64> = all.iter().map(|r| r.inputs[0]).collect();
+        assert_eq!(inputs, [1.0, 3.0, 5.0, 7.0, 10.0]);
+        assert_eq!(all[3].time_since_power_on_s, Some(120.0));
+        // Off for less than a period and a half: the restart is the only step.
+        rows[1].time_s = 198.0;
+        assert_eq!(with_between(20.0, &rows, true).1, [0, 1]);
     }
 }

@@ -235,7 +235,7 @@ fn logged(record: &ThermalRecord, c: &Channels, plan: &Plan) -> ThermalRecord {
 fn stream(plan: &Plan, record: &ThermalRecord, c: &Channels) -> Result<(Vec<Reading>, Vec<usize>)> {
     let readings = readings(plan, &logged(record, c, plan))?;
     if plan.terms.iter().any(Term::remembers) {
-        return Ok(clock::with_between(plan.period_s, &readings));
+        return Ok(clock::with_between(plan.period_s, &readings, plan.keeps()));
     }
     let places = (0..readings.len()).collect();
     Ok((readings, places))

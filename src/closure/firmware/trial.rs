@@ -24,7 +24,9 @@ impl Words {
             inputs: vec![input.offset + input.scale * u],
             rate_out_dps: 0.0,
         });
-        let (mut readings, places) = clock::with_between(self.period_s, &rows.collect::<Vec<_>>());
+        // Only states that are kept see what lies between two power-ons.
+        let rows: Vec<Reading> = rows.collect();
+        let (mut readings, places) = clock::with_between(self.period_s, &rows, true);
         for between in &mut readings {
             between.rate_out_dps = 0.0;
         }
