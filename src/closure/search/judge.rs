@@ -327,3 +327,7 @@ fn reduced(
     let columns = candidate.columns(search.channels, bias, point);
     columns.iter().map(|c| fit.reduce(c)).collect()
 }
+
+#[cfg(test)]
+#[path = "judge_tests.rs"]
+mod tests;

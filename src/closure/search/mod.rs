@@ -395,6 +395,21 @@ impl Model {
         }
         out
     }
+
+    /// What each term adds, deg/s, every row.
+    fn contributions(&self, c: &Channels) -> Vec<Vec<f64>> {
+        let mut from = declared(c).len();
+        let own = |term: &Term| {
+            let to = from + term.candidate.columns(c, &self.acting, &term.point).len();
+            let mut sum = vec![0.0; c.len()];
+            for (column, b) in self.columns[from..to].iter().zip(&self.beta[from..to]) {
+                add_scaled(&mut sum, *b, column);
+            }
+            from = to;
+            sum
+        };
+        self.terms.iter().map(own).collect()
+    }
 }
 
 /// How a column enters.

@@ -1,11 +1,23 @@
 //! What is reported has to stand by itself: shapes without a name, beside which names were found, are not in it.
 
+use super::structure::slowness;
 use super::validate::UNSTEADY;
-use super::{Found, MOST_RIVALS, Search, Term};
+use super::{Found, LEVEL, MOST_RIVALS, Search, Term};
 use crate::closure::likelihood::Unusable;
 
-/// How far the held-out error with the steps may lie above the one without.
+/// Most that the steps may leave of the held-out error without them; the same where more is left than they
+/// explain: what stands beside something larger and unknown may be a part of that.
 const ABOVE: f64 = 1.015;
+const BESIDE: f64 = 0.87;
+
+/// Slow noise, rms in units of the white, from which on a name needs more than the usual probability, and the powers of
+/// ten that each further unit asks for: what was not recorded wanders as slow noise does, but probabilities are reckoned
+/// with noise that is Gaussian and everywhere the same.
+const WANDER: f64 = 1.0;
+const DECADES: f64 = 4.0;
+
+/// A probability that is enough beside any noise.
+const SURELY: f64 = 1e-40;
 
 /// What a name needs where more is left than the names explain. A probability: that record's noise is not the one that
 /// it is reckoned with. A selection frequency (Meinshausen & Buhlmann 2010: 0.6 to 0.9). A share of its square
@@ -23,6 +35,7 @@ impl Search<'_> {
         self.kept_decided(found);
         self.kept_above_rounding(found)?;
         loop {
+            self.kept_from_noise(found)?;
             self.kept_stable(found)?;
             let stable = found.terms.len();
             self.kept_below(found)?;
@@ -45,15 +58,38 @@ impl Search<'_> {
         }
     }
 
-    /// Drops names until the held-out error is not above that of the declared model.
+    /// Drops names, the least probable first, that slow noise as strong as what they leave may have made.
+    fn kept_from_noise(&self, found: &mut Found) -> Result<(), Unusable> {
+        let p_value = |found: &Found, k: usize| found.terms[k].p_value;
+        loop {
+            let each = 0..found.terms.len();
+            let weakest = each.max_by(|a, b| p_value(found, *a).total_cmp(&p_value(found, *b)));
+            let Some(k) = weakest else { return Ok(()) };
+            let fit = self.model(&found.terms)?.fit;
+            let slow = slowness(fit.at.shape, fit.problem.line.used());
+            let asked = LEVEL * 10f64.powf(-DECADES * (slow - WANDER).max(0.0));
+            let asked = asked.max(SURELY);
+            if p_value(found, k) <= asked {
+                return Ok(());
+            }
+            self.drop(found, k);
+        }
+    }
+
+    /// Drops names until the held-out error is not above that of the declared model, or clearly below it where more
+    /// is left.
     fn kept_below(&self, found: &mut Found) -> Result<(), Unusable> {
         let before = self.model(&[])?;
         let square = |terms: &[Term]| -> Result<f64, Unusable> {
             let model = self.model(terms)?;
             Ok(self.heldout_error(&model, &before).square)
         };
-        let limit = self.heldout_error(&before, &before).square * ABOVE.powi(2);
-        while !found.terms.is_empty() && square(&found.terms)? > limit {
+        let of_before = self.heldout_error(&before, &before).square;
+        let limit = |found: &Found| {
+            let most = if found.left.is_some() { BESIDE } else { ABOVE };
+            of_before * most.powi(2)
+        };
+        while !found.terms.is_empty() && square(&found.terms)? > limit(found) {
             let mut least: Option<(usize, f64)> = None;
             for k in 0..found.terms.len() {
                 let mut others = found.terms.clone();

@@ -33,16 +33,7 @@ impl Search<'_> {
         let c = self.channels;
         let weights: Vec<f64> = self.used.iter().map(|u| f64::from(u8::from(*u))).collect();
         let declared = declared(c);
-        let mut next = declared.len();
-        let own = |term: &super::Term| {
-            let count = term.candidate.columns(c, &model.acting, &term.point).len();
-            let mut sum = vec![0.0; c.len()];
-            for k in next..next + count {
-                if let (Some(column), Some(b)) = (model.columns.get(k), model.beta.get(k)) {
-                    add_scaled(&mut sum, *b, column);
-                }
-            }
-            next += count;
+        let own = |mut sum: Vec<f64>| {
             let beta = weighted(&declared, &sum, &weights);
             for (b, column) in beta.iter().zip(&declared) {
                 add_scaled(&mut sum, -b, column);
@@ -50,7 +41,7 @@ impl Search<'_> {
             let used = sum.iter().zip(&self.used).filter(|(_, u)| **u);
             stats::rms(&used.map(|(s, _)| *s).collect::<Vec<_>>())
         };
-        model.terms.iter().map(own).collect()
+        model.contributions(c).into_iter().map(own).collect()
     }
 }
 

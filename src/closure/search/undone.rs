@@ -4,7 +4,7 @@
 //! in: the noise of a column, say, which may well go with the output's noise. Both are then beyond chance, each
 //! beside the other, and neither is in the record.
 
-use super::{Model, Search, Term};
+use super::{Model, Search};
 use crate::closure::likelihood::Unusable;
 use crate::closure::likelihood::linear::{Basis, add_scaled, dot};
 use crate::closure::likelihood::whiten::Whitener;
@@ -55,23 +55,14 @@ impl Search<'_> {
         let fit = &model.fit;
         let whitener = Whitener::new(&fit.problem.line, fit.at.shape);
         let declared = super::declared(c);
-        let mut next = declared.len();
         let reduced: Vec<Vec<f64>> = declared.iter().map(|d| fit.reduce(d)).collect();
         let basis = Basis::new(&whitener.apply_all(&reduced));
-        let part = |term: &Term| {
-            let count = term.candidate.columns(c, &model.acting, &term.point).len();
-            let mut sum = vec![0.0; c.len()];
-            for k in next..next + count {
-                if let (Some(column), Some(b)) = (model.columns.get(k), model.beta.get(k)) {
-                    add_scaled(&mut sum, *b, column);
-                }
-            }
-            next += count;
+        let part = |sum: Vec<f64>| {
             let mut white = whitener.apply(&fit.reduce(&sum));
             basis.project_off(&mut white);
             white
         };
-        model.terms.iter().map(part).collect()
+        model.contributions(c).into_iter().map(part).collect()
     }
 }
 
@@ -86,6 +77,7 @@ fn is_undone(part: &[f64], others: &[&Vec<f64>], share: f64) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Term;
     use super::*;
     use crate::closure::likelihood::random::Stream;
 

@@ -10,9 +10,6 @@ use std::sync::Arc;
 /// Slow noise, in units of white noise over the record, from which on a single step is no evidence.
 const SLOW: f64 = 2.0;
 
-/// Probability that a step needs over slow noise of twice that strength.
-const WEAK: f64 = 1e-4;
-
 /// Probability from which on a step stands that the held-out rows do not show, and the share of its square that
 /// is none.
 const CERTAIN: f64 = 1e-8;
@@ -143,7 +140,7 @@ impl Search<'_> {
     }
 
     /// Without shapes of a single row. Without steps that happen once: they are no law of temperature unless
-    /// everything else is clean, for anything may happen once. And without weak names over strong slow noise.
+    /// everything else is clean, for anything may happen once.
     fn without_accidents(&self, model: Model, found: &mut Found) -> Result<Model, Unusable> {
         let rows = model.fit.problem.line.used();
         let slow = structure::slowness(model.fit.at.shape, rows);
@@ -158,11 +155,10 @@ impl Search<'_> {
             }
             let single = t.id() == "stress_jump" && self.switches(t, &model) < 2;
             let accident = single && (more || slow > SLOW);
-            let weak = slow > 2.0 * SLOW && t.p_value > WEAK;
-            if accident || weak {
+            if accident {
                 found.left = self.channel(t);
             }
-            !(accident || weak)
+            !accident
         });
         if terms.len() == model.terms.len() {
             return Ok(model);

@@ -145,3 +145,44 @@ fn a_spike_is_no_transient_and_twelve_rows_are_one() {
         assert_eq!(names, ["warmup_transient"], "{seed}");
     }
 }
+
+#[test]
+fn a_law_takes_a_names_place_if_it_is_as_good_or_beyond_chance_by_itself() {
+    let supply: Vec<f64> = (0..ROWS)
+        .map(|k| f64::from(u8::from(k / 11 % 3 == 1)))
+        .collect();
+    let degc = [triangle(ROWS / 2), triangle(ROWS / 2)].concat();
+    // The supply's part and that of a step at 30 degC, in units of the noise: alone, less than the step but beyond chance
+    // beside it, not so, and absent.
+    for (of_supply, of_step, expected) in [
+        (4.0, 0.0, Some(("supply_sensitivity", true))),
+        (4.0, 9.0, Some(("supply_sensitivity", false))),
+        (3.0, 9.0, None),
+        (0.0, 6.0, None),
+    ] {
+        let mut random = Random::new(21);
+        let output = (0..ROWS).map(|k| {
+            let jump = if degc[k] > 30.0 { of_step } else { 0.0 };
+            0.3 + 0.01 * (of_supply * supply[k] + jump + random.normal())
+        });
+        let columns = BTreeMap::from([
+            ("rate_out_dps".to_owned(), output.collect()),
+            ("supply_v".to_owned(), supply.clone()),
+            ("die_degc".to_owned(), degc.clone()),
+        ]);
+        let time_s: Vec<f64> = (0..ROWS).map(|k| 10.0 * k as f64).collect();
+        let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+        let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+        let model = search.model(&[]).unwrap();
+        let round = search.round(&model, 0);
+        let jump = round
+            .judged
+            .iter()
+            .find(|j| j.candidate.id() == "stress_jump");
+        let own = Term::of(jump.unwrap(), Vec::new());
+        let law = search.law_instead(&[], &own).unwrap();
+        let law = law.map(|(term, good)| (term.id(), good));
+        let expected = expected.map(|(id, good)| (id.to_owned(), good));
+        assert_eq!(law, expected, "{of_supply}, {of_step}");
+    }
+}
