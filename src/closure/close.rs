@@ -220,9 +220,13 @@ impl Told<'_> {
         warnings: &mut Vec<Warning>,
     ) -> (Option<Correction>, FirmwareErrors) {
         let c = self.search.channels;
-        let output = record.column("rate_out_dps").unwrap_or(&[]);
-        let (low, high) = stats::extremes(output).unwrap_or((0.0, 0.0));
-        let widest = 1.25 * low.abs().max(high.abs()).max(1e-3);
+        // Rates as they come in, and as they go out.
+        let most = |name: &str| {
+            let (low, high) =
+                stats::extremes(record.column(name).unwrap_or(&[])).unwrap_or_default();
+            low.abs().max(high.abs())
+        };
+        let widest = 1.25 * most("rate_out_dps").max(most("rate_dps")).max(1e-3);
         let estimates = self.search.estimates(self.after);
         let none = (None, FirmwareErrors::default());
         let Some(plan) = firmware::plan(c, self.after, &estimates, widest) else {

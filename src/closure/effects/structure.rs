@@ -238,6 +238,52 @@ fn thresholds(u: &[f64], centre: f64) -> Vec<f64> {
     between.into_iter().step_by(every).collect()
 }
 
+/// Gaps, in u, that firmware is tried with beyond the model's: what a noisy reading does not cross twice.
+const WIDER: [f64; 5] = [0.002, 0.005, 0.01, 0.02, 0.04];
+
+/// Centre and gap with which the relay of the firmware, which sees the thermometer's readings, is most often where the model's
+/// is, which sees their smooth course (`wanted`, 0 or 1 a row): among equals those nearest to the model's.
+fn in_readings(
+    c: &Channels,
+    f: &Words,
+    (centre, gap): (f64, f64),
+    wanted: &[f64],
+    term: impl Fn(f64, f64) -> Term,
+) -> Option<(f64, f64)> {
+    let trial = f.trial(c)?;
+    let step_dps = match term(centre, gap) {
+        Term::Step { gain_dps, .. } => gain_dps,
+        _ => return None,
+    };
+    let apart = |centre: f64, gap: f64| -> Option<usize> {
+        let taken = trial.taken_off(&[term(centre, gap)], 4.0 * step_dps.abs().max(1e-3))?;
+        let pairs = taken.iter().zip(wanted);
+        Some(
+            pairs
+                .filter(|(t, w)| (**t / step_dps - **w).abs() > 0.5)
+                .count(),
+        )
+    };
+    let nearer = |best: (usize, f64, f64), centre: f64, gap: f64| {
+        let rows = if best.0 > 0 { apart(centre, gap)? } else { 0 };
+        Some(if rows < best.0 {
+            (rows, centre, gap)
+        } else {
+            best
+        })
+    };
+    let mut best = (apart(centre, gap)?, centre, gap);
+    let mut others = thresholds(&c.u, centre);
+    others.sort_by(|a, b| (a - centre).abs().total_cmp(&(b - centre).abs()));
+    for other in others {
+        best = nearer(best, other, gap)?;
+    }
+    for more in WIDER {
+        best = nearer(best, best.1, gap + more)?;
+    }
+    Some((best.1, best.2))
+}
+
 /// 0 below, 1 above `centre`, by half the gap later in each direction; `once`: it never comes back.
 pub fn step(u: &[f64], centre: f64, gap: f64, once: bool) -> Vec<f64> {
     let mut above = u.first().is_some_and(|u| *u > centre);
@@ -344,16 +390,23 @@ impl Candidate for StressJump {
             // It waits for the cold: the relay of the firmware waits for the warm only.
             return None;
         }
-        Some(vec![Term::Step {
-            gain_dps: *e.beta.first()?,
-            input: f.thermometer()?,
+        let gap = match e.point.form {
+            1 => e.point.theta[1].abs(),
+            _ => 0.0,
+        };
+        let (gain_dps, input) = (*e.beta.first()?, f.thermometer()?);
+        let once = e.point.form == 2;
+        let term = |centre: f64, gap: f64| Term::Step {
+            gain_dps,
+            input,
             centre,
-            gap: match e.point.form {
-                1 => e.point.theta[1].abs(),
-                _ => 0.0,
-            },
-            once: e.point.form == 2,
-        }])
+            gap,
+            once,
+        };
+        let wanted = self.columns(c, &f.bias, &e.point).pop()?;
+        let (centre, gap) =
+            in_readings(c, f, (centre, gap), &wanted, term).unwrap_or((centre, gap));
+        Some(vec![term(centre, gap)])
     }
 
     fn report(&self, c: &Channels, e: &Estimate) -> Reported {
@@ -379,3 +432,7 @@ impl Candidate for StressJump {
         out
     }
 }
+
+#[cfg(test)]
+#[path = "structure_tests.rs"]
+mod tests;

@@ -2,7 +2,7 @@
 
 use super::structure::slowness;
 use super::validate::UNSTEADY;
-use super::{Found, LEVEL, MOST_RIVALS, Search, Term};
+use super::{Found, LEVEL, MOST_RIVALS, Model, Search, Term};
 use crate::closure::likelihood::Unusable;
 
 /// Most that the steps may leave of the held-out error without them; the same where more is left than they
@@ -16,8 +16,9 @@ const BESIDE: f64 = 0.87;
 const WANDER: f64 = 1.0;
 const DECADES: f64 = 4.0;
 
-/// A probability that is enough beside any noise.
-const SURELY: f64 = 1e-40;
+/// A probability that is enough beside anything, and a held-out error without the name that is, times the one with it.
+const SURELY: f64 = 1e-20;
+const TENFOLD: f64 = 10.0;
 
 /// What a name needs where more is left than the names explain. A probability: that record's noise is not the one that
 /// it is reckoned with. A selection frequency (Meinshausen & Buhlmann 2010: 0.6 to 0.9). A share of its square
@@ -60,19 +61,30 @@ impl Search<'_> {
 
     /// Drops names, the least probable first, that slow noise as strong as what they leave may have made.
     fn kept_from_noise(&self, found: &mut Found) -> Result<(), Unusable> {
-        let p_value = |found: &Found, k: usize| found.terms[k].p_value;
+        let mut stand: Vec<String> = Vec::new();
         loop {
-            let each = 0..found.terms.len();
-            let weakest = each.max_by(|a, b| p_value(found, *a).total_cmp(&p_value(found, *b)));
-            let Some(k) = weakest else { return Ok(()) };
-            let fit = self.model(&found.terms)?.fit;
-            let slow = slowness(fit.at.shape, fit.problem.line.used());
+            let each = found.terms.iter().enumerate();
+            let open = each.filter(|(_, t)| !stand.contains(&t.id()));
+            let weakest = open.max_by(|a, b| a.1.p_value.total_cmp(&b.1.p_value));
+            let Some((k, term)) = weakest else {
+                return Ok(());
+            };
+            let model = self.model(&found.terms)?;
+            let slow = slowness(model.fit.at.shape, model.fit.problem.line.used());
             let asked = LEVEL * 10f64.powf(-DECADES * (slow - WANDER).max(0.0));
-            let asked = asked.max(SURELY);
-            if p_value(found, k) <= asked {
+            if term.p_value <= asked.max(SURELY) {
                 return Ok(());
             }
-            self.drop(found, k);
+            let mut others = found.terms.clone();
+            others.remove(k);
+            let without = self.model(&others)?;
+            let square = |m: &Model| self.heldout_error(m, &model).square;
+            if square(&without) > TENFOLD.powi(2) * square(&model) {
+                stand.push(term.id());
+            } else {
+                self.drop(found, k);
+                stand.clear();
+            }
         }
     }
 
@@ -86,7 +98,11 @@ impl Search<'_> {
         };
         let of_before = self.heldout_error(&before, &before).square;
         let limit = |found: &Found| {
-            let most = if found.left.is_some() { BESIDE } else { ABOVE };
+            let sure = found.terms.iter().any(|t| t.p_value <= SURELY);
+            let most = match found.left.is_some() && !sure {
+                true => BESIDE,
+                false => ABOVE,
+            };
             of_before * most.powi(2)
         };
         while !found.terms.is_empty() && square(&found.terms)? > limit(found) {

@@ -139,8 +139,9 @@ fn beside_slow_noise_a_name_needs_more() {
     for (kick, p_value, stays) in [
         (0.0, 9e-3, true),
         (0.5, 9e-3, false),
-        (0.5, 1e-30, true),
-        (4.0, 1e-30, false),
+        (0.5, 1e-19, true),
+        (4.0, 1e-19, false),
+        (4.0, 1e-21, true),
     ] {
         let (names, _) = kept(&walk(kick), p_value, 0, false);
         assert_eq!(
@@ -153,11 +154,12 @@ fn beside_slow_noise_a_name_needs_more() {
 
 #[test]
 fn beside_something_larger_names_have_to_explain_a_good_part() {
-    // A wander of ten times what both names explain; they are certain in themselves.
-    for (size, names) in [(1.0, 2), (60.0, 0)] {
+    // A wander of ten times what both names explain, and one of less.
+    for (size, p_value, names) in [(1.0, 1e-19, 2), (60.0, 1e-19, 0), (60.0, 1e-21, 2)] {
         let bump = |k: usize| size * (-((k as f64 - 140.0) / 60.0).powi(2)).exp();
         let c = disturbed(|_| 4.0, 5.0, bump);
-        assert_eq!(kept_of(&c, [0.0, 0.0], 0, true).0.len(), names, "{size}");
+        let (kept, _) = kept_of(&c, [p_value; 2], 0, true);
+        assert_eq!(kept.len(), names, "{size}, {p_value}");
     }
 }
 
