@@ -221,7 +221,7 @@ const STRESS_JUMP: Sheet = Sheet {
 };
 
 /// Gaps of the hysteresis that are tried, in u.
-const GAPS: [f64; 8] = [0.0, 0.04, 0.08, 0.14, 0.21, 0.3, 0.41, 0.54];
+const GAPS: [f64; 10] = [0.0, 0.04, 0.08, 0.14, 0.21, 0.3, 0.41, 0.54, 0.7, 0.9];
 
 /// How far from a threshold others are tried, in u, and how many at most.
 const NEAR: f64 = 0.1;
@@ -352,7 +352,7 @@ impl Candidate for StressJump {
             let centre = -0.9 + 1.8 * f64::from(j) / 74.0;
             out.push(Point::at(0, &[centre]));
             out.push(Point::at(2, &[centre]));
-            out.extend((1..17).map(|k| Point::at(1, &[centre, 0.04 * f64::from(k)])));
+            out.extend((1..25).map(|k| Point::at(1, &[centre, 0.04 * f64::from(k)])));
         }
         out
     }

@@ -131,7 +131,7 @@ impl Search<'_> {
         {
             return Ok(decided(Term::of(name, round.rivals(name))));
         }
-        if let Some(first) = self.first_of_two(model, &significant, leader)? {
+        if let Some(first) = self.name_instead(model, &significant, leader)? {
             return Ok(Next::Add(Term::of(first, round.rivals(first))));
         }
         Ok(Next::Add(Term::of(leader, Vec::new())))
@@ -214,9 +214,9 @@ impl Search<'_> {
         }
     }
 
-    /// Where a shape without a name leads: a name that, with another one, explains as much. Two
-    /// causes together often look like neither.
-    fn first_of_two<'j>(
+    /// Where a shape without a name leads: a name that explains as much, fitted with its own noise (a gain is found at
+    /// one noise for all points of a candidate), or with another name. Two causes together often look like neither.
+    fn name_instead<'j>(
         &self,
         model: &Model,
         significant: &[&'j Judged],
@@ -231,7 +231,25 @@ impl Search<'_> {
         };
         let alone = value(&[leader])?;
         let mut best: Option<(&Judged, f64)> = None;
-        for j in significant.iter().filter(|j| j.candidate.named()).take(4) {
+        let names = || significant.iter().filter(|j| j.candidate.named()).take(4);
+        for j in names() {
+            let one = match j.candidate.is_whole() {
+                // Its levels or widths lie between rows: as good as they get.
+                true => {
+                    let mut terms = model.terms.clone();
+                    terms.push(Term::of(j, Vec::new()));
+                    self.polished(self.model(&terms)?)?.value - (j.gain - j.net)
+                }
+                false => value(&[j])?,
+            };
+            if one > alone - STRANGER && best.is_none_or(|b| one > b.1) {
+                best = Some((j, one));
+            }
+        }
+        if let Some((j, _)) = best {
+            return Ok(Some(j));
+        }
+        for j in names() {
             let mut terms = model.terms.clone();
             terms.push(Term::of(j, Vec::new()));
             let second = self.judge(&self.model_with(&terms, &near)?, 0);
