@@ -240,7 +240,9 @@ impl Told<'_> {
             firmware::judged(plan, record, c, &self.search.heldout, noise)
         };
         if plan.keeps() {
-            let said = "a lag goes on while the power is off: firmware keeps its state and makes up for the periods                         without power (the manual's \"The correction of averaged readings\"), as it did for the figures here";
+            let said = "a lag goes on while the power is off: firmware keeps its state and makes up for the periods \
+                        without power (the manual's \"The correction of averaged readings\"), as it did for the figures \
+                        here";
             warnings.push(Warning::general("firmware_needs_clock", said));
         }
         let (correction, errors) = match judged(&plan) {

@@ -89,6 +89,8 @@ fn a_lag_that_restarts_do_not_interrupt_keeps_its_state_over_them() {
         assert_eq!(closed.closure.steps[0].effect, "thermal_lag");
         let kept = lags(&closed);
         assert!(!kept.is_empty() && kept.iter().all(|k| *k), "{kept:?}");
+        let mut said = closed.closure.warnings.iter();
+        assert!(said.any(|w| w.code == "firmware_needs_clock"));
         let ratio = firmware_over_float(&closed);
         assert!(ratio < 1.02, "{off:?}: {ratio}");
     }
@@ -96,5 +98,8 @@ fn a_lag_that_restarts_do_not_interrupt_keeps_its_state_over_them() {
 
 #[test]
 fn without_restarts_nothing_has_to_be_kept() {
-    assert!(lags(&closed(0.3, &[])).iter().all(|kept| !kept));
+    let closed = closed(0.3, &[]);
+    assert!(lags(&closed).iter().all(|kept| !kept));
+    let mut said = closed.closure.warnings.iter();
+    assert!(said.all(|w| w.code != "firmware_needs_clock"));
 }

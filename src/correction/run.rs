@@ -279,3 +279,7 @@ fn rounded(value: f64, format: Format) -> i128 {
     // A NaN becomes 0.
     (word as i128).clamp(format.min_raw(), format.max_raw())
 }
+
+#[cfg(test)]
+#[path = "schedule_tests.rs"]
+mod tests;
