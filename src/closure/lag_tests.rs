@@ -79,6 +79,20 @@ fn a_lag_of_nearly_the_whole_bias_is_the_same_in_firmware_and_its_gain_is_looked
 }
 
 #[test]
+fn a_lag_larger_than_the_bias_is_the_only_name() {
+    for share in [1.7, 4.0] {
+        let closed = closed(share, &[]);
+        let steps = closed.closure.steps.iter();
+        let names: Vec<&str> = steps.map(|s| s.effect.as_str()).collect();
+        assert_eq!(names, ["thermal_lag"], "{share}");
+        // Noise of 0.01.
+        let left = closed.closure.after.heldout_rms;
+        assert!(left < 0.015, "{share}: {left}");
+        assert!(firmware_over_float(&closed) < 1.02);
+    }
+}
+
+#[test]
 fn a_lag_that_restarts_do_not_interrupt_keeps_its_state_over_them() {
     // Interrupted, and off for half the lag and for all of it, in which the temperature goes on as before.
     for off in [

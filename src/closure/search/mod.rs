@@ -7,6 +7,7 @@
 //! step is tried again with the others in, against all other names ([`sweep`]), must hold ([`validate`]) and lower the error of
 //! held-out rows ([`heldout`]). Where a shape without a name wins, it is kept as what is left.
 
+mod acting;
 pub mod constancy;
 pub mod estimate;
 pub mod forward;
@@ -227,8 +228,8 @@ impl<'a> Search<'a> {
         &self.candidates
     }
 
-    /// The model with terms. Effects that act on the declared bias see the bias of this very fit (two
-    /// passes).
+    /// The model with terms. Effects that act on the declared bias see the bias that is there beside them
+    /// ([`acting`]).
     ///
     /// # Errors
     /// Too few rows.
@@ -271,20 +272,56 @@ impl<'a> Search<'a> {
     /// As there.
     pub fn model_with(&self, terms: &[Term], options: &reml::Options) -> Result<Model, Unusable> {
         let mut bias = self.plain_bias();
-        let acting = terms.iter().any(|t| t.candidate.acts_on_bias());
-        let passes = match (acting, terms.len()) {
-            (false, _) => 0,
-            (true, 1) => 2,
-            (true, _) => 3,
-        };
-        // Later passes move the bias a little; the noise is near that of the first.
-        let mut passing = *options;
-        for _ in 0..passes {
-            let pass = self.model_once(terms, &bias, &passing)?;
-            passing.near = passing.near.or(Some(pass.fit.at.shape));
-            bias = pass.bias;
+        let acts = |t: &Term| t.candidate.acts_on_bias();
+        if !terms.iter().any(acts) {
+            return self.model_once(terms, &bias, options);
         }
-        self.model_once(terms, &bias, options)
+        if terms.iter().any(|t| t.candidate.is_last()) {
+            // Which rows are clipped depends on everything: the bias of one fit after the other.
+            let passes = if terms.len() == 1 { 2 } else { 3 };
+            let mut passing = *options;
+            for _ in 0..passes {
+                let pass = self.model_once(terms, &bias, &passing)?;
+                passing.near = passing.near.or(Some(pass.fit.at.shape));
+                bias = pass.bias;
+            }
+            return self.model_once(terms, &bias, options);
+        }
+        bias.coefficients_dps = self.settled(terms, &bias, &self.weights());
+        // Again with the rows out that stand out from that.
+        let pass = self.model_once(terms, &bias, options)?;
+        bias.coefficients_dps = self.settled(terms, &bias, &pass.fit.row_weights);
+        let near = reml::Options {
+            near: options.near.or(Some(pass.fit.at.shape)),
+            ..*options
+        };
+        self.model_once(terms, &bias, &near)
+    }
+
+    /// The bias's coefficients beside terms some of which act on it.
+    fn settled(&self, terms: &[Term], bias: &Bias, weights: &[f64]) -> Vec<f64> {
+        let c = self.channels;
+        let mut y = c.error_dps.clone();
+        let mut free = Vec::new();
+        let mut acting: Vec<(&dyn Candidate, &Point)> = Vec::new();
+        for term in terms {
+            if term.candidate.acts_on_bias() {
+                acting.push((term.candidate.as_ref(), &term.point));
+                continue;
+            }
+            for column in term.candidate.columns(c, bias, &term.point) {
+                match term.candidate.is_whole() {
+                    true => add_scaled(&mut y, -1.0, &column),
+                    false => free.push(column),
+                }
+            }
+        }
+        acting::settled(c, (&y, weights), &bias.coefficients_dps, &acting, &free)
+    }
+
+    /// 1 for rows of the fit.
+    fn weights(&self) -> Vec<f64> {
+        self.used.iter().map(|u| f64::from(u8::from(*u))).collect()
     }
 
     fn model_once(
@@ -365,10 +402,9 @@ impl<'a> Search<'a> {
 
     /// Ordinary least squares, for a start.
     fn plain_bias(&self) -> Bias {
-        let weights: Vec<f64> = self.used.iter().map(|u| f64::from(u8::from(*u))).collect();
         let columns = declared(self.channels);
         Bias {
-            coefficients_dps: weighted(&columns, &self.channels.error_dps, &weights),
+            coefficients_dps: weighted(&columns, &self.channels.error_dps, &self.weights()),
             others_dps: Vec::new(),
         }
     }
