@@ -229,7 +229,7 @@ impl<'a> Search<'a> {
     }
 
     /// The model with terms. Effects that act on the declared bias see the bias that is there beside them
-    /// ([`acting`]).
+    /// (`search/acting.rs`).
     ///
     /// # Errors
     /// Too few rows.
