@@ -135,7 +135,7 @@ mod tests {
 
     #[test]
     fn the_bias_beside_a_lag_larger_than_itself_is_the_true_one() {
-        for (share, supply_dps) in [(0.3, 0.0), (1.7, 0.5), (8.0, 0.5)] {
+        for (share, supply_dps) in [(0.3, 0.0), (1.7, 0.5), (4.0, 0.5)] {
             let c = channels(share, supply_dps);
             let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
             let is_lag = |k: &&std::sync::Arc<dyn Candidate>| k.id() == "thermal_lag";
