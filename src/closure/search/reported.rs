@@ -18,7 +18,7 @@ const DECADES: f64 = 4.0;
 
 /// A probability that is enough beside anything, and a held-out error without the name that is, times the one with it.
 const SURELY: f64 = 1e-20;
-const TENFOLD: f64 = 10.0;
+const THREEFOLD: f64 = 3.0;
 
 /// What a name needs where more is left than the names explain. A probability: that record's noise is not the one that
 /// it is reckoned with. A selection frequency (Meinshausen & Buhlmann 2010: 0.6 to 0.9). A share of its square
@@ -35,8 +35,8 @@ impl Search<'_> {
     pub(super) fn kept_alone(&self, found: &mut Found) -> Result<(), Unusable> {
         self.kept_decided(found);
         self.kept_above_rounding(found)?;
+        self.kept_from_noise(found)?;
         loop {
-            self.kept_from_noise(found)?;
             self.kept_stable(found)?;
             let stable = found.terms.len();
             self.kept_below(found)?;
@@ -59,33 +59,23 @@ impl Search<'_> {
         }
     }
 
-    /// Drops names, the least probable first, that slow noise as strong as what they leave may have made.
+    /// Drops names that slow noise as strong as what all of them leave may have made.
     fn kept_from_noise(&self, found: &mut Found) -> Result<(), Unusable> {
-        let mut stand: Vec<String> = Vec::new();
-        loop {
-            let each = found.terms.iter().enumerate();
-            let open = each.filter(|(_, t)| !stand.contains(&t.id()));
-            let weakest = open.max_by(|a, b| a.1.p_value.total_cmp(&b.1.p_value));
-            let Some((k, term)) = weakest else {
-                return Ok(());
-            };
-            let model = self.model(&found.terms)?;
-            let slow = slowness(model.fit.at.shape, model.fit.problem.line.used());
-            let asked = LEVEL * 10f64.powf(-DECADES * (slow - WANDER).max(0.0));
-            if term.p_value <= asked.max(SURELY) {
-                return Ok(());
+        let model = self.model(&found.terms)?;
+        let slow = slowness(model.fit.at.shape, model.fit.problem.line.used());
+        let asked = LEVEL * 10f64.powf(-DECADES * (slow - WANDER).max(0.0));
+        let square = |m: &Model| self.heldout_error(m, &model).square;
+        for k in (0..found.terms.len()).rev() {
+            if found.terms[k].p_value <= asked.max(SURELY) {
+                continue;
             }
-            let mut others = found.terms.clone();
+            let mut others = model.terms.clone();
             others.remove(k);
-            let without = self.model(&others)?;
-            let square = |m: &Model| self.heldout_error(m, &model).square;
-            if square(&without) > TENFOLD.powi(2) * square(&model) {
-                stand.push(term.id());
-            } else {
+            if square(&self.model(&others)?) <= THREEFOLD.powi(2) * square(&model) {
                 self.drop(found, k);
-                stand.clear();
             }
         }
+        Ok(())
     }
 
     /// Drops names until the held-out error is not above that of the declared model, or clearly below it where more
