@@ -58,7 +58,9 @@ fn firmware_over_float(closed: &Closed) -> f64 {
 fn lags(closed: &Closed) -> Vec<bool> {
     let plan = &closed.correction.as_ref().unwrap().plan;
     let kept = |term: &Term| match term {
-        Term::Lag { kept, .. } | Term::LagOfCurve { kept, .. } => Some(*kept),
+        Term::Lag { kept, .. } | Term::LagOfCurve { kept, .. } | Term::CurveOfLag { kept, .. } => {
+            Some(*kept)
+        }
         _ => None,
     };
     plan.terms.iter().filter_map(kept).collect()

@@ -248,7 +248,7 @@ impl Step {
                 match state.lags.get_mut(lag.slot) {
                     Some(state) => {
                         let anew = if lag.kept { first } else { fresh };
-                        lag.behind(ar, state, anew, x)
+                        lag.term(ar, state, anew, x)
                     }
                     None => zero,
                 }

@@ -70,6 +70,11 @@ impl Curve {
         (entries().min().unwrap_or(0), entries().max().unwrap_or(0))
     }
 
+    /// Fraction bits of entries and results.
+    pub fn fraction_bits(&self) -> i32 {
+        self.table.fraction_bits
+    }
+
     /// The input.
     pub fn input(&self) -> usize {
         self.input

@@ -116,7 +116,11 @@ pub(super) fn slope_dps(plan: &Plan, input: usize) -> f64 {
             gain_dps.abs() * powers.map(|(_, p)| f64::from(*p)).sum::<f64>()
         }
         Term::Lag { gain_dps, .. } => gain_dps.abs() * 2.0,
+        // c(y) follows the input more slowly, but y is rounded to its word once more.
         Term::LagOfCurve {
+            gain_dps, values, ..
+        }
+        | Term::CurveOfLag {
             gain_dps, values, ..
         } => gain_dps.abs() * 2.0 * steepest(values),
         Term::Slope {
@@ -148,20 +152,27 @@ pub(super) fn steepest(values: &[f64]) -> f64 {
     rises.fold(0.0, f64::max) * intervals / 2.0
 }
 
+/// The largest magnitude of a curve.
+pub(super) fn largest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |m, v| m.max(v.abs()))
+}
+
 /// The largest sum of the terms on the bias, deg/s.
 pub(super) fn largest_bias_dps(plan: &Plan) -> f64 {
-    let most = |values: &[f64]| values.iter().fold(0.0f64, |m, v| m.max(v.abs()));
     let of = |term: &Term| match term {
         Term::Product { gain_dps, .. } | Term::Decay { gain_dps, .. } => gain_dps.abs(),
         Term::Step { gain_dps, .. } => gain_dps.abs(),
         Term::Lag { gain_dps, .. } => 2.0 * gain_dps.abs(),
         Term::LagOfCurve {
             gain_dps, values, ..
-        } => 2.0 * gain_dps.abs() * most(values),
+        }
+        | Term::CurveOfLag {
+            gain_dps, values, ..
+        } => 2.0 * gain_dps.abs() * largest(values),
         Term::Slope {
             gain_dps_s, rows, ..
         } => 2.0 * slope_gain_dps(plan, *gain_dps_s, *rows).abs(),
-        Term::Curve { values_dps, .. } => most(values_dps),
+        Term::Curve { values_dps, .. } => largest(values_dps),
         Term::ScaleBy { .. } | Term::Cubic { .. } | Term::Even { .. } => 0.0,
     };
     plan.terms.iter().map(of).sum()

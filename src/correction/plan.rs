@@ -85,6 +85,20 @@ pub enum Term {
         /// As in [`Term::Lag`].
         kept: bool,
     },
+    /// gain * (c(x) - c(y)), y behind x as in [`Term::Lag`], c as in [`Term::LagOfCurve`]: an effect of a
+    /// temperature that lags, where a lag of c(x) would be an effect that itself lags.
+    CurveOfLag {
+        /// deg/s.
+        gain_dps: f64,
+        /// x.
+        input: usize,
+        /// c at the knots, 1.
+        values: Vec<f64>,
+        /// tau of y, s.
+        tau_s: f64,
+        /// As in [`Term::Lag`].
+        kept: bool,
+    },
     /// gain * (x now - x `rows` readings ago) / (rows * period); 0 at the first reading.
     Slope {
         /// deg/s per 1/s.
@@ -156,6 +170,7 @@ impl Term {
             Term::Product { .. } => "product",
             Term::Lag { .. } => "lag",
             Term::LagOfCurve { .. } => "lag_of_curve",
+            Term::CurveOfLag { .. } => "curve_of_lag",
             Term::Slope { .. } => "slope",
             Term::Decay { .. } => "decay",
             Term::Curve { .. } => "curve",
@@ -172,6 +187,7 @@ impl Term {
             self,
             Term::Lag { .. }
                 | Term::LagOfCurve { .. }
+                | Term::CurveOfLag { .. }
                 | Term::Slope { .. }
                 | Term::Decay { .. }
                 | Term::Step { .. }
@@ -190,7 +206,9 @@ impl Term {
     pub fn is_kept(&self) -> bool {
         matches!(
             self,
-            Term::Lag { kept: true, .. } | Term::LagOfCurve { kept: true, .. }
+            Term::Lag { kept: true, .. }
+                | Term::LagOfCurve { kept: true, .. }
+                | Term::CurveOfLag { kept: true, .. }
         )
     }
 
@@ -200,6 +218,7 @@ impl Term {
             Term::Product { factors, .. } => factors.iter().map(|(input, _)| *input).collect(),
             Term::Lag { input, .. }
             | Term::LagOfCurve { input, .. }
+            | Term::CurveOfLag { input, .. }
             | Term::Slope { input, .. }
             | Term::Curve { input, .. }
             | Term::Step { input, .. } => vec![*input],
@@ -235,8 +254,8 @@ impl Plan {
             }
         }
         let kinds: [&[&str]; 5] = [
-            &["lag", "lag_of_curve"],
-            &["lag_of_curve", "curve"],
+            &["lag", "lag_of_curve", "curve_of_lag"],
+            &["lag_of_curve", "curve_of_lag", "curve"],
             &["slope"],
             &["decay"],
             &["step"],
@@ -291,6 +310,12 @@ impl Plan {
                 gain("gain_dps", *gain_dps).and_then(|()| tau(*tau_s))
             }
             Term::LagOfCurve {
+                gain_dps,
+                values,
+                tau_s,
+                ..
+            }
+            | Term::CurveOfLag {
                 gain_dps,
                 values,
                 tau_s,

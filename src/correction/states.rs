@@ -1,7 +1,7 @@
 //! The terms with a state that is a number: lags, decays, relays.
 
 use super::curve::Curve;
-use super::formats::{Formats, PRODUCT_BITS, bits_for};
+use super::formats::{Formats, PRODUCT_BITS, bits_for, largest, steepest};
 use super::plan::Plan;
 use super::terms::{Gain, exact, raw};
 use crate::numeric::arithmetic::Arithmetic;
@@ -62,7 +62,7 @@ pub enum Followed {
     Curve(Box<Curve>),
 }
 
-/// What a lag follows, with its word.
+/// What a lag follows, with its word, and what of it goes into the rate.
 #[derive(Debug, Clone)]
 pub struct Following {
     /// What.
@@ -71,17 +71,120 @@ pub struct Following {
     pub from: i32,
     /// The least and the largest word, raw.
     pub limits: (i128, i128),
-    /// The largest magnitude.
-    pub size: f64,
+    /// What the gain is multiplied by where the state's word is chosen: how much an error of the state is
+    /// before the gain. It grows with the range of the state, or with the slope of a curve of it.
+    pub weight: f64,
+    /// The curve of x and y whose difference is taken, in place of theirs.
+    pub through: Option<Box<Curve>>,
 }
 
-/// Fraction bits of a curve that a lag follows: finer than the sum once the gain is on it.
+impl Following {
+    /// An input.
+    pub fn input(formats: &Formats, input: usize) -> Self {
+        let from = formats.input_bits(input);
+        Following {
+            of: Followed::Input(input),
+            from,
+            limits: (-(1i128 << from), (1i128 << from) - 1),
+            weight: 1.0,
+            through: None,
+        }
+    }
+
+    /// A curve through these values.
+    pub fn curve(curve: Box<Curve>, values: &[f64]) -> Self {
+        Following {
+            from: curve.fraction_bits(),
+            limits: curve.range(),
+            of: Followed::Curve(curve),
+            weight: largest(values).max(1.0),
+            through: None,
+        }
+    }
+
+    /// The same, the difference taken of a curve through these values.
+    pub fn read_through(self, curve: Box<Curve>, values: &[f64]) -> Self {
+        Following {
+            weight: steepest(values),
+            through: Some(curve),
+            ..self
+        }
+    }
+}
+
+/// What the gain of a lag is on.
+#[derive(Debug, Clone)]
+pub enum Taken {
+    /// x - y, to at most [`PRODUCT_BITS`] fraction bits.
+    Difference(Cast),
+    /// c(x) - c(y).
+    OfCurve {
+        /// c.
+        curve: Box<Curve>,
+        /// y to the word of x, which c reads.
+        reading: Cast,
+    },
+}
+
+impl Taken {
+    /// For a state with `state` fraction bits.
+    fn new(through: Option<Box<Curve>>, state: i32, from: i32) -> Self {
+        match through {
+            None => Taken::Difference(exact(
+                "correction.lag_difference",
+                state,
+                state.min(PRODUCT_BITS),
+            )),
+            Some(curve) => Taken::OfCurve {
+                curve,
+                reading: exact("correction.lag_reading", state, from),
+            },
+        }
+    }
+
+    /// Fraction bits of the result.
+    fn fraction_bits(&self) -> i32 {
+        match self {
+            Taken::Difference(cast) => cast.target.fraction_bits,
+            Taken::OfCurve { curve, .. } => curve.fraction_bits(),
+        }
+    }
+
+    fn casts_mut(&mut self) -> Vec<&mut Cast> {
+        match self {
+            Taken::Difference(cast) => vec![cast],
+            Taken::OfCurve { curve, reading } => {
+                let mut casts = curve.casts_mut();
+                casts.push(reading);
+                casts
+            }
+        }
+    }
+
+    /// The result for x, the same x with the state's fraction bits, and y.
+    #[inline(always)]
+    fn of<A: Arithmetic>(&self, ar: &A, x: A::Word, [aligned, y]: [A::Word; 2]) -> A::Word {
+        match self {
+            Taken::Difference(cast) => {
+                let rest = ar.sub(aligned, y);
+                ar.cast(rest, cast, &[rest])
+            }
+            Taken::OfCurve { curve, reading } => {
+                // y is held within the range of x, so that its word is one of x.
+                let behind = ar.cast(y, reading, &[y]);
+                ar.sub(curve.value(ar, x), curve.value(ar, behind))
+            }
+        }
+    }
+}
+
+/// Fraction bits of a curve that a lag follows or is read through: finer than the sum once the gain is on it.
 pub(super) fn lagged_curve_bits(formats: &Formats, gain_dps: f64) -> i32 {
     let wanted = formats.sum_fraction_bits + 2 - bits_for(gain_dps.abs());
     wanted.clamp(RATE_BITS, PRODUCT_BITS)
 }
 
-/// gain (x - y); y' = y + cast(a (x0 - y) + b (x - x0)), x0 the input before.
+/// gain (x - y) or gain (c(x) - c(y)); y' = y + cast(a (x0 - y) + b (x - x0)), x0 the input before.
 #[derive(Debug, Clone)]
 pub struct Lag {
     /// Position in the state.
@@ -97,8 +200,7 @@ pub struct Lag {
     approach: Approach,
     /// What is added to the state.
     update: Cast,
-    /// x - y to at most [`PRODUCT_BITS`] fraction bits.
-    difference: Cast,
+    taken: Taken,
     gain: Gain,
 }
 
@@ -112,11 +214,11 @@ impl Lag {
         tau_s: f64,
         slot: usize,
     ) -> Self {
-        let mut approach = Approach::new(plan, formats, tau_s, gain_dps * what.size.max(1.0));
+        let mut approach = Approach::new(plan, formats, tau_s, gain_dps * what.weight);
         approach.state_bits = approach.state_bits.max(what.from);
         let state = approach.state_bits;
-        let read = state.min(PRODUCT_BITS);
         let shift = state - what.from;
+        let taken = Taken::new(what.through, state, what.from);
         Lag {
             slot,
             of: what.of,
@@ -124,9 +226,9 @@ impl Lag {
             align: exact("correction.lag_input", what.from, state),
             approach,
             update: exact("correction.lag", state + approach.fraction_bits, state),
-            difference: exact("correction.lag_difference", state, read),
             limits: (what.limits.0 << shift, what.limits.1 << shift),
-            gain: Gain::new(gain_dps, read, formats),
+            gain: Gain::new(gain_dps, taken.fraction_bits(), formats),
+            taken,
         }
     }
 
@@ -135,20 +237,34 @@ impl Lag {
             Followed::Curve(curve) => curve.casts_mut(),
             Followed::Input(_) => Vec::new(),
         };
-        casts.extend([&mut self.align, &mut self.update, &mut self.difference]);
+        casts.extend([&mut self.align, &mut self.update]);
+        casts.extend(self.taken.casts_mut());
         casts.push(&mut self.gain.out);
         casts
     }
 
     /// The term for x; `lag` is y and x0. At a fresh start y = x0 = x.
     #[inline(always)]
-    pub fn behind<A: Arithmetic>(
+    pub fn term<A: Arithmetic>(
         &self,
         ar: &A,
         lag: &mut [A::Word; 2],
         fresh: A::Truth,
         x: A::Word,
     ) -> A::Word {
+        let both = self.follow(ar, lag, fresh, x);
+        self.gain.times(ar, self.taken.of(ar, x, both))
+    }
+
+    /// Moves the state to x; x and y with the state's fraction bits.
+    #[inline(always)]
+    fn follow<A: Arithmetic>(
+        &self,
+        ar: &A,
+        lag: &mut [A::Word; 2],
+        fresh: A::Truth,
+        x: A::Word,
+    ) -> [A::Word; 2] {
         let x = ar.cast(x, &self.align, &[x]);
         let [y, before] = lag.map(|word| ar.select(fresh, x, word));
         let bits = self.approach.fraction_bits;
@@ -160,9 +276,7 @@ impl Lag {
         let (low, high) = self.limits;
         let y = ar.limit(ar.add(y, moved), low, high, self.approach.state_bits);
         *lag = [y, x];
-        let rest = ar.sub(x, y);
-        self.gain
-            .times(ar, ar.cast(rest, &self.difference, &[rest]))
+        [x, y]
     }
 }
 

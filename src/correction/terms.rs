@@ -3,7 +3,7 @@
 use super::curve::Curve;
 use super::formats::{Formats, PRODUCT_BITS, slope_gain_dps};
 use super::plan::{Plan, Term};
-use super::states::{Decay, Followed, Following, Lag, Relay, lagged_curve_bits};
+use super::states::{Decay, Following, Lag, Relay, lagged_curve_bits};
 use crate::numeric::arithmetic::{Arithmetic, Ring};
 use crate::numeric::cast::{Cast, Label, Target};
 use crate::numeric::format::{Rounding, pow2};
@@ -114,17 +114,8 @@ impl OnBias {
                 tau_s,
                 kept,
             } => {
-                let from = formats.input_bits(*input);
-                let followed = Following {
-                    limits: (-(1i128 << from), (1i128 << from) - 1),
-                    of: Followed::Input(*input),
-                    from,
-                    size: 1.0,
-                };
-                let slot = next(&mut slots.lags);
-                let mut lag = Lag::new(plan, formats, followed, *gain_dps, *tau_s, slot);
-                lag.kept = *kept;
-                OnBias::Lag(Box::new(lag))
+                let x = Following::input(formats, *input);
+                lag(plan, formats, x, (*gain_dps, *tau_s, *kept), slots)
             }
             Term::LagOfCurve {
                 gain_dps,
@@ -133,21 +124,21 @@ impl OnBias {
                 tau_s,
                 kept,
             } => {
-                let size = values.iter().fold(0.0f64, |m, v| m.max(v.abs()));
-                let from = lagged_curve_bits(formats, *gain_dps);
-                let number = next(&mut slots.curves);
-                let input_bits = formats.input_bits(*input);
-                let curve = Curve::new(number, *input, input_bits, values, from);
-                let followed = Following {
-                    limits: curve.range(),
-                    of: Followed::Curve(Box::new(curve)),
-                    from,
-                    size,
-                };
-                let slot = next(&mut slots.lags);
-                let mut lag = Lag::new(plan, formats, followed, *gain_dps, *tau_s, slot);
-                lag.kept = *kept;
-                OnBias::Lag(Box::new(lag))
+                let bits = lagged_curve_bits(formats, *gain_dps);
+                let x = Following::curve(curve(formats, *input, values, bits, slots), values);
+                lag(plan, formats, x, (*gain_dps, *tau_s, *kept), slots)
+            }
+            Term::CurveOfLag {
+                gain_dps,
+                input,
+                values,
+                tau_s,
+                kept,
+            } => {
+                let bits = lagged_curve_bits(formats, *gain_dps);
+                let of = curve(formats, *input, values, bits, slots);
+                let x = Following::input(formats, *input).read_through(of, values);
+                lag(plan, formats, x, (*gain_dps, *tau_s, *kept), slots)
             }
             Term::Slope {
                 gain_dps_s,
@@ -169,9 +160,7 @@ impl OnBias {
                 OnBias::Decay(Box::new(Decay::new(plan, formats, *gain_dps, *tau_s, slot)))
             }
             Term::Curve { input, values_dps } => {
-                let number = next(&mut slots.curves);
-                let bits = formats.input_bits(*input);
-                OnBias::Curve(Box::new(Curve::new(number, *input, bits, values_dps, sum)))
+                OnBias::Curve(curve(formats, *input, values_dps, sum, slots))
             }
             Term::Step {
                 gain_dps,
@@ -208,6 +197,32 @@ impl OnBias {
             OnBias::Curve(curve) => curve.casts_mut(),
         }
     }
+}
+
+/// The next curve, its results with `fraction_bits`.
+fn curve(
+    formats: &Formats,
+    input: usize,
+    values: &[f64],
+    fraction_bits: i32,
+    slots: &mut Slots,
+) -> Box<Curve> {
+    let (number, input_bits) = (next(&mut slots.curves), formats.input_bits(input));
+    Box::new(Curve::new(number, input, input_bits, values, fraction_bits))
+}
+
+/// The next lag: gain, deg/s, time constant, s, and whether its state outlives a restart.
+fn lag(
+    plan: &Plan,
+    formats: &Formats,
+    what: Following,
+    (gain_dps, tau_s, kept): (f64, f64, bool),
+    slots: &mut Slots,
+) -> OnBias {
+    let slot = next(&mut slots.lags);
+    let mut lag = Lag::new(plan, formats, what, gain_dps, tau_s, slot);
+    lag.kept = kept;
+    OnBias::Lag(Box::new(lag))
 }
 
 fn product(formats: &Formats, gain_dps: f64, factors: &[(usize, u32)]) -> OnBias {

@@ -76,6 +76,13 @@ fn keys(term: &Term) -> String {
             values,
             tau_s,
             kept,
+        }
+        | Term::CurveOfLag {
+            gain_dps,
+            input,
+            values,
+            tau_s,
+            kept,
         } => format!(
             "gain_dps = {gain_dps:?}, input = {input}, tau_s = {tau_s:?}, kept = {}, values = {values:?}",
             yes(*kept)

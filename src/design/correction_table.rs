@@ -4,10 +4,11 @@ use super::table::{Real, Table, Value};
 use crate::correction::{Correction, Input, Plan, Planned, Term};
 use crate::error::{Error, Result};
 
-const KINDS: [&str; 10] = [
+const KINDS: [&str; 11] = [
     "product",
     "lag",
     "lag_of_curve",
+    "curve_of_lag",
     "slope",
     "decay",
     "curve",
@@ -71,16 +72,7 @@ fn term(value: &Value) -> Result<Term> {
                 kept: read.kept()?,
             })
         }
-        "lag_of_curve" => {
-            read.only(&["gain_dps", "input", "values", "tau_s", "kept"])?;
-            Ok(Term::LagOfCurve {
-                gain_dps: read.real("gain_dps")?,
-                input: read.input()?,
-                values: read.reals("values")?,
-                tau_s: read.real("tau_s")?,
-                kept: read.kept()?,
-            })
-        }
+        "lag_of_curve" | "curve_of_lag" => read.lag_and_curve(kind),
         "slope" => {
             read.only(&["gain_dps_s", "input", "rows"])?;
             Ok(Term::Slope {
@@ -155,6 +147,30 @@ impl Keys<'_> {
     fn kept(&self) -> Result<bool> {
         let choices = [("yes", true), ("no", false)];
         self.table.take("kept", Some(false), |v| v.choice(&choices))
+    }
+
+    /// The two of a lag and a curve, which have the same keys.
+    fn lag_and_curve(&self, kind: &str) -> Result<Term> {
+        self.only(&["gain_dps", "input", "values", "tau_s", "kept"])?;
+        let (gain_dps, input) = (self.real("gain_dps")?, self.input()?);
+        let (values, tau_s) = (self.reals("values")?, self.real("tau_s")?);
+        let kept = self.kept()?;
+        Ok(match kind {
+            "lag_of_curve" => Term::LagOfCurve {
+                gain_dps,
+                input,
+                values,
+                tau_s,
+                kept,
+            },
+            _ => Term::CurveOfLag {
+                gain_dps,
+                input,
+                values,
+                tau_s,
+                kept,
+            },
+        })
     }
 
     fn product(&self) -> Result<Term> {
