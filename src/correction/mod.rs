@@ -28,6 +28,8 @@ pub use text::Planned;
 #[cfg(test)]
 mod emission_tests;
 #[cfg(test)]
+mod lag_tests;
+#[cfg(test)]
 mod sample;
 #[cfg(test)]
 mod tests;

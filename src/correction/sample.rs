@@ -18,6 +18,25 @@ pub fn normal(lcg: &mut Lcg) -> f64 {
     (0..12).map(|_| unit(lcg) / 2.0).sum()
 }
 
+/// None to two curves of lags, from draws of their own: beside them a seed makes the terms that it made
+/// before there were any.
+fn curves_of_lags(seed: u64, inputs: usize, period_s: f64) -> Vec<Term> {
+    let mut lcg = Lcg(seed ^ 0x001a_6ced);
+    // Seeds next to each other begin with nearly the same draws.
+    (0..4).for_each(|_| _ = lcg.draw());
+    let count = below(&mut lcg, 3);
+    let one = |_| Term::CurveOfLag {
+        gain_dps: unit(&mut lcg),
+        input: below(&mut lcg, inputs as u64) as usize,
+        values: (0..2 + below(&mut lcg, 30))
+            .map(|_| unit(&mut lcg))
+            .collect(),
+        tau_s: period_s * 10f64.powf(2.0 + 2.0 * unit(&mut lcg)),
+        kept: unit(&mut lcg) > 0.3,
+    };
+    (0..count).map(one).collect()
+}
+
 /// A random plan of `inputs` inputs; with relays only if asked.
 pub fn plan(seed: u64, inputs: usize, relays: bool) -> Plan {
     let mut lcg = Lcg(seed);
@@ -39,6 +58,9 @@ pub fn plan(seed: u64, inputs: usize, relays: bool) -> Plan {
             rate_max_dps: 450.0,
         },
     ];
+    if inputs > 0 {
+        terms.extend(curves_of_lags(seed, inputs, period_s));
+    }
     for _ in 0..count {
         let any = below(&mut lcg, inputs.max(1) as u64) as usize;
         let tau_s = period_s * 10f64.powf(2.0 + 2.0 * unit(&mut lcg));
@@ -217,6 +239,16 @@ pub fn evaluate(plan: &Plan, passes: usize, readings: &[Reading]) -> Vec<f64> {
                     let x = series(*input, *kept);
                     let c: Vec<f64> = x.iter().map(|x| knot(values, *x)).collect();
                     gain_dps * behind(&c, plan.period_s / tau_s)
+                }
+                Term::CurveOfLag {
+                    gain_dps,
+                    input,
+                    values,
+                    tau_s,
+                    kept,
+                } => {
+                    let y = x[*input] - behind(&series(*input, *kept), plan.period_s / tau_s);
+                    gain_dps * (knot(values, x[*input]) - knot(values, y))
                 }
                 Term::Slope {
                     gain_dps_s,
