@@ -80,9 +80,9 @@ fn after_a_jump_the_curve_of_a_lag_runs_along_the_curve_and_a_lag_of_it_straight
     let x = |n: usize| if n < BEFORE { JUMP.0 } else { JUMP.1 };
     let along = |n: usize| -GAIN_DPS * (c(x(n)) - c(y(n)));
     let along_anew = |n: usize| if n < RESTART { along(n) } else { 0.0 };
-    let straight = |n: usize| match n < BEFORE || n >= RESTART {
-        true => 0.0,
-        false => -GAIN_DPS * (c(JUMP.1) - c(JUMP.0)) * left(n - BEFORE),
+    let straight = |n: usize| match (BEFORE..RESTART).contains(&n) {
+        true => -GAIN_DPS * (c(JUMP.1) - c(JUMP.0)) * left(n - BEFORE),
+        false => 0.0,
     };
     let due: [(Term, &dyn Fn(usize) -> f64); 3] = [
         (curve_of_lag(true), &along),
