@@ -19,6 +19,7 @@ terms = [
     { kind = "product", gain_dps = 97.2, factors = [[0, 1]] },
     { kind = "product", gain_dps = 21.9, factors = [[0, 2]] },
     { kind = "lag", gain_dps = 4.0, input = 0, tau_s = 600.0 },
+    { kind = "curve_of_lag", gain_dps = 0.5, input = 0, tau_s = 900.0, kept = "yes", values = [0, 1, -0.5] },
     { kind = "decay", gain_dps = 0.5, tau_s = 900.0 },
     { kind = "step", gain_dps = 0.3, input = 0, centre = 0.2, gap = 0.1, once = "no" },
     { kind = "product", gain_dps = 0.1, factors = [[1, 1]] },
