@@ -110,6 +110,13 @@ impl Channels {
         Ok(out)
     }
 
+    /// What the output was, deg/s; NaN where not measured.
+    pub fn output_dps(&self) -> Vec<f64> {
+        let rate = self.column("rate_dps");
+        let each = self.error_dps.iter().enumerate();
+        each.map(|(i, e)| e + rate.map_or(0.0, |r| r[i])).collect()
+    }
+
     /// Which rows are fitted on and which are held out.
     ///
     /// # Errors
@@ -119,10 +126,7 @@ impl Channels {
             let (low, high) = range(rate);
             high > low
         });
-        let output: Option<Vec<f64>> = rate.map(|rate| {
-            let pairs = self.error_dps.iter().zip(rate);
-            pairs.map(|(e, r)| e + r).collect()
-        });
+        let output = rate.map(|_| self.output_dps());
         blocks::split(&self.time_s, &self.u, output.as_deref())
     }
 

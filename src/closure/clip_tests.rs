@@ -40,14 +40,7 @@ fn channels(seed: u64) -> Channels {
 fn term(search: &Search, point: Point) -> Term {
     let mut all = search.candidates().iter();
     let candidate = all.find(|c| c.id() == "output_saturation").unwrap();
-    Term {
-        candidate: candidate.clone(),
-        point,
-        p_value: 0.0,
-        rivals: Vec::new(),
-        gain: 0.0,
-        beside: Vec::new(),
-    }
+    Term::new(candidate.clone(), point)
 }
 
 /// The model with the clip polished from a shape.

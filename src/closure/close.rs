@@ -149,7 +149,7 @@ impl Told<'_> {
         };
         let held = over(&self.search.heldout);
         Errors {
-            train_rms: stats::rms(&over(&self.search.used)),
+            train_rms: stats::rms(&over(&self.search.train)),
             heldout_rms: stats::rms(&held),
             heldout_max_abs: held.iter().fold(0.0, |m, r| m.max(r.abs())),
         }
@@ -313,6 +313,17 @@ impl Told<'_> {
                 Missing::Excitation(remark) => (Fate::NotExcited, remark.clone()),
             };
             out.push(without(candidate, fate, remark));
+        }
+        for term in self.found.terms.iter().filter(|t| t.evident) {
+            out.push(Evidence {
+                effect: term.id(),
+                fate: Fate::Taken,
+                p_value: Some(term.p_value),
+                gain: None,
+                remark:
+                    "a step: readings that agree to the last digit at an end of the output's range"
+                        .to_owned(),
+            });
         }
         out.extend(self.wave(&out));
         let listed: Vec<String> = out.iter().map(|e| e.effect.clone()).collect();

@@ -25,6 +25,7 @@ pub mod noise;
 pub mod order;
 pub mod polynomial;
 pub mod quantised;
+pub mod rails;
 pub mod search;
 pub mod staircase;
 pub mod sweep;

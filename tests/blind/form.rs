@@ -133,6 +133,10 @@ pub fn plant(
                     measure(w, &shift(s * largest), Some((&unit, s * largest)))
                 })?;
             let c = shift(k);
+            if parameters.iter().any(|p| p.0 == "bends_phase") && !(0.3..=3.0).contains(&k) {
+                // The unit is Q's own bend: physics gives its sign and, but for what Q is known by, its size.
+                return None;
+            }
             w.pull.iter_mut().zip(&unit).for_each(|(a, b)| *a += k * b);
             parameters.push(("pull_rad", k));
             c

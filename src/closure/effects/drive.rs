@@ -1,7 +1,8 @@
 //! Effects of the drive loop: damping and amplitude.
 
 use super::{
-    Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, gain, map, moving,
+    Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, entry, gain, map,
+    moving, spaced,
 };
 use crate::closure::channels::Channels;
 use crate::closure::firmware::Words;
@@ -113,7 +114,7 @@ const COUPLING: Sheet = Sheet {
     id: "amplitude_phase_coupling",
     physics: "a stiffening spring moves the resonance with the drive's amplitude (Duffing), so the \
               measured phase, the thermometer, errs with the drive gain",
-    equation: "-B'(p) k (g^n - 1), n = 1 or 2",
+    equation: "B(p - k (g^n - 1)) - B(p), n = 1 or 2",
     parameters: &[Parameter {
         name: "pull_rad",
         plausible: (1e-4, 0.3),
@@ -139,32 +140,38 @@ impl Candidate for Coupling {
     }
 
     fn points(&self, _c: &Channels) -> Vec<Point> {
-        (0..5).map(Point::form).collect()
+        // Small pulls, along the curve's slope; large ones by the curve itself.
+        let large = (0..2).flat_map(|form| LARGE.map(|most_u| Point::at(form, &[most_u])));
+        (0..PULLS).map(Point::form).chain(large).collect()
+    }
+
+    fn fine(&self, _c: &Channels, point: &Point) -> Vec<Point> {
+        let powers = [point.form, point.form ^ 1];
+        let each = spaced(0.02, 2.0, 8).into_iter();
+        each.flat_map(|most_u| [most_u, -most_u])
+            .flat_map(|most_u| powers.map(|form| Point::at(form, &[most_u])))
+            .collect()
     }
 
     fn columns(&self, c: &Channels, bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
-        let Some(g) = c.column("agc") else {
-            return Vec::new();
-        };
-        // Forms: the gain's first and second power; the first power with the curve's own second-order
-        // answer, for large pulls; the powers of the amplitude, which is the gain without Q's course in
-        // temperature.
-        let amplitude = match point.form {
-            3 | 4 => without_temperature(g, &c.u),
-            _ => g.to_vec(),
-        };
-        let square = matches!(point.form, 1 | 4);
-        let pull = map(&amplitude, |g| if square { g * g - 1.0 } else { g - 1.0 });
-        let slope: Vec<f64> =
-            c.u.iter()
-                .zip(&pull)
-                .map(|(u, d)| bias.slope(*u) * d)
-                .collect();
-        if point.form != 2 {
-            return vec![slope];
-        }
-        let bent = bias.coefficients_dps.get(2).copied().unwrap_or(0.0);
-        vec![slope, map(&pull, |d| bent * d * d)]
+        let (pull, most) = pulls(c, point.form);
+        let pairs = c.u.iter().zip(&pull);
+        vec![match point.theta.first() {
+            Some(most_u) => {
+                let k = most_u / most;
+                let moved = |(u, d): (&f64, &f64)| bias.at(u - k * d) - bias.at(*u);
+                pairs.map(moved).collect()
+            }
+            None => pairs.map(|(u, d)| -bias.slope(*u) * d).collect(),
+        }]
+    }
+
+    fn is_sized(&self, point: &Point) -> bool {
+        !point.theta.is_empty()
+    }
+
+    fn spacing(&self, _c: &Channels, point: &Point) -> Vec<f64> {
+        map(&point.theta, |most_u| (0.2 * most_u.abs()).max(0.01))
     }
 
     fn acts_on_bias(&self) -> bool {
@@ -177,8 +184,34 @@ impl Candidate for Coupling {
     }
 
     fn report(&self, c: &Channels, e: &Estimate) -> Reported {
-        [gain("pull_rad", e, 0, -c.half)].into_iter().collect()
+        let Some(most_u) = e.point.theta.first() else {
+            return [gain("pull_rad", e, 0, c.half)].into_iter().collect();
+        };
+        let per_unit = c.half / pulls(c, e.point.form).1;
+        let std = e.theta_std.first().copied().unwrap_or(0.0);
+        [entry("pull_rad", most_u * per_unit, (std * per_unit).abs())]
+            .into_iter()
+            .collect()
     }
+}
+
+/// Courses of the pull: the drive gain's first and second power, and those of the amplitude, which is the gain without Q's
+/// course in temperature.
+const PULLS: usize = 4;
+
+/// Largest pulls, in units of u, at which the search looks.
+const LARGE: [f64; 6] = [0.15, -0.15, 0.4, -0.4, 1.0, -1.0];
+
+/// The course of a form's pull, and its largest magnitude.
+fn pulls(c: &Channels, form: usize) -> (Vec<f64>, f64) {
+    let g = c.column("agc").unwrap_or(&[]);
+    let source = match form {
+        0 | 1 => g.to_vec(),
+        _ => without_temperature(g, &c.u),
+    };
+    let pull = map(&source, |g| g.powi(1 + form as i32 % 2) - 1.0);
+    let most = pull.iter().fold(f64::MIN_POSITIVE, |m, d| m.max(d.abs()));
+    (pull, most)
 }
 
 /// A gain over its own quadratic in temperature.

@@ -12,6 +12,7 @@ pub mod drive;
 pub mod field;
 pub mod heat;
 pub mod outside;
+mod past;
 pub mod rate;
 pub mod structure;
 pub mod tone;
@@ -188,6 +189,12 @@ pub trait Candidate: Send + Sync {
         false
     }
 
+    /// True for a shape that has its size in it, so that its column's coefficient is 1: every shape of a whole
+    /// candidate, and a non-linear shape of another one.
+    fn is_sized(&self, _point: &Point) -> bool {
+        self.is_whole()
+    }
+
     /// What a shape costs in log-likelihood beyond the usual price: for a choice among many, or for
     /// a part that the effect does not need.
     fn surcharge(&self, _c: &Channels, _point: &Point) -> f64 {
@@ -207,6 +214,11 @@ pub trait Candidate: Send + Sync {
 
     /// The shape with its levels moved, deg/s, for a clip; `None` if that is not of the same form.
     fn moved(&self, _point: &Point, _by_dps: f64) -> Option<Point> {
+        None
+    }
+
+    /// The shape with given levels, deg/s, for a clip.
+    fn at_levels(&self, _lower_dps: Option<f64>, _upper_dps: Option<f64>) -> Option<Point> {
         None
     }
 

@@ -7,6 +7,7 @@ use super::{
 use crate::closure::channels::{Channels, range};
 use crate::closure::firmware::Words;
 use crate::correction::Term;
+use crate::record::stats;
 
 /// All of this file.
 pub fn all() -> Vec<Box<dyn Candidate>> {
@@ -275,15 +276,17 @@ impl Candidate for Deadband {
         sizes.retain(|s| *s > 0.0);
         sizes.sort_by(f64::total_cmp);
         let least = sizes.first().copied().unwrap_or(0.0).max(1e-4 * top(c));
+        let small = 0.3 * stats::difference_noise(&c.error_dps);
         let mut out = Vec::new();
         for form in 0..2 {
-            // What subtracts shows at every rate, what jumps only at rates within the zone.
+            // What subtracts shows at every rate, however small it is; what jumps only at rates within the zone.
             let from = if form == 0 {
                 1.001 * least
             } else {
-                (1e-3 * top(c)).min(least)
+                (1e-3 * top(c)).min(least).min(small).max(1e-6 * top(c))
             };
-            let widths = spaced(from, 0.9 * top(c), 24);
+            let to = 0.9 * top(c);
+            let widths = spaced(from, to, ((to / from).ln() / 0.3).ceil().max(24.0) as usize);
             out.extend(widths.into_iter().map(|d| Point::at(form, &[d.ln()])));
         }
         out
@@ -355,16 +358,9 @@ fn total(c: &Channels, bias: &Bias) -> Vec<f64> {
         .collect()
 }
 
-/// What the output was, deg/s; NaN where not measured.
-fn observed(c: &Channels) -> Vec<f64> {
-    let rate = c.column("rate_dps");
-    let each = c.error_dps.iter().enumerate();
-    each.map(|(i, e)| e + rate.map_or(0.0, |r| r[i])).collect()
-}
-
 /// Levels from a far end of the output towards its middle, at rising shares of the rows beyond.
 fn levels(c: &Channels, upper: bool) -> Vec<f64> {
-    let mut sorted = observed(c);
+    let mut sorted = c.output_dps();
     sorted.retain(|v| v.is_finite());
     sorted.sort_by(f64::total_cmp);
     if upper {
@@ -442,7 +438,7 @@ impl Candidate for Saturation {
     }
 
     fn spacing(&self, c: &Channels, point: &Point) -> Vec<f64> {
-        let (low, high) = range(&observed(c));
+        let (low, high) = range(&c.output_dps());
         vec![0.04 * (high - low); point.theta.len()]
     }
 
@@ -461,6 +457,15 @@ impl Candidate for Saturation {
     fn moved(&self, point: &Point, by_dps: f64) -> Option<Point> {
         let levels: Vec<f64> = point.theta.iter().map(|l| l + by_dps).collect();
         (point.form > 0).then(|| Point::at(point.form, &levels))
+    }
+
+    fn at_levels(&self, lower_dps: Option<f64>, upper_dps: Option<f64>) -> Option<Point> {
+        match (lower_dps, upper_dps) {
+            (None, None) => None,
+            (None, Some(upper)) => Some(Point::at(1, &[upper])),
+            (Some(lower), None) => Some(Point::at(2, &[lower])),
+            (Some(lower), Some(upper)) => Some(Point::at(3, &[upper, lower])),
+        }
     }
 
     fn report(&self, _c: &Channels, e: &Estimate) -> Reported {

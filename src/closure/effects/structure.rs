@@ -345,6 +345,11 @@ impl Candidate for StressJump {
         true
     }
 
+    fn surcharge(&self, _c: &Channels, point: &Point) -> f64 {
+        // What happened once may be anything: a law that fits as well says what comes next.
+        if point.form == 2 { 4.0 } else { 0.0 }
+    }
+
     fn fine(&self, _c: &Channels, _point: &Point) -> Vec<Point> {
         // Where the temperature wanders, a step that is a little off switches at other times.
         let mut out = Vec::new();

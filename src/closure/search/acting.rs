@@ -68,18 +68,30 @@ pub(super) fn settled(
 ) -> Vec<f64> {
     let declared = declared(c);
     let order = declared.len();
-    let effects = acting.iter();
-    let effects = effects.flat_map(|(candidate, point)| Affine::of(c, *candidate, point, order));
-    let effects: Vec<Affine> = effects.collect();
+    let mut effects: Vec<Affine> = Vec::new();
+    let mut sized: Vec<Affine> = Vec::new();
+    for (candidate, point) in acting {
+        let own = Affine::of(c, *candidate, point, order);
+        match candidate.is_sized(point) {
+            true => sized.extend(own),
+            false => effects.extend(own),
+        }
+    }
     let mut bias = start.to_vec();
     for _ in 0..TURNS {
         let mut columns: Vec<Vec<f64>> = effects.iter().map(|e| e.at(&bias)).collect();
         columns.extend(declared.iter().cloned());
         columns.extend(free.iter().cloned());
-        let gains = weighted(&columns, y, weights);
         let mut rest = y.to_vec();
+        for effect in &sized {
+            add_scaled(&mut rest, -1.0, &effect.at(&bias));
+        }
+        let mut gains = weighted(&columns, &rest, weights);
+        gains.truncate(effects.len());
+        gains.resize(effects.len() + sized.len(), 1.0);
+        rest.copy_from_slice(y);
         let mut columns = declared.clone();
-        for (gain, effect) in gains.iter().zip(&effects) {
+        for (gain, effect) in gains.iter().zip(effects.iter().chain(&sized)) {
             add_scaled(&mut rest, -gain, &effect.still);
             for (column, by) in columns.iter_mut().zip(&effect.by_bias) {
                 add_scaled(column, *gain, by);
@@ -88,6 +100,10 @@ pub(super) fn settled(
         columns.extend(free.iter().cloned());
         let mut next = weighted(&columns, &rest, weights);
         next.truncate(order);
+        if effects.is_empty() {
+            // Linear as it stands.
+            return next;
+        }
         let pairs = next.iter().zip(&bias);
         let moved = pairs.fold(0.0, |m: f64, (a, b)| m.max((a - b).abs()));
         let most = next.iter().fold(0.0, |m: f64, b| m.max(b.abs()));

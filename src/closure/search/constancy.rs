@@ -150,14 +150,7 @@ mod tests {
         let is_it = |candidate: &&Arc<dyn Candidate>| candidate.id() == effect;
         let candidate = search.candidates().iter().find(is_it).unwrap().clone();
         let point: Point = candidate.points(c).remove(0);
-        let term = Term {
-            candidate,
-            point,
-            p_value: 0.0,
-            rivals: Vec::new(),
-            gain: 0.0,
-            beside: Vec::new(),
-        };
+        let term = Term::new(candidate, point);
         let model = search.model(std::slice::from_ref(&term)).unwrap();
         search.constancy(&model, &term)
     }

@@ -54,7 +54,7 @@ impl Tangent {
             pairs.map(|(a, b)| (a - b) / (2.0 * step)).collect()
         };
         let by_theta = steps.iter().enumerate().map(slope).collect();
-        let whole = term.candidate.is_whole();
+        let whole = term.candidate.is_sized(&term.point);
         Tangent {
             own,
             by_beta: if whole { Vec::new() } else { columns },
@@ -167,18 +167,9 @@ mod tests {
         let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
         let split = c.split().unwrap();
         let search = Search::new(&c, &split, Effort::default(), Vec::new());
-        let term = |id: &str, point: Point| Term {
-            candidate: search
-                .candidates()
-                .iter()
-                .find(|c| c.id() == id)
-                .unwrap()
-                .clone(),
-            point,
-            p_value: 0.0,
-            rivals: Vec::new(),
-            gain: 0.0,
-            beside: Vec::new(),
+        let term = |id: &str, point: Point| {
+            let candidate = search.candidates().iter().find(|c| c.id() == id);
+            Term::new(candidate.unwrap().clone(), point)
         };
         let terms = [
             term("output_saturation", Point::at(1, &[10.0])),

@@ -6,6 +6,7 @@ use crate::closure::likelihood::Unusable;
 use crate::closure::likelihood::linear::{Basis, dot};
 use crate::closure::likelihood::random::Stream;
 use crate::closure::likelihood::whiten::Whitener;
+use crate::closure::rails::{self, Rails};
 
 /// Pairs of complementary halves.
 const PAIRS: usize = 15;
@@ -21,12 +22,28 @@ impl Search<'_> {
         term: usize,
         but: &[String],
     ) -> Result<f64, Unusable> {
+        if model.terms[term].evident {
+            return Ok(self.rails_again());
+        }
         let mut others = model.terms.clone();
         others.remove(term);
         let round = self.round(&self.model(&others)?, 0);
         let against = round.judged.iter();
         let against = against.filter(|j| !but.contains(&j.candidate.id()));
         Ok(self.selection_frequency(model, term, against))
+    }
+
+    /// Share of the halves of the training rows that show the same rails.
+    fn rails_again(&self) -> f64 {
+        let levels = |r: &Rails| (r.lower_dps, r.upper_dps);
+        let whole = self.rails.as_ref().map(levels);
+        let shows = |k: usize| {
+            let side = half(self.train.len(), k / 2);
+            let own = self.train.iter().zip(side);
+            let own: Vec<bool> = own.map(|(t, s)| *t && s == (k % 2 == 0)).collect();
+            rails::of(self.channels, &own).as_ref().map(levels) == whole
+        };
+        (0..2 * PAIRS).filter(|k| shows(*k)).count() as f64 / (2 * PAIRS) as f64
     }
 
     /// Share of the halves of the record (whole segments, complementary pairs; Meinshausen & Buhlmann 2010,

@@ -1,10 +1,10 @@
 //! One round: all candidates beside those that are taken, each at its best shape.
 
 use super::refine::{self, Bench, Profiled};
-use super::{LEVEL, MOST_RIVALS, Model, Search, tones};
+use super::{LEVEL, MOST_RIVALS, Model, Search, acting, tones};
 use crate::closure::channels::Channels;
 use crate::closure::effects::tone::{Pickup, returns};
-use crate::closure::effects::{Bias, Candidate, Missing, Point};
+use crate::closure::effects::{Bias, Candidate, Missing, Point, map};
 use crate::closure::likelihood::candidates::Group;
 use crate::closure::likelihood::linear::add_scaled;
 use crate::closure::likelihood::reml::Fit;
@@ -14,6 +14,11 @@ use std::sync::Arc;
 
 /// What a coefficient or parameter costs in log-likelihood when explanations are compared.
 pub const PRICE: f64 = 2.0;
+
+/// What a shape costs beside its columns.
+pub fn price(candidate: &dyn Candidate, c: &Channels, point: &Point) -> f64 {
+    PRICE * point.theta.len() as f64 + candidate.surcharge(c, point)
+}
 
 /// Net gain within which two explanations are equally good.
 pub const EQUAL: f64 = 4.0;
@@ -170,7 +175,9 @@ impl Search<'_> {
             };
             let Some(point) = point else { continue };
             let near = gain > 0.5 * best - 10.0;
-            let bench = (near || candidate.is_whole()).then(|| Bench::new(fit, shape));
+            let acting = candidate.acts_on_bias() && !candidate.is_last();
+            let looked = near || acting || candidate.is_whole();
+            let bench = looked.then(|| Bench::new(fit, shape));
             let gain = |p: &Point| {
                 let bench = bench.as_ref()?;
                 Some(refine::gain(bench, candidate.as_ref(), c, &model.bias, p))
@@ -190,17 +197,24 @@ impl Search<'_> {
                 }
                 _ => start.clone(),
             };
-            let acting = near && candidate.acts_on_bias() && !candidate.is_last();
-            let (point, bias) = match acting {
-                true => self.admitted(model, candidate.as_ref(), point, points, gain),
-                false => (point, None),
+            let beside = match (acting, &bench) {
+                (true, Some(bench)) => self.admitted(model, candidate.as_ref(), points, bench),
+                _ => None,
             };
-            biases.push(bias);
+            let (point, bias) = match beside {
+                Some((point, bias)) => (point, Some(bias)),
+                None => (point, None),
+            };
             // At one noise; the null hypothesis may choose the one that suits it best.
-            let whole = candidate.is_whole().then(|| gain(&point)).flatten();
+            let bench = bench.filter(|_| candidate.is_sized(&point));
+            let whole = bench.map(|bench| {
+                let bias = bias.as_ref().unwrap_or(&model.bias);
+                refine::gain(&bench, candidate.as_ref(), c, bias, &point)
+            });
             let whole = whole.map(|g| g + fit.problem.evaluate(shape).loglik - fit.at.loglik);
             starts.push((candidate.clone(), point, p_value));
             wholes.push(whole);
+            biases.push(bias);
         }
         let columns: Vec<Vec<Vec<f64>>> = starts
             .iter()
@@ -218,10 +232,9 @@ impl Search<'_> {
             .map(
                 |(((candidate, point, p_value), Profiled { gain, columns, .. }), whole)| {
                     let gain = whole.unwrap_or(gain);
-                    let paid = PRICE * (columns + point.theta.len()) as f64;
-                    let surcharge = candidate.surcharge(c, &point);
+                    let paid = PRICE * columns as f64 + price(candidate.as_ref(), c, &point);
                     Judged {
-                        net: gain - paid - surcharge,
+                        net: gain - paid,
                         candidate,
                         point,
                         gain,
@@ -233,38 +246,35 @@ impl Search<'_> {
     }
 }
 
-/// Passes in which the declared bias and an effect that acts on it find each other.
-const PASSES: usize = 2;
-
 impl Search<'_> {
-    /// A shape whose coefficients physics admits, that one or the best of `points`, with the declared bias
-    /// beside it.
+    /// The best of `points` whose coefficients physics admits, each with the declared bias that is there beside it: a
+    /// strong effect that acts on the bias bends what the declared model finds without it, and would be judged by
+    /// a bias that it made itself.
     fn admitted(
         &self,
         model: &Model,
         candidate: &dyn Candidate,
-        best: Point,
         points: &[Point],
-        gain: impl Fn(&Point) -> Option<f64>,
-    ) -> (Point, Option<Bias>) {
-        let (bias, beta) = self.bias_beside(model, candidate, &best);
-        if candidate.admits(&best, &beta) {
-            return (best, Some(bias));
-        }
-        let each = points.iter().filter_map(|p| {
-            let (bias, beta) = self.bias_beside(model, candidate, p);
-            let there = gain(p)?;
-            candidate.admits(p, &beta).then_some((there, p, bias))
-        });
-        match each.max_by(|a, b| a.0.total_cmp(&b.0)) {
-            Some((_, point, bias)) => (point.clone(), Some(bias)),
-            None => (best, None),
-        }
+        bench: &Bench<'_>,
+    ) -> Option<(Point, Bias)> {
+        let c = self.channels;
+        let net = |point: &Point| {
+            let (bias, beta) = self.bias_beside(model, candidate, point);
+            let paid = PRICE * beta.len() as f64 + price(candidate, c, point);
+            let admitted = candidate.admits(point, &beta);
+            let gain = || refine::gain(bench, candidate, c, &bias, point);
+            admitted.then(|| gain() - paid)
+        };
+        let each = points.iter().filter_map(|p| Some((net(p)?, p)));
+        let (_, start) = each.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let steps = map(&candidate.spacing(c, start), |s| 0.5 * s);
+        let top = refine::climbed(start, steps, |p| net(p).unwrap_or(f64::NEG_INFINITY));
+        let (bias, _) = self.bias_beside(model, candidate, &top);
+        Some((top, bias))
     }
 
-    /// The declared bias with a candidate in, and the candidate's coefficients: a strong effect that acts on the
-    /// bias bends what the declared model finds without it, and is then judged by a bias that it made
-    /// itself. Ordinary least squares, for the shape alone.
+    /// The declared bias with a candidate in, and the candidate's coefficients. Ordinary least squares, for the shape
+    /// alone.
     fn bias_beside(
         &self,
         model: &Model,
@@ -278,15 +288,13 @@ impl Search<'_> {
         for (column, b) in model.columns.iter().zip(&model.beta).skip(order) {
             add_scaled(&mut rest, -b, column);
         }
-        let mut own = Vec::new();
-        for _ in 0..PASSES {
-            let mut columns = super::declared(c);
-            columns.extend(candidate.columns(c, &bias, point));
-            let mut found = super::weighted(&columns, &rest, &model.fit.row_weights);
-            own = found.split_off(order.min(found.len()));
-            bias.coefficients_dps = found;
-        }
-        (bias, own)
+        let data = (rest.as_slice(), model.fit.row_weights.as_slice());
+        let acting = [(candidate, point)];
+        bias.coefficients_dps = acting::settled(c, data, &bias.coefficients_dps, &acting, &[]);
+        let mut columns = super::declared(c);
+        columns.extend(candidate.columns(c, &bias, point));
+        let own = super::weighted(&columns, &rest, &model.fit.row_weights);
+        (bias, own.get(order..).unwrap_or_default().to_vec())
     }
 }
 

@@ -61,17 +61,11 @@ mod tests {
     fn term(id: &str, theta: f64) -> Term {
         use crate::closure::effects::Candidate;
         use crate::closure::effects::tone::Pickup;
-        Term {
-            candidate: std::sync::Arc::new(Pickup {
-                frequency_hz: theta,
-                further: id == "outside:tone",
-            }) as std::sync::Arc<dyn Candidate>,
-            point: Point::at(0, &[theta]),
-            p_value: 1.0,
-            rivals: Vec::new(),
-            gain: 0.0,
-            beside: Vec::new(),
-        }
+        let candidate: std::sync::Arc<dyn Candidate> = std::sync::Arc::new(Pickup {
+            frequency_hz: theta,
+            further: id == "outside:tone",
+        });
+        Term::new(candidate, Point::at(0, &[theta]))
     }
 
     #[test]

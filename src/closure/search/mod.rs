@@ -31,6 +31,7 @@ use super::likelihood::Unusable;
 use super::likelihood::blocks::Split;
 use super::likelihood::linear::{Basis, add_scaled, dot};
 use super::likelihood::reml::{self, Fit};
+use super::rails::{self, Rails};
 use judge::{Judged, Round};
 use memo::Memo;
 use std::cell::RefCell;
@@ -78,18 +79,31 @@ pub struct Term {
     pub gain: f64,
     /// What the probability is beside: the ids of the terms that were in.
     pub beside: Vec<String>,
+    /// The record shows it without a fit ([`crate::closure::rails`]): its shape stands, and no comparison decides on it.
+    pub evident: bool,
 }
 
 impl Term {
+    /// A shape of which nothing is known yet.
+    pub fn new(candidate: Arc<dyn Candidate>, point: Point) -> Self {
+        Term {
+            candidate,
+            point,
+            p_value: 0.0,
+            rivals: Vec::new(),
+            gain: 0.0,
+            beside: Vec::new(),
+            evident: false,
+        }
+    }
+
     /// From a round's judgement.
     pub fn of(judged: &Judged, rivals: Vec<String>) -> Self {
         Term {
-            candidate: judged.candidate.clone(),
-            point: judged.point.clone(),
             p_value: judged.p_value,
             gain: judged.gain,
             rivals,
-            beside: Vec::new(),
+            ..Term::new(judged.candidate.clone(), judged.point.clone())
         }
     }
 
@@ -147,12 +161,16 @@ pub struct Found {
 pub struct Search<'a> {
     /// The record.
     pub channels: &'a Channels,
-    /// Rows to fit on.
+    /// Rows to fit on: those of the training blocks that do not stand at a rail.
     pub used: Vec<bool>,
+    /// Rows of the training blocks.
+    pub train: Vec<bool>,
     /// Rows to judge on.
     pub heldout: Vec<bool>,
     /// How hard.
     pub effort: Effort,
+    /// Levels at which the output stands.
+    pub rails: Option<Rails>,
     candidates: Vec<Arc<dyn Candidate>>,
     models: Memo<Arc<Model>>,
     rounds: Memo<Arc<Round>>,
@@ -205,11 +223,16 @@ impl<'a> Search<'a> {
         let mut candidates = extra;
         candidates.extend(effects::catalogue(channels).into_iter().map(Arc::from));
         candidates.extend(effects::outside::all(channels).into_iter().map(Arc::from));
+        let train: Vec<bool> = both(&split.train);
+        let rails = rails::of(channels, &train);
+        let free = |(i, row): (usize, &bool)| *row && !rails.as_ref().is_some_and(|r| r.rows[i]);
         Search {
             channels,
-            used: both(&split.train),
+            used: train.iter().enumerate().map(free).collect(),
+            train,
             heldout: both(&split.heldout),
             effort,
+            rails,
             candidates,
             models: Memo::default(),
             rounds: Memo::default(),
@@ -310,7 +333,7 @@ impl<'a> Search<'a> {
                 continue;
             }
             for column in term.candidate.columns(c, bias, &term.point) {
-                match term.candidate.is_whole() {
+                match term.candidate.is_sized(&term.point) {
                     true => add_scaled(&mut y, -1.0, &column),
                     false => free.push(column),
                 }
@@ -331,11 +354,17 @@ impl<'a> Search<'a> {
         options: &reml::Options,
     ) -> Result<Model, Unusable> {
         let c = self.channels;
+        // Rows at a rail are left out where the clip is in the model.
+        let railed = terms.iter().any(|t| t.evident);
+        let used = if railed { &self.used } else { &self.train };
         let mut columns = declared(c);
         let order = columns.len();
         let mut kinds = vec![Kind::Free; order];
         for term in terms {
-            let kind = match (term.candidate.is_last(), term.candidate.is_whole()) {
+            let kind = match (
+                term.candidate.is_last(),
+                term.candidate.is_sized(&term.point),
+            ) {
                 (true, _) => Kind::Last,
                 (_, true) => Kind::Whole,
                 _ => Kind::Free,
@@ -346,7 +375,9 @@ impl<'a> Search<'a> {
             }
         }
         let unclipped = columns.clone();
-        let clipped = clip(c, acting, &mut columns, &kinds);
+        // Where the rails are known, a fitted row is not clipped, whatever the model says.
+        let spared = railed.then_some(used.as_slice());
+        let clipped = clip(c, acting, (&mut columns, &kinds), spared);
         let mut y = c.error_dps.clone();
         let mut free = Vec::new();
         for (column, kind) in columns.iter().zip(&kinds) {
@@ -360,7 +391,7 @@ impl<'a> Search<'a> {
             // The noise needs a constant over all rows, clipped ones too.
             free.push(clipped);
         }
-        let fit = reml::fit(&c.time_s, &y, &free, &self.used, options)?;
+        let fit = reml::fit(&c.time_s, &y, &free, used, options)?;
         let off_dps = fit.beta.last().copied().filter(|_| clips).unwrap_or(0.0);
         let mut given = fit.beta.iter();
         let mut beta: Vec<f64> = kinds
@@ -461,8 +492,13 @@ enum Kind {
 
 /// Puts clips after all other columns: in rows that are clipped these vanish, and the clip's own
 /// column is the whole error, limit less applied rate, instead of its distance from a total that
-/// depends on the very coefficients that are sought. 1 for each such row.
-fn clip(c: &Channels, bias: &Bias, columns: &mut [Vec<f64>], kinds: &[Kind]) -> Vec<f64> {
+/// depends on the very coefficients that are sought. `spared` rows are not. 1 for each clipped row.
+fn clip(
+    c: &Channels,
+    bias: &Bias,
+    (columns, kinds): (&mut [Vec<f64>], &[Kind]),
+    spared: Option<&[bool]>,
+) -> Vec<f64> {
     let mut clipped = vec![0.0; c.len()];
     for k in 0..columns.len() {
         if kinds[k] != Kind::Last {
@@ -470,6 +506,10 @@ fn clip(c: &Channels, bias: &Bias, columns: &mut [Vec<f64>], kinds: &[Kind]) -> 
         }
         for i in 0..c.len() {
             if columns[k][i] == 0.0 {
+                continue;
+            }
+            if spared.is_some_and(|rows| rows[i]) {
+                columns[k][i] = 0.0;
                 continue;
             }
             let others = bias.others_dps.get(i).copied().unwrap_or(0.0);

@@ -85,17 +85,18 @@ pub fn refined(
     start: &Point,
     reach: f64,
 ) -> Point {
+    let steps = candidate.spacing(c, start);
+    let steps = steps.iter().map(|s| reach * s).collect();
+    climbed(start, steps, |p| gain(bench, candidate, c, bias, p))
+}
+
+/// The top of a gain near a start: coordinate steps, halved where none of them rises.
+pub fn climbed(start: &Point, mut steps: Vec<f64>, gain: impl Fn(&Point) -> f64) -> Point {
     let mut best = start.clone();
     if best.theta.is_empty() {
         return best;
     }
-    let gain = |p: &Point| gain(bench, candidate, c, bias, p);
     let mut reached = gain(&best);
-    let mut steps: Vec<f64> = candidate
-        .spacing(c, start)
-        .iter()
-        .map(|s| reach * s)
-        .collect();
     for _ in 0..HALVINGS {
         let mut moved = true;
         let mut turns = 0;
@@ -130,7 +131,7 @@ pub fn gain(
     point: &Point,
 ) -> f64 {
     let columns = candidate.columns(c, bias, point);
-    if candidate.is_whole() {
+    if candidate.is_sized(point) {
         bench.gain_whole(&columns)
     } else {
         bench.gain(&columns)

@@ -66,7 +66,7 @@ impl Search<'_> {
         let asked = LEVEL * 10f64.powf(-DECADES * (slow - WANDER).max(0.0));
         let square = |m: &Model| self.heldout_error(m, &model).square;
         for k in (0..found.terms.len()).rev() {
-            if found.terms[k].p_value <= asked.max(SURELY) {
+            if found.terms[k].p_value <= asked.max(SURELY) || found.terms[k].evident {
                 continue;
             }
             let mut others = model.terms.clone();
@@ -88,7 +88,8 @@ impl Search<'_> {
         };
         let of_before = self.heldout_error(&before, &before).square;
         let limit = |found: &Found| {
-            let sure = found.terms.iter().any(|t| t.p_value <= SURELY);
+            let mut terms = found.terms.iter();
+            let sure = terms.any(|t| t.p_value <= SURELY || t.evident);
             let most = match found.left.is_some() && !sure {
                 true => BESIDE,
                 false => ABOVE,
@@ -124,7 +125,7 @@ impl Search<'_> {
             let steady = self.constancy(&model, term);
             let steady = steady.is_none_or(|c| c.p_value > UNSTEADY || c.share < SHARE);
             let often = || self.selected_beside(&model, k, &term.rivals);
-            stable.push(term.p_value <= BEYOND && steady && often()? >= STABLE);
+            stable.push(term.evident || term.p_value <= BEYOND && steady && often()? >= STABLE);
         }
         let mut stable = stable.into_iter();
         found.terms.retain(|_| stable.next() == Some(true));

@@ -59,13 +59,11 @@ fn kept_of(
     let term = |id: &str, p_value: f64, rivals: usize| {
         let candidate = search.candidates().iter().find(|c| c.id() == id);
         let candidate = candidate.unwrap().clone();
+        let point = candidate.points(c).remove(0);
         Term {
-            point: candidate.points(c).remove(0),
-            candidate,
             p_value,
             rivals: (0..rivals).map(|k| format!("rival {k}")).collect(),
-            gain: 0.0,
-            beside: Vec::new(),
+            ..Term::new(candidate, point)
         }
     };
     let mut found = Found {

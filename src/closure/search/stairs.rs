@@ -1,6 +1,6 @@
 //! Thresholds: their likelihood is a staircase, flat between readings.
 
-use super::judge::PRICE;
+use super::judge::price;
 use crate::closure::channels::Channels;
 use crate::closure::effects::{Candidate, Point};
 
@@ -27,9 +27,8 @@ pub fn settled(
     let (mut best, mut reached) = climbed(candidate, c, top, &gain);
     for other in others {
         let (point, there) = climbed(candidate, c, &other, &gain);
-        // What needs a parameter less may gain less.
-        let more = best.theta.len() as f64 - point.theta.len() as f64;
-        if there + PRICE * more > reached {
+        // What costs less may gain less.
+        if there - price(candidate, c, &point) > reached - price(candidate, c, &best) {
             (best, reached) = (point, there);
         }
     }
@@ -103,6 +102,7 @@ fn middle(top: &Point, fine: &[(Point, f64)], gain: impl Fn(&Point) -> f64) -> P
 mod tests {
     use super::*;
     use crate::closure::effects::{Bias, Estimate, Missing, Reported, Sheet};
+    use crate::closure::search::judge::PRICE;
     use crate::closure::synthetic::Random;
     use std::collections::BTreeMap;
 

@@ -1,9 +1,9 @@
 //! After the forward steps: every term again, with the others in.
 
-use super::judge::{Judged, PRICE};
+use super::judge::{Judged, PRICE, price};
 use super::refine::{self, Bench};
 use super::{LEVEL, MOST_RIVALS, Model, Search, Term, stairs};
-use crate::closure::effects::Point;
+use crate::closure::effects::{Bias, Point, map};
 use crate::closure::likelihood::Unusable;
 use crate::closure::likelihood::linear::add_scaled;
 use crate::closure::likelihood::noise::Timeline;
@@ -13,6 +13,9 @@ const BETTER: f64 = 1.5;
 
 /// Most polishes in a row.
 const POLISHES: usize = 3;
+
+/// Places from which a shape that moves the bias is climbed.
+const CLIMBS: usize = 4;
 
 /// Passes over all terms.
 const SWEEPS: usize = 2;
@@ -42,7 +45,8 @@ impl Search<'_> {
     /// no likelihood tells from other levels.
     fn levelled(&self, model: Model) -> Result<Model, Unusable> {
         let mut terms = model.terms.clone();
-        for term in terms.iter_mut().filter(|t| t.candidate.is_last()) {
+        let loose = |t: &&mut Term| t.candidate.is_last() && !t.evident;
+        for term in terms.iter_mut().filter(loose) {
             if let Some(point) = term.candidate.moved(&term.point, model.off_dps) {
                 term.point = point;
             }
@@ -61,7 +65,9 @@ impl Search<'_> {
 
     fn polished_once(&self, mut model: Model) -> Result<Model, Unusable> {
         for k in 0..model.terms.len() {
-            if model.terms[k].point.theta.is_empty() {
+            let term = &model.terms[k];
+            let finer = || !term.candidate.fine(self.channels, &term.point).is_empty();
+            if term.evident || term.point.theta.is_empty() && !finer() {
                 continue;
             }
             let mut lines = vec![model.fit.problem.line.clone()];
@@ -76,10 +82,12 @@ impl Search<'_> {
                     continue;
                 }
                 let mut terms = model.terms.clone();
-                let fewer = terms[k].point.theta.len() as f64 - point.theta.len() as f64;
+                let candidate = terms[k].candidate.clone();
+                let price = |point: &Point| price(candidate.as_ref(), self.channels, point);
+                let more = price(&point) - price(&terms[k].point);
                 terms[k].point = point;
                 let next = self.model_with(&terms, &self.near(&model))?;
-                if next.value + PRICE * fewer > model.value {
+                if next.value - more > model.value {
                     model = next;
                 }
             }
@@ -103,7 +111,7 @@ impl Search<'_> {
             }
             for column in other.candidate.columns(c, &model.acting, &other.point) {
                 let column = model.fit.reduce(&column);
-                if other.candidate.is_whole() {
+                if other.candidate.is_sized(&other.point) {
                     add_scaled(&mut problem.y, -1.0, &column);
                 } else {
                     problem.columns.push(column);
@@ -113,8 +121,17 @@ impl Search<'_> {
         let bench = Bench::of_problem(&model.fit, &problem, model.fit.at.shape);
         let term = &model.terms[k];
         let candidate = term.candidate.as_ref();
-        let gain = |p: &Point| refine::gain(&bench, candidate, c, &model.bias, p);
-        let fine: Vec<(Point, f64)> = candidate
+        // A shape that acts on the bias moves it: each is judged by the bias that is there beside it.
+        let moves = candidate.acts_on_bias() && !candidate.is_last();
+        let gain = |p: &Point| match moves {
+            true => refine::gain(&bench, candidate, c, &self.bias_with(model, k, p), p),
+            false => refine::gain(&bench, candidate, c, &model.bias, p),
+        };
+        let climbed = |start: &Point| {
+            let steps = candidate.spacing(c, start);
+            refine::climbed(start, map(&steps, |s| 0.5 * s), gain)
+        };
+        let mut fine: Vec<(Point, f64)> = candidate
             .fine(c, &term.point)
             .into_iter()
             .map(|p| {
@@ -122,17 +139,35 @@ impl Search<'_> {
                 (p, there)
             })
             .collect();
-        let mut start = term.point.clone();
-        let mut best = gain(&start);
-        for (point, there) in &fine {
-            // A form with a parameter more has to be worth it.
-            let more = point.theta.len() as f64 - term.point.theta.len() as f64;
-            if there - PRICE * more > best {
-                (start, best) = (point.clone(), there - PRICE * more);
+        if moves {
+            // The bias follows closely: tops are narrow beside the distance of these places.
+            fine.sort_by(|a, b| b.1.total_cmp(&a.1));
+            fine.truncate(CLIMBS);
+            for (point, there) in &mut fine {
+                *point = climbed(point);
+                *there = gain(point);
             }
         }
-        let top = refine::refined(&bench, candidate, c, &model.bias, &start, 0.5);
+        let mut start = term.point.clone();
+        let mut best = gain(&start) - price(candidate, c, &start);
+        for (point, there) in &fine {
+            // A form that costs more has to be worth it.
+            let net = there - price(candidate, c, point);
+            if net > best {
+                (start, best) = (point.clone(), net);
+            }
+        }
+        let top = climbed(&start);
         stairs::settled(candidate, c, &top, &fine, gain)
+    }
+
+    /// The bias of a model in which a term has another shape.
+    fn bias_with(&self, model: &Model, k: usize, point: &Point) -> Bias {
+        let mut terms = model.terms.clone();
+        terms[k].point = point.clone();
+        let mut bias = model.acting.clone();
+        bias.coefficients_dps = self.settled(&terms, &bias, &model.fit.row_weights);
+        bias
     }
 
     /// Every term against all other candidates, the other terms being in: it is replaced by a better
@@ -148,6 +183,10 @@ impl Search<'_> {
             let mut changed = false;
             let mut k = 0;
             while k < model.terms.len() {
+                if model.terms[k].evident {
+                    k += 1;
+                    continue;
+                }
                 let mut others = model.terms.clone();
                 let own = others.remove(k);
                 let own_spikes = self.spikes(&model.fit);

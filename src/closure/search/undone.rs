@@ -44,6 +44,7 @@ impl Search<'_> {
                     .collect()
             };
             named[*k]
+                && !model.terms[*k].evident
                 && (is_undone(&parts[*k], &others(true), STRANGERS)
                     || is_undone(&parts[*k], &others(false), ALL))
         })
@@ -118,14 +119,8 @@ mod tests {
         let term = |id: &str| {
             let is_it = |c: &&std::sync::Arc<dyn Candidate>| c.id() == id;
             let candidate = search.candidates().iter().find(is_it).unwrap().clone();
-            Term {
-                point: candidate.points(&c).remove(0),
-                candidate,
-                p_value: 0.0,
-                rivals: Vec::new(),
-                gain: 0.0,
-                beside: Vec::new(),
-            }
+            let point = candidate.points(&c).remove(0);
+            Term::new(candidate, point)
         };
         let terms = [term("supply_sensitivity"), term("g_sensitivity")];
         let model = search.model(&terms).unwrap();

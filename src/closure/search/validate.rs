@@ -62,7 +62,7 @@ impl Search<'_> {
         let mut k = 0;
         while k < model.terms.len() {
             let term = model.terms[k].clone();
-            if !term.candidate.named() {
+            if !term.candidate.named() || term.evident {
                 k += 1;
                 continue;
             }
@@ -75,7 +75,7 @@ impl Search<'_> {
             );
             let silent = term.p_value <= CERTAIN && self.unseen(&model, &term);
             if !silent && a.innovations >= b.innovations && a.square >= b.square {
-                found.left = found.left.take().or_else(|| self.channel(&term));
+                self.leaves(found, &term);
                 model = without;
             } else {
                 k += 1;
@@ -156,7 +156,7 @@ impl Search<'_> {
             let single = t.id() == "stress_jump" && self.switches(t, &model) < 2;
             let accident = single && (more || slow > SLOW);
             if accident {
-                found.left = self.channel(t);
+                self.leaves(found, t);
             }
             !accident
         });
@@ -183,7 +183,7 @@ impl Search<'_> {
             others.remove(k);
             let law = self.law_instead(&others, term)?;
             if law.as_ref().is_none_or(|(_, good)| !good) {
-                found.left = found.left.take().or_else(|| self.channel(term));
+                self.leaves(found, term);
             }
             match law {
                 Some((law, _)) => {
@@ -197,6 +197,13 @@ impl Search<'_> {
             return Ok(model);
         }
         self.polished(self.model(&terms)?)
+    }
+
+    /// A name that is dropped leaves something, unless it was no more than chance makes in many records.
+    fn leaves(&self, found: &mut Found, term: &Term) {
+        if term.p_value <= BEYOND {
+            found.left = found.left.take().or_else(|| self.channel(term));
+        }
     }
 
     /// Whether a term has one gain.

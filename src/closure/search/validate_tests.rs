@@ -121,14 +121,7 @@ fn a_transient_of_one_row_is_an_accident_and_one_of_twelve_is_none() {
     let is_it = |c: &&Arc<dyn Candidate>| c.id() == "warmup_transient";
     let candidate = search.candidates().iter().find(is_it).unwrap();
     for (tau_s, once) in [(4.4, true), (11.0, true), (14.0, false), (120.0, false)] {
-        let term = Term {
-            candidate: candidate.clone(),
-            point: Point::at(0, &[f64::ln(tau_s)]),
-            p_value: 1e-9,
-            rivals: Vec::new(),
-            gain: 20.0,
-            beside: Vec::new(),
-        };
+        let term = Term::new(candidate.clone(), Point::at(0, &[f64::ln(tau_s)]));
         let model = search.model(std::slice::from_ref(&term)).unwrap();
         assert_eq!(search.shows_once(&term, &model), once, "{tau_s}");
     }

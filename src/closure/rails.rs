@@ -1,0 +1,131 @@
+//! Rails: levels at which the output stands still.
+//!
+//! A converter or an output word that clips gives one and the same reading for whatever lies beyond, noise included.
+//! Readings of a noisy output that agree to the last digit at an end of its range show that directly: no model is
+//! asked. A clip before the noise (an amplifier's) leaves no such mark; it is a candidate like all others.
+
+use super::channels::Channels;
+
+/// Fewest readings at a rail, and how much oftener they come than any other reading (but the opposite rail's).
+const FEWEST: usize = 3;
+const OFTENER: usize = 3;
+
+/// Share of the rows that may lie beyond a rail: what was added to the output later.
+const BEYOND: f64 = 0.02;
+
+/// Readings within a rail that tell how many would agree with it by chance.
+const NEIGHBOURS: usize = 20;
+
+/// Two readings that differ by less than this share of the range are one.
+const SAME: f64 = 1e-9;
+
+/// Probability of as many equal readings by chance up to which they are a rail.
+const LEVEL: f64 = 1e-4;
+
+/// The rails of a record.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rails {
+    /// deg/s.
+    pub upper_dps: Option<f64>,
+    /// deg/s.
+    pub lower_dps: Option<f64>,
+    /// Rows that stand at one.
+    pub rows: Vec<bool>,
+    /// Probability that chance makes so many readings agree at the less certain of them.
+    pub p_value: f64,
+}
+
+/// A reading and how many rows have it.
+type Reading = (f64, usize);
+
+/// The rails that given rows show; `None`: none.
+pub fn of(c: &Channels, rows: &[bool]) -> Option<Rails> {
+    let output = c.output_dps();
+    let pairs = output.iter().zip(rows);
+    let mut sorted: Vec<f64> = pairs.filter(|(_, row)| **row).map(|(v, _)| *v).collect();
+    sorted.retain(|v| v.is_finite());
+    sorted.sort_by(f64::total_cmp);
+    let same = SAME * (sorted.last()? - sorted.first()?);
+    let mut readings: Vec<Reading> = Vec::new();
+    for v in sorted {
+        match readings.last_mut() {
+            Some((last, count)) if v - *last <= same => *count += 1,
+            _ => readings.push((v, 1)),
+        }
+    }
+    let lower = rail(&readings);
+    readings.reverse();
+    let upper = rail(&readings);
+    let p_value = [lower, upper]
+        .iter()
+        .flatten()
+        .map(|r| r.1)
+        .reduce(f64::max)?;
+    let level = |rail: Option<(f64, f64)>| rail.map(|r| r.0);
+    let (upper_dps, lower_dps) = (level(upper), level(lower));
+    let at = |level: Option<f64>, v: f64| level.is_some_and(|l| (v - l).abs() <= same);
+    let stands = |v: &f64| at(upper_dps, *v) || at(lower_dps, *v);
+    Some(Rails {
+        upper_dps,
+        lower_dps,
+        rows: output.iter().map(stands).collect(),
+        p_value,
+    })
+}
+
+/// The level of a rail at the beginning of readings in order, and its probability.
+fn rail(readings: &[Reading]) -> Option<(f64, f64)> {
+    let rows: usize = readings.iter().map(|r| r.1).sum();
+    let resolution = readings.windows(2).map(|w| (w[1].0 - w[0].0).abs());
+    let resolution = resolution.reduce(f64::min)?;
+    let mut counts: Vec<usize> = readings.iter().map(|r| r.1).collect();
+    counts.sort_unstable_by(|a, b| b.cmp(a));
+    // The largest is the rail's, the second may be the opposite one's.
+    let usual = *counts.get(2)?;
+    let most = (BEYOND * rows as f64).max(2.0) as usize;
+    let mut beyond = 0;
+    let mut places = 0;
+    let mut best: Option<(usize, Reading)> = None;
+    for (k, reading) in readings.iter().enumerate() {
+        if beyond > most {
+            break;
+        }
+        places += 1;
+        beyond += reading.1;
+        if best.is_none_or(|(_, b)| reading.1 > b.1) {
+            best = Some((k, *reading));
+        }
+    }
+    let (k, (level, count)) = best?;
+    if count < FEWEST.max(OFTENER * usual) {
+        return None;
+    }
+    let mut within = 0;
+    let neighbour = readings[k + 1..].iter().find(|r| {
+        within += r.1;
+        within >= NEIGHBOURS
+    });
+    let width = (neighbour.or(readings.last())?.0 - level).abs();
+    let expected = within as f64 * resolution / width;
+    let p_value = (2.0 * places as f64 * at_least(count - 1, expected)).min(1.0);
+    (p_value <= LEVEL).then_some((level, p_value))
+}
+
+/// Probability of `count` or more where `expected` are (Poisson).
+fn at_least(count: usize, expected: f64) -> f64 {
+    if count as f64 <= expected {
+        return 1.0;
+    }
+    let mut term = (-expected).exp();
+    for k in 1..=count {
+        term *= expected / k as f64;
+    }
+    let mut sum = 0.0;
+    let mut k = count;
+    while term > 1e-3 * sum {
+        sum += term;
+        k += 1;
+        term *= expected / k as f64;
+    }
+    sum.min(1.0)
+}
