@@ -40,11 +40,12 @@ pub enum Next {
 }
 
 impl Search<'_> {
-    /// Runs the search.
+    /// One run of the search, and its model before names were dropped; with `names_only` it ends, with something left,
+    /// where a shape without a name leads.
     ///
     /// # Errors
     /// Too few rows to fit anything.
-    pub fn run(&self) -> Result<Found, Unusable> {
+    pub(super) fn run_once(&self, names_only: bool) -> Result<(Found, Model), Unusable> {
         let mut found = Found {
             terms: Vec::new(),
             strangers: Vec::new(),
@@ -56,7 +57,13 @@ impl Search<'_> {
         };
         let mut model = self.model(&self.evident())?;
         for _ in 0..ROUNDS {
-            model = self.forward(model, &mut found)?;
+            model = self.forward(model, &mut found, names_only)?;
+            if let Some(stranger) = model.terms.iter().find(|t| !t.candidate.named())
+                && names_only
+            {
+                found.left = self.channel(stranger);
+                return Ok((found, model));
+            }
             let before: Vec<String> = model.terms.iter().map(Term::id).collect();
             model = self.swept(model)?;
             model = self.without_undone(model)?;
@@ -65,6 +72,7 @@ impl Search<'_> {
                 break;
             }
         }
+        let reached = model.clone();
         let model = self.validated(model, &mut found)?;
         if found.left.is_none() && self.coloured(&model) {
             found.left = Some("time_s".to_owned());
@@ -80,7 +88,7 @@ impl Search<'_> {
             found.left = found.left.or_else(|| self.channel(stranger));
         }
         self.kept_alone(&mut found)?;
-        Ok(found)
+        Ok((found, reached))
     }
 
     /// What is in the record before anything is fitted: a clip at its rails.
@@ -98,11 +106,18 @@ impl Search<'_> {
         clip.map(term).into_iter().collect()
     }
 
-    /// Steps until nothing is called for.
-    fn forward(&self, mut model: Model, found: &mut Found) -> Result<Model, Unusable> {
+    /// Steps until nothing is called for, or, with `names_only`, a shape without a name.
+    fn forward(
+        &self,
+        mut model: Model,
+        found: &mut Found,
+        names_only: bool,
+    ) -> Result<Model, Unusable> {
         loop {
             let named = model.terms.iter().filter(|t| t.candidate.named()).count();
-            if named >= self.effort.steps || model.terms.len() - named >= STRANGERS {
+            let strangers = model.terms.len() - named;
+            let most = if names_only { 1 } else { STRANGERS };
+            if named >= self.effort.steps || strangers >= most {
                 return Ok(model);
             }
             let round = self.round(&model, self.effort.surrogates);

@@ -15,6 +15,7 @@ pub mod halves;
 pub mod heldout;
 pub mod judge;
 mod memo;
+mod otherwise;
 pub mod refine;
 mod reported;
 mod rounding;
