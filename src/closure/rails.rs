@@ -5,6 +5,7 @@
 //! asked. A clip before the noise (an amplifier's) leaves no such mark; it is a candidate like all others.
 
 use super::channels::Channels;
+use crate::record::stats;
 
 /// Fewest readings at a rail, and how much oftener they come than any other reading (but the opposite rail's).
 const FEWEST: usize = 3;
@@ -53,9 +54,11 @@ pub fn of(c: &Channels, rows: &[bool]) -> Option<Rails> {
             _ => readings.push((v, 1)),
         }
     }
-    let lower = rail(&readings);
+    let gaps: Vec<f64> = readings.windows(2).map(|w| w[1].0 - w[0].0).collect();
+    let resolution = gaps.iter().copied().reduce(f64::min)?;
+    let lower = rail(&readings, resolution);
     readings.reverse();
-    let upper = rail(&readings);
+    let upper = rail(&readings, resolution);
     let p_value = [lower, upper]
         .iter()
         .flatten()
@@ -65,19 +68,30 @@ pub fn of(c: &Channels, rows: &[bool]) -> Option<Rails> {
     let (upper_dps, lower_dps) = (level(upper), level(lower));
     let at = |level: Option<f64>, v: f64| level.is_some_and(|l| (v - l).abs() <= same);
     let stands = |v: &f64| at(upper_dps, *v) || at(lower_dps, *v);
-    Some(Rails {
+    let stand: Vec<bool> = output.iter().map(stands).collect();
+    // Readings of an output that is coarser than its noise agree wherever it rests.
+    let pairs = c.error_dps.iter().zip(rows).zip(&stand);
+    let free = pairs.filter(|((_, row), stands)| **row && !**stands);
+    let free: Vec<f64> = free.map(|((e, _), _)| *e).collect();
+    let coarse = in_steps(&gaps, resolution) && stats::difference_noise(&free) < resolution;
+    (!coarse).then_some(Rails {
         upper_dps,
         lower_dps,
-        rows: output.iter().map(stands).collect(),
+        rows: stand,
         p_value,
     })
 }
 
+/// Whether most readings lie whole steps apart; of continuous ones a fifth does.
+fn in_steps(gaps: &[f64], step: f64) -> bool {
+    let off = |gap: &f64| (gap / step - (gap / step).round()).abs();
+    let whole = gaps.iter().filter(|gap| off(gap) < 0.1).count();
+    2 * whole > gaps.len()
+}
+
 /// The level of a rail at the beginning of readings in order, and its probability.
-fn rail(readings: &[Reading]) -> Option<(f64, f64)> {
+fn rail(readings: &[Reading], resolution: f64) -> Option<(f64, f64)> {
     let rows: usize = readings.iter().map(|r| r.1).sum();
-    let resolution = readings.windows(2).map(|w| (w[1].0 - w[0].0).abs());
-    let resolution = resolution.reduce(f64::min)?;
     let mut counts: Vec<usize> = readings.iter().map(|r| r.1).collect();
     counts.sort_unstable_by(|a, b| b.cmp(a));
     // The largest is the rail's, the second may be the opposite one's.
