@@ -84,7 +84,7 @@ impl Candidate for ThermalLag {
     fn correction(&self, c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
         let (gain_dps, tau_s) = (*e.beta.first()?, tau_s(c, &e.point));
         let input = f.thermometer()?;
-        let tangent = e.point.form % c.heats() > 0;
+        let tangent = !e.point.form.is_multiple_of(c.heats());
         let of_square = e.beta.get(1).map_or(0.0, |b| b / gain_dps);
         let curve = |u: f64| {
             let x = if tangent { c.tangent_at(u) } else { u };

@@ -40,7 +40,7 @@ impl Search<'_> {
         let shows = |k: usize| {
             let side = half(self.train.len(), k / 2);
             let own = self.train.iter().zip(side);
-            let own: Vec<bool> = own.map(|(t, s)| *t && s == (k % 2 == 0)).collect();
+            let own: Vec<bool> = own.map(|(t, s)| *t && s == k.is_multiple_of(2)).collect();
             rails::of(self.channels, &own).as_ref().map(levels) == whole
         };
         (0..2 * PAIRS).filter(|k| shows(*k)).count() as f64 / (2 * PAIRS) as f64
