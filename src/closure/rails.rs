@@ -143,3 +143,7 @@ fn at_least(count: usize, expected: f64) -> f64 {
     }
     sum.min(1.0)
 }
+
+#[cfg(test)]
+#[path = "rails_tests.rs"]
+mod tests;

@@ -1,0 +1,310 @@
+//! Rails: where the output stands still, and where it only seems to.
+
+use super::*;
+use crate::closure::close::{Closed, close};
+use crate::closure::likelihood::reml;
+use crate::closure::search::{Effort, Search, Term};
+use crate::closure::synthetic::{self, Random, triangle};
+use crate::closure::verdict::Fate;
+use crate::design::reader;
+use std::collections::BTreeMap;
+
+const UPPER_DPS: f64 = 70.123;
+const LOWER_DPS: f64 = -66.871;
+
+/// A record of an output, with the rate that was applied.
+fn channels(output: &[f64], rate: Option<&[f64]>) -> Channels {
+    let mut columns = BTreeMap::from([
+        ("rate_out_dps".to_owned(), output.to_vec()),
+        ("die_degc".to_owned(), triangle(output.len())),
+    ]);
+    if let Some(rate) = rate {
+        columns.insert("rate_dps".to_owned(), rate.to_vec());
+    }
+    let time_s: Vec<f64> = (0..output.len()).map(|k| k as f64).collect();
+    Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap()
+}
+
+fn of_all(c: &Channels) -> Option<Rails> {
+    of(c, &vec![true; c.len()])
+}
+
+fn sine_dps(k: usize) -> f64 {
+    80.0 * (0.168_3 * k as f64).sin()
+}
+
+/// A sinusoid with noise, clipped: 16 % of its rows at each side.
+fn clipped(random: &mut Random, rows: usize, low: f64, high: f64) -> Vec<f64> {
+    (0..rows)
+        .map(|k| (sine_dps(k) + 0.3 * random.normal()).clamp(low, high))
+        .collect()
+}
+
+#[test]
+fn one_rail_and_both_are_found_with_outliers_beyond_them() {
+    let none = f64::INFINITY;
+    for seed in 0..20 {
+        for (low, high) in [
+            (-none, UPPER_DPS),
+            (LOWER_DPS, none),
+            (LOWER_DPS, UPPER_DPS),
+        ] {
+            for outliers in [0, 8] {
+                let mut output = clipped(&mut Random::new(seed), 300, low, high);
+                let stands: Vec<bool> = output.iter().map(|v| *v == low || *v == high).collect();
+                let free: Vec<usize> = (0..300).filter(|k| !stands[*k]).collect();
+                for k in 0..outliers {
+                    let off = 90.0 + 7.0 * k as f64;
+                    output[free[20 * k + 20]] = if k % 2 == 0 { off } else { -off };
+                }
+                // As channels have it: the rate taken off and added again, which rounds.
+                let rate: Vec<f64> = (0..300).map(|k| 100.0 * sine_dps(k)).collect();
+                let c = channels(&output, Some(&rate));
+                let rails = of_all(&c).unwrap();
+                for (found, due) in [(rails.upper_dps, high), (rails.lower_dps, low)] {
+                    assert_eq!(found.is_some(), due.is_finite(), "{seed}: {rails:?}");
+                    let off = found.map_or(0.0, |found| (found - due).abs());
+                    assert!(off < 1e-11, "{seed}: {off}");
+                }
+                assert_eq!(rails.rows, stands, "{seed}, {outliers}");
+                assert!(rails.p_value < 1e-20, "{seed}: {}", rails.p_value);
+            }
+        }
+    }
+}
+
+#[test]
+fn rows_that_are_not_given_or_not_measured_show_no_rail_and_may_stand_at_one() {
+    let mut output = clipped(&mut Random::new(1), 300, LOWER_DPS, UPPER_DPS);
+    let first = output.iter().position(|v| *v == UPPER_DPS).unwrap();
+    output[first] = f64::NAN;
+    let c = channels(&output, None);
+    let early: Vec<bool> = (0..300).map(|k| k < 200).collect();
+    let rails = of(&c, &early).unwrap();
+    let stands: Vec<bool> = output
+        .iter()
+        .map(|v| [LOWER_DPS, UPPER_DPS].contains(v))
+        .collect();
+    assert!(!stands[first] && stands[200..].contains(&true));
+    assert_eq!(rails.rows, stands);
+    // All but those that stand.
+    let moving: Vec<bool> = stands.iter().map(|s| !s).collect();
+    assert_eq!(of(&c, &moving), None);
+}
+
+#[test]
+fn continuous_noise_has_no_rail() {
+    for seed in 0..400 {
+        let mut random = Random::new(seed);
+        let rows = [20, 60, 300][seed as usize % 3];
+        let output: Vec<f64> = match seed % 4 {
+            0 => (0..rows).map(|_| random.normal()).collect(),
+            1 => (0..rows).map(|_| random.uniform()).collect(),
+            2 => random.coloured(rows, 0.95),
+            _ => (0..rows).map(|k| sine_dps(k) + random.normal()).collect(),
+        };
+        assert_eq!(of_all(&channels(&output, None)), None, "{seed}");
+    }
+}
+
+#[test]
+fn a_coarse_output_has_no_rail() {
+    for seed in 0..400 {
+        let mut random = Random::new(seed);
+        let step = [0.03, 0.2, 0.5, 1.0, 1.5, 2.0, 3.0][seed as usize % 7];
+        let middle = random.uniform();
+        // Noise, noise over a course, and the course of a rate.
+        let course = |k: usize| match seed % 3 {
+            0 => 0.0,
+            1 => (k as f64 / 50.0).sin(),
+            _ => 30.0 * (k as f64 / 9.0).sin(),
+        };
+        let output: Vec<f64> = (0..300)
+            .map(|k| step * ((course(k) + random.normal()) / step + middle).round())
+            .collect();
+        let c = channels(&output, None);
+        assert_eq!(of_all(&c), None, "{seed}: steps of {step}, {middle}");
+    }
+}
+
+#[test]
+fn the_ends_of_a_coarse_sinusoid_are_no_rails() {
+    // The peak is at the edge of the last step, which then has 2.4 times the rows of the next.
+    for peak in 10..40 {
+        let peak = 0.5 + f64::from(peak);
+        let output: Vec<f64> = (0..600)
+            .map(|k| (peak * f64::from(k).sin()).round())
+            .collect();
+        assert_eq!(of_all(&channels(&output, None)), None, "{peak}");
+    }
+}
+
+#[test]
+fn a_rate_that_dwells_at_its_extremes_makes_no_rail() {
+    for seed in 0..100 {
+        let mut random = Random::new(seed);
+        let step = [0.2, 1.0, 3.0][seed as usize % 3];
+        let offset = 2.0 * random.uniform();
+        // Up, dwell, down, dwell.
+        let rate: Vec<f64> = (0..320)
+            .map(|k| {
+                let way = (k % 80) as f64 - 20.0;
+                100.0 * (1.0 - ((way - 20.0).abs() / 10.0 - 2.0).clamp(-1.0, 1.0)) - 100.0
+            })
+            .collect();
+        assert!(rate.iter().filter(|r| r.abs() == 100.0).count() > 100);
+        let output: Vec<f64> = rate
+            .iter()
+            .map(|r| step * ((r + offset + 0.05 * random.normal()) / step).round())
+            .collect();
+        let c = channels(&output, Some(&rate));
+        assert_eq!(of_all(&c), None, "{seed}: steps of {step}");
+    }
+}
+
+#[test]
+fn the_fewer_readings_agree_the_less_certain_is_a_rail() {
+    // In steps of a tenth of the noise. As many readings as asked for are at the rail, the others are below.
+    let p_value = |count: usize| {
+        let mut random = Random::new(3);
+        let mut output: Vec<f64> = (0..400)
+            .map(|_| 0.1 * (10.0 * random.normal()).round())
+            .filter(|v| *v < 1.35)
+            .collect();
+        output.extend(vec![1.5; count]);
+        of_all(&channels(&output, None)).map(|r| r.p_value)
+    };
+    let sizes = [120, 100, 90, 80, 70];
+    let all: Vec<f64> = sizes.iter().map(|n| p_value(*n).unwrap()).collect();
+    assert!(all.windows(2).all(|w| w[0] < w[1]), "{all:?}");
+    assert!(all[0] < 1e-30 && all[4] < 1e-4, "{all:?}");
+    assert_eq!(p_value(6), None);
+    // Where readings are as fine as the noise, three that agree are enough and two are not.
+    let fine = |count: usize| {
+        let mut random = Random::new(4);
+        let mut output: Vec<f64> = (0..100).map(|_| random.uniform()).collect();
+        output.extend(vec![1.01; count]);
+        of_all(&channels(&output, None)).map(|r| r.p_value)
+    };
+    assert_eq!(fine(2), None);
+    assert!(fine(3).unwrap() < 1e-4 && fine(4) < fine(3));
+}
+
+const ROWS: usize = 300;
+const NOISE_DPS: f64 = 0.05;
+
+/// Noise, then a hard clip; the share of the rows that it clips, and the noise of the held-out ones that it does not.
+fn closed(seed: u64, (low, high): (f64, f64), supply_dps: f64) -> (Closed, f64, f64) {
+    let mut random = Random::new(seed);
+    let degc = [triangle(ROWS / 2), triangle(ROWS / 2)].concat();
+    let rate: Vec<f64> = (0..ROWS).map(sine_dps).collect();
+    let supply: Vec<f64> = (0..ROWS)
+        .map(|k| f64::from(u8::from(k / 11 % 3 == 1)))
+        .collect();
+    let noise: Vec<f64> = (0..ROWS).map(|_| NOISE_DPS * random.normal()).collect();
+    let output: Vec<f64> = (0..ROWS)
+        .map(|k| {
+            let u = degc[k] / 35.0 - 1.0;
+            let total = rate[k] + 2.0 - 1.5 * u + 0.7 * u * u + supply_dps * supply[k];
+            (total + noise[k]).clamp(low, high)
+        })
+        .collect();
+    let stands: Vec<bool> = output.iter().map(|v| *v == low || *v == high).collect();
+    let mut record = synthetic::record("die_degc", &degc, &output);
+    record.columns.insert("rate_dps".to_owned(), rate);
+    record.columns.insert("supply_v".to_owned(), supply);
+    let design = reader::read(None).unwrap();
+    let closed = close(&record, Vec::new(), &design, "test", Effort::default()).unwrap();
+    let held = (0..ROWS).filter(|k| closed.split.heldout[*k]);
+    let squares: Vec<f64> = held
+        .map(|k| if stands[k] { 0.0 } else { noise[k].powi(2) })
+        .collect();
+    let due_dps = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+    let share = stands.iter().filter(|s| **s).count() as f64 / ROWS as f64;
+    (closed, share, due_dps)
+}
+
+/// The clip's step with its exact levels, said to be taken; as little is left as noise makes.
+fn is_told(closed: &Closed, (low, high): (f64, f64), due_dps: f64) {
+    let closure = &closed.closure;
+    let step = closure.steps.iter().find(|s| s.effect == EFFECT).unwrap();
+    for (name, due) in [("lower_dps", low), ("upper_dps", high)] {
+        let found = step.parameters.get(name);
+        assert_eq!(found.is_some(), due.is_finite(), "{step:?}");
+        assert!(found.is_none_or(|found| (found - due).abs() < 1e-12));
+    }
+    assert!(step.selection_frequency > 0.9, "{step:?}");
+    assert!(step.p_value < 1e-4, "{step:?}");
+    let told: Vec<Fate> = closure
+        .evidence
+        .iter()
+        .filter(|e| e.effect == EFFECT)
+        .map(|e| e.fate)
+        .collect();
+    assert_eq!(told, [Fate::Taken]);
+    let left = closure.after.heldout_rms;
+    assert!(left < 1.1 * due_dps, "{left} of {due_dps}");
+    assert!(closure.before.heldout_rms > 10.0 * left);
+}
+
+const EFFECT: &str = "output_saturation";
+const NONE: f64 = f64::INFINITY;
+
+#[test]
+fn a_hard_clip_after_the_noise_is_the_only_name_with_its_exact_levels() {
+    for (seed, limits, due_share) in [
+        (0, (-NONE, 76.111), 0.12),
+        (1, (-54.321, NONE), 0.25),
+        (2, (LOWER_DPS, UPPER_DPS), 0.35),
+        (3, (-62.7, 65.3), 0.4),
+    ] {
+        let (closed, share, due_dps) = closed(seed, limits, 0.0);
+        assert!((share - due_share).abs() < 0.04, "{seed}: {share}");
+        let steps = closed.closure.steps.iter();
+        let names: Vec<&str> = steps.map(|s| s.effect.as_str()).collect();
+        assert_eq!(names, [EFFECT], "{seed}");
+        is_told(&closed, limits, due_dps);
+    }
+}
+
+#[test]
+fn beside_a_hard_clip_another_effect_is_found() {
+    for (seed, limits) in [(0, (-NONE, 76.111)), (1, (LOWER_DPS, UPPER_DPS))] {
+        let (closed, _, due_dps) = closed(seed, limits, 0.4);
+        let steps = &closed.closure.steps;
+        let mut names: Vec<&str> = steps.iter().map(|s| s.effect.as_str()).collect();
+        names.sort_unstable();
+        assert_eq!(names, [EFFECT, "supply_sensitivity"], "{seed}");
+        is_told(&closed, limits, due_dps);
+    }
+}
+
+#[test]
+fn without_its_clip_a_record_is_fitted_over_all_its_rows() {
+    let (closed, ..) = closed(2, (LOWER_DPS, UPPER_DPS), 0.0);
+    let (c, split) = (&closed.channels, &closed.split);
+    let search = Search::new(c, split, Effort::default(), Vec::new());
+    let count = |rows: &[bool]| rows.iter().filter(|r| **r).count();
+    assert_eq!(search.train, split.train);
+    let stand = search.rails.as_ref().unwrap().rows.iter();
+    let at_rails = stand.zip(&split.train).filter(|(s, t)| **s && **t).count();
+    assert!(at_rails > 60);
+    assert_eq!(count(&search.used), count(&split.train) - at_rails);
+    // With every row at full weight.
+    let plainly = reml::Options {
+        robust: false,
+        ..search.options()
+    };
+    let fitted = |terms: &[Term]| {
+        let model = search.model_with(terms, &plainly).unwrap();
+        model.fit.problem.line.used()
+    };
+    assert_eq!(fitted(&[]), count(&split.train));
+    assert_eq!(fitted(&closed.after.terms), count(&search.used));
+    let residual = closed.before.residual(c);
+    let rows = residual.iter().zip(&split.train).filter(|(_, t)| **t);
+    let square: f64 = rows.map(|(r, _)| r * r).sum();
+    let due = (square / count(&split.train) as f64).sqrt();
+    let told = closed.closure.before.train_rms;
+    assert!((told / due - 1.0).abs() < 1e-9, "{told} for {due}");
+}
