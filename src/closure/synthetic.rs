@@ -1,5 +1,6 @@
 //! Records made for the tests, from seeds.
 
+use super::channels::Channels;
 use crate::design::{FitOptions, FitOrder};
 use crate::record::ThermalRecord;
 use std::collections::BTreeMap;
@@ -77,5 +78,94 @@ pub(crate) fn few(order: FitOrder) -> FitOptions {
     FitOptions {
         order,
         heldout_blocks: 2,
+    }
+}
+
+/// A gyro whose drive gain pulls the measured phase, its thermometer.
+pub(crate) struct Pull {
+    /// What the phase errs by per unit of the gain's power less one.
+    pub(crate) pull_rad: f64,
+    /// Of the gain: 1 or 2.
+    pub(crate) power: i32,
+    /// The error follows the bias curve's slope, as if every pull were small.
+    pub(crate) along_slope: bool,
+    /// Beside it.
+    pub(crate) supply_dps: f64,
+}
+
+/// Its record.
+pub(crate) struct Pulled {
+    pub(crate) channels: Channels,
+    /// The pull per unit of the gain's power less one, and the largest, in units of u.
+    pub(crate) pull_u: f64,
+    pub(crate) most_u: f64,
+    /// In the output.
+    pub(crate) noise_dps: Vec<f64>,
+}
+
+impl Default for Pull {
+    fn default() -> Self {
+        Pull {
+            pull_rad: 0.3,
+            power: 1,
+            along_slope: false,
+            supply_dps: 0.0,
+        }
+    }
+}
+
+impl Pull {
+    /// The bias, deg/s, over powers of the reading scaled to -1 ..= 1.
+    pub(crate) const BIAS_DPS: [f64; 3] = [8.0, -3.0, 1.0];
+
+    /// Two unequal heatings, over which the phase goes through 0.12 rad, with set points of the amplitude in turn.
+    pub(crate) fn made(&self) -> Pulled {
+        const ROWS: usize = 400;
+        let mut random = Random::new(4);
+        let degc = [triangle(100), triangle(300)].concat();
+        let agc: Vec<f64> = (0..ROWS)
+            .map(|k| [1.0, 1.15, 0.85, 1.3][k / 17 % 4])
+            .collect();
+        let by: Vec<f64> = agc.iter().map(|g| g.powi(self.power) - 1.0).collect();
+        let phase_rad: Vec<f64> = degc
+            .iter()
+            .zip(&by)
+            .map(|(t, d)| {
+                -std::f64::consts::FRAC_PI_2 - 0.06 * (t / 35.0 - 1.0) + self.pull_rad * d
+            })
+            .collect();
+        let (u, _, half_rad) = super::channels::scaled(&phase_rad);
+        let pull_u = self.pull_rad / half_rad;
+        let [b0, b1, b2] = Self::BIAS_DPS;
+        let bias = |u: f64| b0 + b1 * u + b2 * u * u;
+        let slope = |u: f64| b1 + 2.0 * b2 * u;
+        let supply: Vec<f64> = (0..ROWS)
+            .map(|k| f64::from(u8::from(k % 90 < 40)))
+            .collect();
+        let noise_dps: Vec<f64> = (0..ROWS).map(|_| 0.01 * random.normal()).collect();
+        let output = (0..ROWS).map(|k| {
+            let moved = pull_u * by[k];
+            let pulled = match self.along_slope {
+                true => bias(u[k]) - slope(u[k]) * moved,
+                false => bias(u[k] - moved),
+            };
+            pulled + self.supply_dps * supply[k] + noise_dps[k]
+        });
+        let columns = BTreeMap::from([
+            ("rate_out_dps".to_owned(), output.collect()),
+            ("phase_rad".to_owned(), phase_rad),
+            ("agc".to_owned(), agc),
+            ("supply_v".to_owned(), supply),
+        ]);
+        let time_s: Vec<f64> = (0..ROWS).map(|k| 10.0 * k as f64).collect();
+        let degc_of = |rad: f64| 35.0 - (rad + std::f64::consts::FRAC_PI_2) * 35.0 / 0.06;
+        let channels = Channels::new(&time_s, &columns, "phase_rad", degc_of).unwrap();
+        let most = by.iter().fold(0.0, |m: f64, d| m.max(d.abs()));
+        Pulled {
+            channels,
+            pull_u,
+            most_u: pull_u * most,
+            noise_dps,
+        }
     }
 }

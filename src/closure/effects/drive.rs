@@ -227,23 +227,5 @@ fn without_temperature(g: &[f64], u: &[f64]) -> Vec<f64> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn less_q_does_not_bend_the_phase_back() {
-        for (form, beta, admitted) in [
-            (0, vec![-3.0], true),
-            (1, vec![0.9], true),
-            (1, vec![-0.9], false),
-            (2, vec![-3.0, 0.9], true),
-            (2, vec![3.0, -0.9], false),
-        ] {
-            assert_eq!(
-                Damping.admits(&Point::form(form), &beta),
-                admitted,
-                "{form}"
-            );
-        }
-    }
-}
+#[path = "drive_tests.rs"]
+mod tests;

@@ -118,59 +118,67 @@ pub(super) fn settled(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::closure::channels::lag;
     use crate::closure::search::{Effort, Search};
-    use crate::closure::synthetic::{Random, triangle};
-    use std::collections::BTreeMap;
+    use crate::closure::synthetic::Pull;
 
-    const BIAS: [f64; 3] = [8.0, -3.0, 1.0];
-    const TAU_S: f64 = 60.0;
-
-    /// Two unequal heatings; `share` of the bias behind, `supply_dps` of a supply that goes with the time.
-    fn channels(share: f64, supply_dps: f64) -> Channels {
-        let mut random = Random::new(4);
-        let time_s: Vec<f64> = (0..400).map(f64::from).collect();
-        let degc = [triangle(100), triangle(300)].concat();
-        let bias = |degc: &f64| {
-            let u = degc / 35.0 - 1.0;
-            BIAS[0] + BIAS[1] * u + BIAS[2] * u * u
+    /// How far the bias is from the true one, without the pull and beside it; `sized`: the shape has its size in it.
+    fn off(pull: &Pull, sized: bool) -> (f64, f64) {
+        let pulled = pull.made();
+        let c = &pulled.channels;
+        let search = Search::new(c, &c.split().unwrap(), Effort::default(), Vec::new());
+        let mut all = search.candidates().iter();
+        let candidate = all.find(|k| k.id() == "amplitude_phase_coupling").unwrap();
+        let form = pull.power as usize - 1;
+        let point = match sized {
+            true => Point::at(form, &[pulled.most_u]),
+            false => Point::form(form),
         };
-        let now: Vec<f64> = degc.iter().map(bias).collect();
-        let late = lag(&time_s, &now, TAU_S);
-        let supply: Vec<f64> = (0..400).map(|k| f64::from(u8::from(k % 90 < 40))).collect();
-        let output = (0..400).map(|k| {
-            now[k] + share * (now[k] - late[k]) + supply_dps * supply[k] + 0.01 * random.normal()
-        });
-        let columns = BTreeMap::from([
-            ("rate_out_dps".to_owned(), output.collect()),
-            ("die_degc".to_owned(), degc.clone()),
-            ("supply_v".to_owned(), supply),
-        ]);
-        Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap()
+        assert_eq!(candidate.is_sized(&point), sized);
+        let free = [c.column("supply_v").unwrap().to_vec()];
+        let off = |bias: &[f64]| {
+            let pairs = bias.iter().zip(Pull::BIAS_DPS);
+            pairs.fold(0.0, |m: f64, (b, due)| m.max((b - due).abs()))
+        };
+        let start = search.model(&[]).unwrap().bias.coefficients_dps;
+        let acting = [(candidate.as_ref(), &point)];
+        let data = (c.error_dps.as_slice(), [1.0; 400].as_slice());
+        let found = settled(c, data, &start, &acting, &free);
+        (off(&start), off(&found))
     }
 
     #[test]
-    fn the_bias_beside_a_lag_larger_than_itself_is_the_true_one() {
-        for (share, supply_dps) in [(0.3, 0.0), (1.7, 0.5), (4.0, 0.5)] {
-            let c = channels(share, supply_dps);
-            let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
-            let is_lag = |k: &&std::sync::Arc<dyn Candidate>| k.id() == "thermal_lag";
-            let candidate = search.candidates().iter().find(is_lag).unwrap();
-            let point = Point::at(0, &[TAU_S.ln()]);
-            let free = [c.column("supply_v").unwrap().to_vec()];
-            let off = |bias: &[f64]| {
-                let pairs = bias.iter().zip(BIAS);
-                // The supply may be anywhere: its mean is the constant's.
-                pairs
-                    .skip(1)
-                    .fold(0.0, |m: f64, (b, due)| m.max((b - due).abs()))
+    fn the_bias_beside_a_pull_along_its_slope_is_the_true_one() {
+        for (pull_rad, power, supply_dps) in [(0.05, 1, 0.0), (-0.05, 2, 0.5), (0.15, 1, 0.5)] {
+            let pull = Pull {
+                pull_rad,
+                power,
+                supply_dps,
+                along_slope: true,
             };
-            let start = search.model(&[]).unwrap().bias.coefficients_dps;
-            let acting = [(candidate.as_ref(), &point)];
-            let found = settled(&c, (&c.error_dps, &[1.0; 400]), &start, &acting, &free);
-            let (before, after) = (off(&start), off(&found));
-            assert!(after < 0.02 * (1.0 + share.abs()), "{share}: {after}");
-            assert!(before > 10.0 * after, "{share}: {before} before, {after}");
+            let (before, after) = off(&pull, false);
+            assert!(after < 0.02, "{pull_rad}: {after}");
+            assert!(
+                before > 10.0 * after,
+                "{pull_rad}: {before} before, {after}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_bias_beside_a_large_pull_of_known_size_is_the_true_one() {
+        for (pull_rad, power, supply_dps) in [(0.1, 1, 0.0), (0.3, 2, 0.5), (-0.3, 2, 0.5)] {
+            let pull = Pull {
+                pull_rad,
+                power,
+                supply_dps,
+                along_slope: false,
+            };
+            let (before, after) = off(&pull, true);
+            assert!(after < 0.02, "{pull_rad}: {after}");
+            assert!(
+                before > 20.0 * after,
+                "{pull_rad}: {before} before, {after}"
+            );
         }
     }
 }

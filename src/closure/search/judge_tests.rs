@@ -1,49 +1,45 @@
 //! The declared bias beside an effect that acts on it.
 
 use super::*;
-use crate::closure::channels::lag;
 use crate::closure::search::Effort;
-use crate::closure::synthetic::{Random, triangle};
-use std::collections::BTreeMap;
+use crate::closure::synthetic::Pull;
 
-/// deg/s, in the thermometer scaled to -1 ..= 1.
-const BIAS: [f64; 3] = [8.0, -3.0, 1.0];
-const TAU_S: f64 = 300.0;
-/// Of the bias, behind.
-const SHARE: f64 = 0.6;
-
-#[test]
-fn the_bias_beside_a_strong_lag_is_the_true_one() {
-    let mut random = Random::new(4);
-    let time_s: Vec<f64> = (0..400).map(|k| 10.0 * k as f64).collect();
-    let degc = [triangle(100), triangle(300)].concat();
-    let bias = |degc: &f64| {
-        let u = degc / 35.0 - 1.0;
-        BIAS[0] + BIAS[1] * u + BIAS[2] * u * u
-    };
-    let now: Vec<f64> = degc.iter().map(bias).collect();
-    let late = lag(&time_s, &now, TAU_S);
-    let output = now.iter().zip(&late);
-    let output = output.map(|(now, late)| now + SHARE * (now - late) + 0.01 * random.normal());
-    let columns = BTreeMap::from([
-        ("rate_out_dps".to_owned(), output.collect()),
-        ("die_degc".to_owned(), degc.clone()),
-    ]);
-    let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
-    let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
-    let is_it = |c: &&Arc<dyn Candidate>| c.id() == "thermal_lag";
+/// How far the bias is from the true one without the pull and beside it, and the pull's coefficient.
+fn beside(pull: &Pull, sized: bool) -> (f64, f64, f64) {
+    let pulled = pull.made();
+    let c = &pulled.channels;
+    let search = Search::new(c, &c.split().unwrap(), Effort::default(), Vec::new());
+    let is_it = |c: &&Arc<dyn Candidate>| c.id() == "amplitude_phase_coupling";
     let candidate = search.candidates().iter().find(is_it).unwrap();
     let model = search.model(&[]).unwrap();
-    let point = Point::at(0, &[TAU_S.ln()]);
+    let form = pull.power as usize - 1;
+    let (point, due) = match sized {
+        true => (Point::at(form, &[pulled.most_u]), 1.0),
+        false => (Point::form(form), pulled.pull_u),
+    };
     let off = |bias: &Bias| {
-        let pairs = bias.coefficients_dps.iter().zip(BIAS);
+        let pairs = bias.coefficients_dps.iter().zip(Pull::BIAS_DPS);
         pairs.fold(0.0, |m: f64, (b, due)| m.max((b - due).abs()))
     };
-    let (beside, own) = search.bias_beside(&model, candidate.as_ref(), &point);
-    let (alone, found) = (off(&model.bias), off(&beside));
-    assert!(
-        alone > 0.1 && found < 0.1 * alone,
-        "{alone} alone, {found} beside"
-    );
-    assert!((own[0] - SHARE).abs() < 0.05, "{own:?}");
+    let (found, own) = search.bias_beside(&model, candidate.as_ref(), &point);
+    assert_eq!(own.len(), 1);
+    (off(&model.bias), off(&found), own[0] / due)
+}
+
+#[test]
+fn the_bias_beside_a_strong_pull_is_the_true_one() {
+    for along_slope in [true, false] {
+        let pull = Pull {
+            pull_rad: 0.2,
+            power: 2,
+            along_slope,
+            ..Pull::default()
+        };
+        let (alone, found, share) = beside(&pull, !along_slope);
+        assert!(
+            alone > 0.1 && found < 0.1 * alone,
+            "{along_slope}: {alone} alone, {found} beside"
+        );
+        assert!((share - 1.0).abs() < 0.02, "{along_slope}: {share}");
+    }
 }
