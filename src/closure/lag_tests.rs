@@ -4,6 +4,7 @@ use super::channels::lag;
 use super::close::{Closed, close};
 use super::search::{Effort, Search};
 use super::synthetic::{self, Random, triangle};
+use super::verdict::Step;
 use crate::correction::Term;
 use crate::design::reader;
 use std::ops::Range;
@@ -11,23 +12,32 @@ use std::ops::Range;
 const ROWS: usize = 600;
 const TAU_S: f64 = 60.0;
 
-/// deg/s at a temperature, degC.
-fn bias_dps(degc: f64) -> f64 {
+/// A part of the bias: deg/s, and deg/s per unit of u and of its square.
+type Curve = [f64; 3];
+
+const BIAS: Curve = [8.0, -3.0, 1.0];
+
+fn at(curve: Curve, degc: f64) -> f64 {
     let u = degc / 35.0 - 1.0;
-    8.0 - 3.0 * u + 1.0 * u * u
+    curve[0] + curve[1] * u + curve[2] * u * u
 }
 
-/// Four heatings, `share` of the bias follows with its lag; noise of 0.01 deg/s, no power in these rows.
-fn closed(share: f64, without_power: &[Range<usize>]) -> Closed {
+/// A share of the whole bias.
+fn of_bias(share: f64) -> Curve {
+    BIAS.map(|b| share * b)
+}
+
+/// Four heatings; `late` is a part of the bias that follows a temperature which lags; noise of 0.01 deg/s, no power
+/// in these rows.
+fn closed(late: Curve, without_power: &[Range<usize>]) -> Closed {
     let mut random = Random::new(8);
     let degc: Vec<f64> = [triangle(ROWS / 4), triangle(ROWS / 4)].concat().repeat(2);
     let time_s: Vec<f64> = (0..ROWS).map(|k| k as f64).collect();
-    let now: Vec<f64> = degc.iter().map(|t| bias_dps(*t)).collect();
-    let late = lag(&time_s, &now, TAU_S);
-    let output: Vec<f64> = now
+    let behind = lag(&time_s, &degc, TAU_S);
+    let output: Vec<f64> = degc
         .iter()
-        .zip(&late)
-        .map(|(now, late)| now + share * (now - late) + 0.01 * random.normal())
+        .zip(&behind)
+        .map(|(t, l)| at(BIAS, *t) + at(late, *t) - at(late, *l) + 0.01 * random.normal())
         .collect();
     let mut record = synthetic::record("die_degc", &degc, &output);
     if !without_power.is_empty() {
@@ -66,14 +76,66 @@ fn lags(closed: &Closed) -> Vec<bool> {
     plan.terms.iter().filter_map(kept).collect()
 }
 
+/// The only step, which has to be this one.
+fn only(closed: &Closed) -> &Step {
+    let steps = closed.closure.steps.iter();
+    let names: Vec<&str> = steps.map(|s| s.effect.as_str()).collect();
+    assert_eq!(names, ["thermal_lag"]);
+    &closed.closure.steps[0]
+}
+
+/// Whether a parameter is what it is due to be, with its unit per K and a share that it may be off.
+fn is(step: &Step, name: &str, due: f64, off: f64) {
+    let found = step.parameters[name];
+    assert!((found / due - 1.0).abs() < off, "{name}: {found} for {due}");
+}
+
 #[test]
-fn a_lag_of_nearly_the_whole_bias_is_the_same_in_firmware_and_its_gain_is_looked_at() {
-    let closed = closed(0.9, &[]);
-    let step = &closed.closure.steps[0];
-    assert_eq!(step.effect, "thermal_lag");
-    assert!(step.parameters.contains_key("share_of_bias"), "{step:?}");
-    let ratio = firmware_over_float(&closed);
-    assert!(ratio < 1.02, "{ratio}");
+fn what_lags_with_a_curve_has_a_gain_and_a_curvature_and_one_time_constant() {
+    for late in [of_bias(0.9), [0.0, -2.0, -1.5], [0.0, 0.4, 2.5]] {
+        let closed = closed(late, &[]);
+        let step = only(&closed);
+        is(step, "tau_s", TAU_S, 0.05);
+        // In the middle of the readings.
+        let u = closed.channels.middle_degc / 35.0 - 1.0;
+        let due = (late[1] + 2.0 * late[2] * u) / 35.0;
+        is(step, "gain_dps_per_k", due, 0.05);
+        is(step, "curvature_dps_per_k2", late[2] / 35f64.powi(2), 0.05);
+        let left = closed.closure.after.heldout_rms;
+        assert!(left < 0.011, "{late:?}: {left}");
+    }
+}
+
+#[test]
+fn what_lags_in_proportion_has_no_curvature() {
+    for gain_dps in [-2.0, 0.3] {
+        let closed = closed([0.0, gain_dps, 0.0], &[]);
+        let step = only(&closed);
+        is(step, "tau_s", TAU_S, 0.05);
+        is(step, "gain_dps_per_k", gain_dps / 35.0, 0.05);
+        assert!(
+            !step.parameters.contains_key("curvature_dps_per_k2"),
+            "{step:?}"
+        );
+        assert!(firmware_over_float(&closed) < 1.02);
+    }
+}
+
+#[test]
+fn firmware_bends_the_lagging_temperature_and_does_not_delay_the_curve() {
+    for late in [of_bias(0.9), [0.0, 0.4, 2.5]] {
+        let closed = closed(late, &[]);
+        let ratio = firmware_over_float(&closed);
+        assert!(ratio < 1.02, "{late:?}: {ratio}");
+        let plan = &closed.correction.as_ref().unwrap().plan;
+        let mut terms = plan.terms.iter();
+        assert!(terms.any(|t| matches!(t, Term::CurveOfLag { .. })));
+    }
+}
+
+#[test]
+fn the_gain_of_a_lag_of_nearly_the_whole_bias_is_looked_at() {
+    let closed = closed(of_bias(0.9), &[]);
     let effort = Effort::default();
     let search = Search::new(&closed.channels, &closed.split, effort, Vec::new());
     let constancy = search.constancy(&closed.after, &closed.after.terms[0]);
@@ -83,10 +145,8 @@ fn a_lag_of_nearly_the_whole_bias_is_the_same_in_firmware_and_its_gain_is_looked
 #[test]
 fn a_lag_larger_than_the_bias_is_the_only_name() {
     for share in [1.7, 4.0] {
-        let closed = closed(share, &[]);
-        let steps = closed.closure.steps.iter();
-        let names: Vec<&str> = steps.map(|s| s.effect.as_str()).collect();
-        assert_eq!(names, ["thermal_lag"], "{share}");
+        let closed = closed(of_bias(share), &[]);
+        only(&closed);
         // Noise of 0.01.
         let left = closed.closure.after.heldout_rms;
         assert!(left < 0.015, "{share}: {left}");
@@ -101,7 +161,7 @@ fn a_lag_that_restarts_do_not_interrupt_keeps_its_state_over_them() {
         [160..160, 300..300, 470..470],
         [160..190, 305..365, 470..475],
     ] {
-        let closed = closed(0.3, &off);
+        let closed = closed(of_bias(0.3), &off);
         assert_eq!(closed.closure.steps[0].effect, "thermal_lag");
         let kept = lags(&closed);
         assert!(!kept.is_empty() && kept.iter().all(|k| *k), "{kept:?}");
@@ -114,7 +174,7 @@ fn a_lag_that_restarts_do_not_interrupt_keeps_its_state_over_them() {
 
 #[test]
 fn without_restarts_nothing_has_to_be_kept() {
-    let closed = closed(0.3, &[]);
+    let closed = closed(of_bias(0.3), &[]);
     assert!(lags(&closed).iter().all(|kept| !kept));
     let mut said = closed.closure.warnings.iter();
     assert!(said.all(|w| w.code != "firmware_needs_clock"));

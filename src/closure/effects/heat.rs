@@ -355,3 +355,7 @@ impl Candidate for Ageing {
         .collect()
     }
 }
+
+#[cfg(test)]
+#[path = "heat_tests.rs"]
+mod tests;
