@@ -493,3 +493,7 @@ fn limits(point: &Point) -> (f64, f64) {
         _ => (f64::NEG_INFINITY, f64::INFINITY),
     }
 }
+
+#[cfg(test)]
+#[path = "rate_tests.rs"]
+mod tests;

@@ -1,10 +1,13 @@
 //! A bias that steps at a temperature, closed: where the firmware's relay switches.
 
+use crate::closure::channels::Channels;
 use crate::closure::close::close;
-use crate::closure::search::Effort;
+use crate::closure::effects::Reported;
+use crate::closure::search::{Effort, Search};
 use crate::closure::synthetic::{self, Random};
 use crate::correction::Term;
 use crate::design::reader;
+use std::collections::BTreeMap;
 
 /// Held-out error of the firmware over the model's, and the relay's centre (degC) and gap (K): stairs of 5 K, up and
 /// down twice, each of twelve rows and one on the way to the next, 3.3 K up or 1.4 K down; the bias is 0.4 deg/s higher above `at_degc`; noise of
@@ -72,4 +75,54 @@ fn the_relay_switches_where_the_readings_are_and_not_where_their_smooth_course_i
 fn a_relay_at_a_noisy_stair_does_not_chatter() {
     let (ratio, centre, gap) = relayed(34.9, 0.15);
     assert!(ratio < 1.1, "{ratio}, {centre} degC, {gap} K");
+}
+
+/// Parameters of a step of 0.4 deg/s, the only name; from `least_degc` up and down to 42 degC three times
+/// and to 70 four times: the bias goes up at 45 and comes back at 25, if it gets there.
+fn stepped(seed: u64, least_degc: f64) -> Reported {
+    let mut random = Random::new(seed);
+    let rows = 420;
+    let mut up = false;
+    let degc: Vec<f64> = (0..rows)
+        .map(|k| {
+            let way = (k % 60) as f64 / 30.0;
+            let most_degc = if k < 180 { 42.0 } else { 70.0 };
+            least_degc + (most_degc - least_degc) * way.min(2.0 - way)
+        })
+        .collect();
+    let output = degc.iter().map(|t| {
+        up = *t > 45.0 || up && *t > 25.0;
+        2.0 - 0.05 * t + if up { 0.4 } else { 0.0 } + 0.01 * random.normal()
+    });
+    let columns = BTreeMap::from([
+        ("rate_out_dps".to_owned(), output.collect()),
+        ("die_degc".to_owned(), degc.clone()),
+    ]);
+    let time_s: Vec<f64> = (0..rows).map(|k| 10.0 * k as f64).collect();
+    let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+    let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+    let found = search.run().unwrap();
+    let names: Vec<String> = found.terms.iter().map(|t| t.id()).collect();
+    assert_eq!(names, ["stress_jump"], "{seed}, {least_degc}");
+    let estimate = search.estimates(&search.model(&found.terms).unwrap());
+    found.terms[0].candidate.report(&c, &estimate[0])
+}
+
+#[test]
+fn of_a_step_once_and_a_hysteresis_that_do_equally_well_the_law_is_taken() {
+    for seed in 0..3 {
+        // Never below 30 degC again: whether it would have come back nothing says.
+        let open = stepped(seed, 30.0);
+        assert!(!open.contains_key("returns"), "{seed}: {open:?}");
+        let (centre, gap) = (open["centre_degc"].0, open["gap_k"].0);
+        let (up, down) = (centre + 0.5 * gap, centre - 0.5 * gap);
+        assert!(
+            (43.0..47.0).contains(&up) && down < 30.5,
+            "{seed}: {open:?}"
+        );
+        // It came back.
+        let shown = stepped(seed, 10.0);
+        let gap = shown["gap_k"].0;
+        assert!((18.0..22.0).contains(&gap), "{seed}: {shown:?}");
+    }
 }

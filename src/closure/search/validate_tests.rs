@@ -179,3 +179,52 @@ fn a_law_takes_a_names_place_if_it_is_as_good_or_beyond_chance_by_itself() {
         assert_eq!(law, expected, "{of_supply}, {of_step}");
     }
 }
+
+#[test]
+fn a_dropped_name_leaves_something_if_it_was_beyond_what_chance_makes() {
+    let supply: Vec<f64> = (0..ROWS)
+        .map(|k| f64::from(u8::from(k / 11 % 3 == 1)))
+        .collect();
+    let degc = [triangle(ROWS / 2), triangle(ROWS / 2)].concat();
+    let time_s: Vec<f64> = (0..ROWS).map(|k| 10.0 * k as f64).collect();
+    let channels = |of_supply: &dyn Fn(usize) -> f64| {
+        let mut random = Random::new(21);
+        let output = (0..ROWS).map(|k| 0.3 + 0.01 * (of_supply(k) * supply[k] + random.normal()));
+        let columns = BTreeMap::from([
+            ("rate_out_dps".to_owned(), output.collect()),
+            ("supply_v".to_owned(), supply.clone()),
+            ("die_degc".to_owned(), degc.clone()),
+        ]);
+        Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap()
+    };
+    // The held-out rows have it the other way round.
+    let held = channels(&|_| 0.0).split().unwrap().heldout;
+    let c = channels(&|k| if held[k] { -4.0 } else { 4.0 });
+    let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+    let is_it = |c: &&Arc<dyn Candidate>| c.id() == "supply_sensitivity";
+    let candidate = search.candidates().iter().find(is_it).unwrap();
+    for (p_value, before, after) in [
+        (2.0 * BEYOND, None, None),
+        (2.0 * BEYOND, Some("accel_g"), Some("accel_g")),
+        (0.5 * BEYOND, None, Some("supply_v")),
+        (0.5 * BEYOND, Some("accel_g"), Some("accel_g")),
+    ] {
+        let mut found = Found {
+            terms: Vec::new(),
+            strangers: Vec::new(),
+            left: before.map(str::to_owned),
+            first: Vec::new(),
+            missing: Vec::new(),
+            undecided: Vec::new(),
+            within_rounding: Vec::new(),
+        };
+        let term = Term {
+            p_value,
+            ..Term::new(candidate.clone(), candidate.points(&c).remove(0))
+        };
+        let model = search.model(std::slice::from_ref(&term)).unwrap();
+        let model = search.validated(model, &mut found).unwrap();
+        assert!(model.terms.is_empty());
+        assert_eq!(found.left.as_deref(), after, "{p_value}, {before:?}");
+    }
+}
