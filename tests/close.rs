@@ -108,3 +108,15 @@ fn the_default_gyro_hides_a_mode_crossing() {
     assert!(after < 0.1 * before, "{before} -> {after}");
     assert_eq!(value["residual_structure"]["left"], false, "{value}");
 }
+
+#[test]
+fn a_step_among_other_causes_is_no_resonance() {
+    // Their first steps lead to a narrow resonance in the step's place, beside which nothing else is found.
+    let seeds = [4_700_023, 4_700_050];
+    let scenarios = seeds.map(|seed| Scenario::drawn(Class::Triple, seed));
+    for mark in tally::run(&scenarios, answer) {
+        assert!(mark.planted.contains("stress_jump"), "{}", mark.planted);
+        let all = (mark.found, mark.named, mark.rightly);
+        assert_eq!(all, (3, 3, 3), "{}: {}", mark.planted, mark.answered);
+    }
+}

@@ -7,9 +7,10 @@
 use super::channels::Channels;
 use crate::record::stats;
 
-/// Fewest readings at a rail, and how much oftener they come than any other reading (but the opposite rail's).
+/// Fewest readings at a rail where no other reading (but the opposite rail's) comes twice, and how many more for each
+/// time that one does.
 const FEWEST: usize = 3;
-const OFTENER: usize = 3;
+const OFTENER: usize = 4;
 
 /// Share of the rows that may lie beyond a rail: what was added to the output later.
 const BEYOND: f64 = 0.02;
@@ -111,7 +112,7 @@ fn rail(readings: &[Reading], resolution: f64) -> Option<(f64, f64)> {
         }
     }
     let (k, (level, count)) = best?;
-    if count < FEWEST.max(OFTENER * usual) {
+    if count < FEWEST + OFTENER * (usual - 1) {
         return None;
     }
     let mut within = 0;

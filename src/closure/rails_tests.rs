@@ -174,7 +174,7 @@ fn the_fewer_readings_agree_the_less_certain_is_a_rail() {
         output.extend(vec![1.5; count]);
         of_all(&channels(&output, None)).map(|r| r.p_value)
     };
-    let sizes = [120, 100, 90, 80, 70];
+    let sizes = [160, 145, 130, 115, 100];
     let all: Vec<f64> = sizes.iter().map(|n| p_value(*n).unwrap()).collect();
     assert!(all.windows(2).all(|w| w[0] < w[1]), "{all:?}");
     assert!(all[0] < 1e-30 && all[4] < 1e-4, "{all:?}");
