@@ -37,6 +37,13 @@ pub struct Rails {
     pub p_value: f64,
 }
 
+impl Rails {
+    /// Whether a clip that adds so much, deg/s, is at a rail.
+    pub fn is_at(&self, by_dps: f64) -> bool {
+        by_dps < 0.0 && self.upper_dps.is_some() || by_dps > 0.0 && self.lower_dps.is_some()
+    }
+}
+
 /// A reading and how many rows have it.
 type Reading = (f64, usize);
 

@@ -308,3 +308,29 @@ fn without_its_clip_a_record_is_fitted_over_all_its_rows() {
     let told = closed.closure.before.train_rms;
     assert!((told / due - 1.0).abs() < 1e-9, "{told} for {due}");
 }
+
+#[test]
+fn a_level_before_the_noise_is_found_opposite_to_a_rail() {
+    // A rate table: above, the word ends; below, an amplifier, whose level has the noise on it.
+    let mut random = Random::new(8);
+    let rate = |k: usize| [0.0, 60.0, -60.0, 100.0, -100.0, 140.0, -160.0][k / 3 % 7];
+    let output: Vec<f64> = (0..210)
+        .map(|k| (f64::max(rate(k) + 1.0, -120.0) + 0.02 * random.normal()).min(121.0))
+        .collect();
+    let rates: Vec<f64> = (0..210).map(rate).collect();
+    let c = channels(&output, Some(&rates));
+    let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+    assert_eq!(search.rails.as_ref().unwrap().lower_dps, None);
+    let found = search.run().unwrap();
+    let names: Vec<String> = found.terms.iter().map(|t| t.id()).collect();
+    assert_eq!(names, ["output_saturation"]);
+    let levels = &found.terms[0].point.theta;
+    assert!(
+        levels[0] == 121.0 && (levels[1] + 120.0).abs() < 0.01,
+        "{levels:?}"
+    );
+    let model = search.model(&found.terms).unwrap();
+    let residual = model.residual(&c);
+    let worst = residual.iter().fold(0.0, |m: f64, r| m.max(r.abs()));
+    assert!(worst < 0.1, "{worst}");
+}

@@ -3,9 +3,7 @@
 use super::judge::{Judged, Round};
 use super::memo::Memo;
 use super::{Found, LEVEL, MOST_RIVALS, Model, Search, Term};
-use crate::closure::effects::{Candidate, Point};
 use crate::closure::likelihood::{Unusable, reml};
-use std::sync::Arc;
 
 /// By how much net gain a shape without a name has to be better than the best name.
 const STRANGER: f64 = 6.0;
@@ -55,7 +53,7 @@ impl Search<'_> {
             undecided: Vec::new(),
             within_rounding: Vec::new(),
         };
-        let mut model = self.model(&self.evident())?;
+        let mut model = self.beginning()?;
         for _ in 0..ROUNDS {
             model = self.forward(model, &mut found, names_only)?;
             if let Some(stranger) = model.terms.iter().find(|t| !t.candidate.named())
@@ -89,21 +87,6 @@ impl Search<'_> {
         }
         self.kept_alone(&mut found)?;
         Ok((found, reached))
-    }
-
-    /// What is in the record before anything is fitted: a clip at its rails.
-    fn evident(&self) -> Vec<Term> {
-        let Some(rails) = &self.rails else {
-            return Vec::new();
-        };
-        let clip = self.candidates.iter().find(|c| c.is_last());
-        let clip = clip.and_then(|c| Some((c, c.at_levels(rails.lower_dps, rails.upper_dps)?)));
-        let term = |(candidate, point): (&Arc<dyn Candidate>, Point)| Term {
-            p_value: rails.p_value,
-            evident: true,
-            ..Term::new(candidate.clone(), point)
-        };
-        clip.map(term).into_iter().collect()
     }
 
     /// Steps until nothing is called for, or, with `names_only`, a shape without a name.

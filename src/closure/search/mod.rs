@@ -8,8 +8,10 @@
 //! held-out rows ([`heldout`]). Where a shape without a name wins, it is kept as what is left.
 
 mod acting;
+mod clip;
 pub mod constancy;
 pub mod estimate;
+mod evident;
 pub mod forward;
 pub mod halves;
 pub mod heldout;
@@ -33,6 +35,7 @@ use super::likelihood::blocks::Split;
 use super::likelihood::linear::{Basis, add_scaled, dot};
 use super::likelihood::reml::{self, Fit};
 use super::rails::{self, Rails};
+use clip::{Kind, clip};
 use judge::{Judged, Round};
 use memo::Memo;
 use std::cell::RefCell;
@@ -357,7 +360,7 @@ impl<'a> Search<'a> {
         let c = self.channels;
         // Rows at a rail are left out where the clip is in the model.
         let railed = terms.iter().any(|t| t.evident);
-        let used = if railed { &self.used } else { &self.train };
+        let used = [&self.train, &self.used][usize::from(railed)];
         let mut columns = declared(c);
         let order = columns.len();
         let mut kinds = vec![Kind::Free; order];
@@ -376,8 +379,9 @@ impl<'a> Search<'a> {
             }
         }
         let unclipped = columns.clone();
-        // Where the rails are known, a fitted row is not clipped, whatever the model says.
-        let spared = railed.then_some(used.as_slice());
+        // A fitted row is not clipped at a rail, whatever the model says.
+        let rails = self.rails.as_ref().filter(|_| railed);
+        let spared = |row: usize, by_dps| used[row] && rails.is_some_and(|r| r.is_at(by_dps));
         let clipped = clip(c, acting, (&mut columns, &kinds), spared);
         let mut y = c.error_dps.clone();
         let mut free = Vec::new();
@@ -478,51 +482,6 @@ impl Model {
         };
         self.terms.iter().map(own).collect()
     }
-}
-
-/// How a column enters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    /// With a coefficient of its own.
-    Free,
-    /// As it is.
-    Whole,
-    /// As it is, after all others: where it is not 0, it alone says what the output is.
-    Last,
-}
-
-/// Puts clips after all other columns: in rows that are clipped these vanish, and the clip's own
-/// column is the whole error, limit less applied rate, instead of its distance from a total that
-/// depends on the very coefficients that are sought. `spared` rows are not. 1 for each clipped row.
-fn clip(
-    c: &Channels,
-    bias: &Bias,
-    (columns, kinds): (&mut [Vec<f64>], &[Kind]),
-    spared: Option<&[bool]>,
-) -> Vec<f64> {
-    let mut clipped = vec![0.0; c.len()];
-    for k in 0..columns.len() {
-        if kinds[k] != Kind::Last {
-            continue;
-        }
-        for i in 0..c.len() {
-            if columns[k][i] == 0.0 {
-                continue;
-            }
-            if spared.is_some_and(|rows| rows[i]) {
-                columns[k][i] = 0.0;
-                continue;
-            }
-            let others = bias.others_dps.get(i).copied().unwrap_or(0.0);
-            let whole = columns[k][i] + bias.at(c.u[i]) + others;
-            for column in columns.iter_mut() {
-                column[i] = 0.0;
-            }
-            columns[k][i] = whole;
-            clipped[i] = 1.0;
-        }
-    }
-    clipped
 }
 
 /// Weighted least squares; rows of weight 0 may hold anything.
