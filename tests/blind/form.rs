@@ -127,16 +127,15 @@ pub fn plant(
                     .map(|(p, u)| w.bias_at(*p) - w.bias_at(p + k * u))
                     .collect()
             };
+            // The unit of a bend is that of Q itself: physics gives its sign.
+            let bends = parameters.iter().any(|p| p.0 == "bends_phase");
+            let sign = if bends { sign.abs() } else { sign };
             let largest = sign * 0.3 / unit.iter().map(|u| u.abs()).fold(1e-12, f64::max);
             let k = largest
                 * reach(target_rms, |s| {
                     measure(w, &shift(s * largest), Some((&unit, s * largest)))
                 })?;
             let c = shift(k);
-            if parameters.iter().any(|p| p.0 == "bends_phase") && !(0.3..=3.0).contains(&k) {
-                // The unit is Q's own bend: physics gives its sign and, but for what Q is known by, its size.
-                return None;
-            }
             w.pull.iter_mut().zip(&unit).for_each(|(a, b)| *a += k * b);
             parameters.push(("pull_rad", k));
             c
