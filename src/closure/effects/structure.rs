@@ -105,6 +105,15 @@ const MODE_CROSSING: Sheet = Sheet {
 /// Widths of crossings that are tried, in u.
 const WIDTHS: [f64; 5] = [0.03, 0.06, 0.12, 0.22, 0.4];
 
+/// The widest crossing, in u: of a wider one the record (-1..1) does not show both flanks, and what fits is any bend.
+const WIDEST: f64 = 0.6;
+
+/// Centre and half width of a crossing, in u: within the record.
+fn crossing(point: &Point) -> (f64, f64) {
+    let (centre, width) = (point.theta[0], point.theta[1].exp());
+    (centre.clamp(-1.0, 1.0), width.min(WIDEST))
+}
+
 impl Candidate for ModeCrossing {
     fn sheet(&self) -> &Sheet {
         &MODE_CROSSING
@@ -127,7 +136,7 @@ impl Candidate for ModeCrossing {
     }
 
     fn columns(&self, c: &Channels, _bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
-        let (centre, width) = (point.theta[0], point.theta[1].exp());
+        let (centre, width) = crossing(point);
         let at = |u: f64| (u - centre) / width;
         vec![
             map(&c.u, |u| 1.0 / (1.0 + at(u).powi(2))),
@@ -136,7 +145,7 @@ impl Candidate for ModeCrossing {
     }
 
     fn spacing(&self, _c: &Channels, point: &Point) -> Vec<f64> {
-        vec![point.theta[1].exp(), 0.5]
+        vec![crossing(point).1, 0.5]
     }
 
     fn is_local(&self) -> bool {
@@ -158,7 +167,7 @@ impl Candidate for ModeCrossing {
     }
 
     fn correction(&self, _c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
-        let (centre, width) = (e.point.theta[0], e.point.theta[1].exp());
+        let (centre, width) = crossing(&e.point);
         let (a, d) = (*e.beta.first()?, e.beta.get(1).copied().unwrap_or(0.0));
         let shape = |u: f64| {
             let x = (u - centre) / width;
@@ -175,11 +184,11 @@ impl Candidate for ModeCrossing {
     fn report(&self, c: &Channels, e: &Estimate) -> Reported {
         let k = c.kelvin_per_u;
         let std = |i: usize| e.theta_std.get(i).copied().unwrap_or(0.0);
-        let width = e.point.theta[1].exp();
+        let (centre, width) = crossing(&e.point);
         [
             entry(
                 "centre_degc",
-                c.middle_degc + k * e.point.theta[0],
+                c.middle_degc + k * centre,
                 (k * std(0)).abs(),
             ),
             entry("width_k", (k * width).abs(), (k * width * std(1)).abs()),

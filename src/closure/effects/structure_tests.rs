@@ -1,5 +1,6 @@
 //! A bias that steps at a temperature, closed: where the firmware's relay switches.
 
+use super::{Point, WIDEST, crossing};
 use crate::closure::channels::Channels;
 use crate::closure::close::close;
 use crate::closure::effects::Reported;
@@ -124,5 +125,16 @@ fn of_a_step_once_and_a_hysteresis_that_do_equally_well_the_law_is_taken() {
         let shown = stepped(seed, 10.0);
         let gap = shown["gap_k"].0;
         assert!((18.0..22.0).contains(&gap), "{seed}: {shown:?}");
+    }
+}
+
+#[test]
+fn a_crossing_lies_within_the_record() {
+    for (theta, expected) in [
+        ([0.3, f64::ln(0.1)], (0.3, 0.1)),
+        ([-7.0, f64::ln(40.0)], (-1.0, WIDEST)),
+    ] {
+        let (centre, width) = crossing(&Point::at(0, &theta));
+        assert!((centre - expected.0).abs() < 1e-12 && (width - expected.1).abs() < 1e-12);
     }
 }

@@ -23,11 +23,13 @@ impl Search<'_> {
             return Ok(first);
         }
         let due = self.net(&reached);
+        let barred = self.begin_without(Vec::new());
         for without in beginnings(&reached.terms) {
             self.begin_without(without);
             let (other, _) = self.run_once(true)?;
-            self.begin_without(Vec::new());
+            let own = self.begin_without(Vec::new());
             if let Some(found) = self.better(other, due)? {
+                self.begin_without(own);
                 return Ok(Found {
                     first: first.first,
                     missing: first.missing,
@@ -35,13 +37,15 @@ impl Search<'_> {
                 });
             }
         }
+        self.begin_without(barred);
         Ok(first)
     }
 
-    /// What the next run does without, at its beginning.
-    fn begin_without(&self, ids: Vec<String>) {
-        *self.barred.borrow_mut() = ids;
+    /// What is judged next does without these; what was barred until now. The report's rounds do without what the
+    /// accepted run did without: else a name that was taken without it competes with it again.
+    fn begin_without(&self, ids: Vec<String>) -> Vec<String> {
         self.rounds.clear();
+        self.barred.replace(ids)
     }
 
     /// A run's names, if they explained everything to it and are worth more than `due`, the model that the first run came

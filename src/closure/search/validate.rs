@@ -259,8 +259,18 @@ impl Search<'_> {
         Ok(self.selection_frequency(model, own, against) >= least)
     }
 
-    /// Whether one row of the fit holds a term's shape; a clip's rows are measured at a level of their own.
+    /// Whether one row of the fit holds a term's shape. Of a clip's or a dead band's rows, which are as far off as it
+    /// happens, the number counts: of those off by more than the noise, or by half of the most.
     fn shows_once(&self, term: &Term, model: &Model) -> bool {
+        if term.candidate.is_whole() {
+            let own = model.terms.iter().position(|t| t.id() == term.id());
+            let all = model.contributions(self.channels);
+            let rows = own.map_or(&[][..], |k| &all[k]).iter().zip(&self.train);
+            let off_dps: Vec<f64> = rows.filter(|(_, t)| **t).map(|(v, _)| v.abs()).collect();
+            let most_dps = off_dps.iter().fold(0.0, |m: f64, v| m.max(*v));
+            let least_dps = model.fit.noise.white_rms_dps.min(0.5 * most_dps);
+            return off_dps.iter().filter(|v| **v > least_dps).count() < 2;
+        }
         let once = |column: &Vec<f64>| {
             let used = column.iter().zip(&self.used).filter(|(_, u)| **u);
             let squares = used.map(|(v, _)| v * v);
@@ -270,7 +280,7 @@ impl Search<'_> {
         let columns = term
             .candidate
             .columns(self.channels, &model.acting, &term.point);
-        !term.candidate.is_whole() && !columns.is_empty() && columns.iter().all(once)
+        !columns.is_empty() && columns.iter().all(once)
     }
 
     /// How often a term's column switches between 0 and 1.

@@ -3,6 +3,7 @@
 use super::*;
 use crate::closure::channels::Channels;
 use crate::closure::effects::{Candidate, Point};
+use crate::closure::likelihood::blocks::Split;
 use crate::closure::search::Effort;
 use crate::closure::synthetic::{Random, triangle};
 use std::collections::BTreeMap;
@@ -124,6 +125,43 @@ fn a_transient_of_one_row_is_an_accident_and_one_of_twelve_is_none() {
         let term = Term::new(candidate.clone(), Point::at(0, &[f64::ln(tau_s)]));
         let model = search.model(std::slice::from_ref(&term)).unwrap();
         assert_eq!(search.shows_once(&term, &model), once, "{tau_s}");
+    }
+}
+
+#[test]
+fn a_clip_of_one_row_is_an_accident_and_one_of_two_is_none() {
+    let mut random = Random::new(3);
+    // Peaks of 100, 97, 94, ... deg/s, each of one row.
+    let rate_dps = |k: usize| {
+        if k % 40 == 20 {
+            100.0 - k as f64 * 3.0 / 40.0
+        } else {
+            0.0
+        }
+    };
+    let degc = [triangle(ROWS / 2), triangle(ROWS / 2)].concat();
+    let output = (0..ROWS).map(|k| rate_dps(k) + 0.01 * random.normal());
+    let columns = BTreeMap::from([
+        ("rate_out_dps".to_owned(), output.collect()),
+        ("rate_dps".to_owned(), (0..ROWS).map(rate_dps).collect()),
+        ("die_degc".to_owned(), degc),
+    ]);
+    let time_s: Vec<f64> = (0..ROWS).map(|k| 10.0 * k as f64).collect();
+    let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+    let all = |heldout: bool| vec![!heldout; ROWS];
+    let split = Split {
+        train: all(false),
+        heldout: all(true),
+        ..c.split().unwrap()
+    };
+    let search = Search::new(&c, &split, Effort::default(), Vec::new());
+    let is_it = |c: &&Arc<dyn Candidate>| c.id() == "output_saturation";
+    let candidate = search.candidates().iter().find(is_it).unwrap();
+    // Between the first two peaks of 98.5 and 95.5 deg/s; both, the second by little; far below the noise.
+    for (level_dps, once) in [(96.0, true), (95.4, false), (95.0, false), (98.499, true)] {
+        let term = Term::new(candidate.clone(), Point::at(1, &[level_dps]));
+        let model = search.model(std::slice::from_ref(&term)).unwrap();
+        assert_eq!(search.shows_once(&term, &model), once, "{level_dps}");
     }
 }
 
