@@ -231,7 +231,7 @@ impl Told<'_> {
         let none = (None, FirmwareErrors::default());
         let Some(plan) = firmware::plan(c, self.after, &estimates, widest) else {
             let terms = self.after.terms.iter();
-            let obstacles = terms.filter_map(|t| t.candidate.obstacle(c));
+            let obstacles = terms.filter_map(|t| t.candidate.obstacle(c, &t.point));
             warnings.extend(obstacles.map(|why| Warning::general("not_compensable", why)));
             return none;
         };

@@ -1,9 +1,9 @@
-//! Effects of heat's history and of time.
+//! Effects of heat's history.
 
 use super::past::{LagTerm, past_lags, past_slopes};
 use super::{
-    Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, entry, from_log, gain,
-    heated, map, spaced,
+    Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, from_log, gain, heated,
+    map, spaced,
 };
 use crate::closure::channels::{Channels, lag, slope};
 use crate::closure::firmware::{Words, knots};
@@ -12,12 +12,7 @@ use crate::correction::Term;
 
 /// All of this file.
 pub fn all() -> Vec<Box<dyn Candidate>> {
-    vec![
-        Box::new(ThermalLag),
-        Box::new(TemperatureRate),
-        Box::new(Warmup),
-        Box::new(Ageing),
-    ]
+    vec![Box::new(ThermalLag), Box::new(TemperatureRate)]
 }
 
 /// Part of the bias follows a temperature that lags the thermometer's.
@@ -27,7 +22,8 @@ const THERMAL_LAG: Sheet = Sheet {
     id: "thermal_lag",
     physics: "part of the bias (electronics, package) follows a temperature that lags the \
               structure's: a loop between heating and cooling that closes in dwells",
-    equation: "k (T - T_l), or k (T - T_l) + q (T^2 - T_l^2), T from the middle; tau dT_l/dt = T - T_l",
+    equation: "k (T - T_l), or k (T - T_l) + q (T^2 - T_l^2), T from the middle; tau dT_l/dt = T - T_l, T_l = T at \
+               the start, or not (a record that begins before the gyro is soaked)",
     parameters: &[
         Parameter {
             name: "gain_dps_per_k",
@@ -59,8 +55,7 @@ impl Candidate for ThermalLag {
         let fastest = (1.5 * c.period_s()).max(1e-3);
         let slowest = (c.span_s() / 2.5).max(2.0 * fastest);
         let taus = spaced(fastest, slowest, 18);
-        // Forms: the part that lags is linear in temperature; it has a curve of its own.
-        let forms = if c.span_s() > 0.0 { 2 * c.heats() } else { 0 };
+        let forms = if c.span_s() > 0.0 { 3 * c.heats() } else { 0 };
         (0..forms)
             .flat_map(|form| taus.iter().map(move |t| Point::at(form, &[t.ln()])))
             .collect()
@@ -73,19 +68,34 @@ impl Candidate for ThermalLag {
             let pairs = now.iter().zip(&late);
             pairs.map(|(x, l)| x.powi(power) - l.powi(power)).collect()
         };
-        let powers = if point.form < c.heats() { 1 } else { 2 };
-        (1..=powers).map(behind).collect()
+        match Lagging::of(c, point) {
+            Lagging::Linear => vec![behind(1)],
+            Lagging::Curved => vec![behind(1), behind(2)],
+            Lagging::Unsoaked => vec![behind(1), fading(c, tau_s(c, point))],
+        }
     }
 
     fn spacing(&self, c: &Channels, _point: &Point) -> Vec<f64> {
         vec![((c.span_s() / c.period_s()).max(4.0)).ln() / 18.0]
     }
 
+    fn surcharge(&self, c: &Channels, point: &Point) -> f64 {
+        // A transient at the start alone is a warm-up's.
+        match Lagging::of(c, point) {
+            Lagging::Unsoaked => 4.0,
+            _ => 0.0,
+        }
+    }
+
     fn correction(&self, c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
         let (gain_dps, tau_s) = (*e.beta.first()?, tau_s(c, &e.point));
         let input = f.thermometer()?;
         let tangent = !e.point.form.is_multiple_of(c.heats());
-        let of_square = e.beta.get(1).map_or(0.0, |b| b / gain_dps);
+        let lagging = Lagging::of(c, &e.point);
+        let of_square = match (lagging, e.beta.get(1)) {
+            (Lagging::Curved, Some(b)) if gain_dps != 0.0 => b / gain_dps,
+            _ => 0.0,
+        };
         let curve = |u: f64| {
             let x = if tangent { c.tangent_at(u) } else { u };
             x + of_square * x * x
@@ -111,12 +121,16 @@ impl Candidate for ThermalLag {
             tau_s,
             kept,
         };
-        let columns = self.columns(c, &f.bias, &e.point);
+        let mut columns = self.columns(c, &f.bias, &e.point);
+        if lagging == Lagging::Unsoaked {
+            // How this record began is no law: the firmware starts soaked.
+            columns.truncate(1);
+        }
         // A curve of a lagging tangent is neither of the last two: what comes nearest is taken.
-        let terms: &[&LagTerm<'_>] = match (tangent, columns.len()) {
-            (false, 1) => &[&linear],
-            (true, 1) => &[&late_curve],
-            _ => &[&curve_of_late, &late_curve],
+        let terms: &[&LagTerm<'_>] = match (tangent, lagging) {
+            (_, Lagging::Curved) => &[&curve_of_late, &late_curve],
+            (false, _) => &[&linear],
+            (true, _) => &[&late_curve],
         };
         let mut wanted = vec![0.0; c.len()];
         for (column, b) in columns.iter().zip(&e.beta) {
@@ -131,11 +145,42 @@ impl Candidate for ThermalLag {
         let mut out: Reported = [gain("gain_dps_per_k", e, 0, per_k), from_log("tau_s", e, 0)]
             .into_iter()
             .collect();
-        if e.point.form >= c.heats() {
-            out.extend([gain("curvature_dps_per_k2", e, 1, per_k * per_k)]);
+        match (Lagging::of(c, &e.point), &e.beta[..]) {
+            (Lagging::Curved, _) => out.extend([gain("curvature_dps_per_k2", e, 1, per_k * per_k)]),
+            (Lagging::Unsoaked, [of_u, _]) if *of_u != 0.0 => {
+                out.extend([gain("start_behind_k", e, 1, c.kelvin_per_u / of_u)]);
+            }
+            _ => {}
         }
         out
     }
+}
+
+/// What lags, in the order of the forms (each for every reading of the temperature).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Lagging {
+    /// A part of the bias that is linear in temperature.
+    Linear,
+    /// One with a curve of its own.
+    Curved,
+    /// A linear one whose temperature was another one when the record began.
+    Unsoaked,
+}
+
+impl Lagging {
+    fn of(c: &Channels, point: &Point) -> Self {
+        match point.form / c.heats() {
+            0 => Lagging::Linear,
+            1 => Lagging::Curved,
+            _ => Lagging::Unsoaked,
+        }
+    }
+}
+
+/// What is left of a difference at the start of the record.
+fn fading(c: &Channels, tau_s: f64) -> Vec<f64> {
+    let start_s = c.time_s.first().copied().unwrap_or(0.0);
+    map(&c.time_s, |t| (-(t - start_s) / tau_s).exp())
 }
 
 /// The time constant of a lag: shorter ones are a rate of change, longer ones a drift in time.
@@ -207,154 +252,6 @@ impl Candidate for TemperatureRate {
 
 /// Rows to each side of a slope.
 const SLOPES: [usize; 5] = [1, 2, 3, 5, 9];
-
-/// Exponential in time since power-on.
-struct Warmup;
-
-const WARMUP: Sheet = Sheet {
-    id: "warmup_transient",
-    physics: "self-heating and settling of references after each power-on",
-    equation: "w exp(-t_on / tau)",
-    parameters: &[
-        Parameter {
-            name: "amplitude_dps",
-            plausible: (0.005, 5.0),
-        },
-        Parameter {
-            name: "tau_s",
-            plausible: (10.0, 3000.0),
-        },
-    ],
-    compensable: true,
-    confounders: &["ageing_drift", "thermal_lag", "stress_jump"],
-    experiment: "power cycles at constant ambient temperature: the transient repeats with each one",
-    reference: "Micromachines 12 (2021) 1329",
-};
-
-impl Candidate for Warmup {
-    fn sheet(&self) -> &Sheet {
-        &WARMUP
-    }
-
-    fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing> {
-        let clock = if c.on_known {
-            "time_since_power_on_s"
-        } else {
-            "time_s"
-        };
-        Ok(vec![clock.to_owned()])
-    }
-
-    fn points(&self, c: &Channels) -> Vec<Point> {
-        let (_, longest) = crate::closure::channels::range(&c.on_s);
-        let fastest = 1.5 * c.period_s();
-        spaced(fastest, (longest / 1.5).max(2.0 * fastest), 16)
-            .into_iter()
-            .map(|tau| Point::at(0, &[tau.ln()]))
-            .collect()
-    }
-
-    fn columns(&self, c: &Channels, _bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
-        let tau_s = warm_s(c, point);
-        vec![map(&c.on_s, |t| (-t / tau_s).exp())]
-    }
-
-    fn spacing(&self, c: &Channels, _point: &Point) -> Vec<f64> {
-        vec![((c.span_s() / c.period_s()).max(4.0)).ln() / 16.0]
-    }
-
-    fn correction(&self, c: &Channels, e: &Estimate, _f: &mut Words) -> Option<Vec<Term>> {
-        Some(vec![Term::Decay {
-            gain_dps: *e.beta.first()?,
-            tau_s: warm_s(c, &e.point),
-        }])
-    }
-
-    fn report(&self, c: &Channels, e: &Estimate) -> Reported {
-        let (_, std) = from_log("tau_s", e, 0).1;
-        [
-            gain("amplitude_dps", e, 0, 1.0),
-            entry("tau_s", warm_s(c, &e.point), std),
-        ]
-        .into_iter()
-        .collect()
-    }
-}
-
-/// The time constant of a warm-up: one that goes on for longer than the power is on is a drift.
-fn warm_s(c: &Channels, point: &Point) -> f64 {
-    let (_, longest) = crate::closure::channels::range(&c.on_s);
-    point.theta[0].exp().min(longest.max(c.period_s()))
-}
-
-/// Slow drift in time, linear or logarithmic.
-struct Ageing;
-
-const AGEING: Sheet = Sheet {
-    id: "ageing_drift",
-    physics: "creep, outgassing and relaxing stress: a drift that does not come back",
-    equation: "k t, or k ln(1 + t / t0)",
-    parameters: &[
-        Parameter {
-            name: "drift_dps_per_h",
-            plausible: (1e-4, 10.0),
-        },
-        Parameter {
-            name: "t0_s",
-            plausible: (10.0, 1e6),
-        },
-    ],
-    compensable: false,
-    confounders: &["warmup_transient", "stress_jump"],
-    experiment: "a second run after power-off at the same temperatures: ageing goes on where it \
-                 stopped, a warm-up starts again",
-    reference: "general knowledge; IEEE Std 952 for rate random walk",
-};
-
-impl Candidate for Ageing {
-    fn sheet(&self) -> &Sheet {
-        &AGEING
-    }
-
-    fn channels(&self, _c: &Channels) -> Result<Vec<String>, Missing> {
-        Ok(vec!["time_s".to_owned()])
-    }
-
-    fn points(&self, c: &Channels) -> Vec<Point> {
-        let span = c.span_s();
-        let mut out = vec![Point::form(0)];
-        let starts = spaced(0.01 * span, 1.5 * span, 8);
-        out.extend(starts.into_iter().map(|t0| Point::at(1, &[t0.ln()])));
-        out
-    }
-
-    fn columns(&self, c: &Channels, _bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
-        let start = c.time_s.first().copied().unwrap_or(0.0);
-        if point.form == 0 {
-            let span = c.span_s().max(f64::MIN_POSITIVE);
-            return vec![map(&c.time_s, |t| (t - start) / span)];
-        }
-        let t0 = point.theta[0].exp();
-        vec![map(&c.time_s, |t| ((t - start) / t0).ln_1p())]
-    }
-
-    fn spacing(&self, _c: &Channels, point: &Point) -> Vec<f64> {
-        vec![0.7; point.theta.len()]
-    }
-
-    fn report(&self, c: &Channels, e: &Estimate) -> Reported {
-        if e.point.form == 0 {
-            let per_h = 3600.0 / c.span_s().max(f64::MIN_POSITIVE);
-            return [gain("drift_dps_per_h", e, 0, per_h)].into_iter().collect();
-        }
-        [
-            gain("gain_dps_per_efold", e, 0, 1.0),
-            from_log("t0_s", e, 0),
-        ]
-        .into_iter()
-        .collect()
-    }
-}
 
 #[cfg(test)]
 #[path = "heat_tests.rs"]

@@ -1,24 +1,26 @@
-//! A drift and a warm-up, each called what it is.
+//! Lags of records that begin before the gyro is soaked.
 
 use super::*;
 use crate::closure::search::{Effort, Search, Term as Step};
 use crate::closure::synthetic::{Random, triangle};
 use std::collections::BTreeMap;
 
-const ROWS: usize = 300;
+const ROWS: usize = 400;
+const TAU_S: f64 = 200.0;
 
-/// Names of a record of two heatings with one power-on, and the first one's parameters; `added`, deg/s, at a time, s.
-fn named(seed: u64, added: impl Fn(f64) -> f64) -> (Vec<String>, Reported) {
+/// Names and the first one's parameters, of a record whose bias follows a temperature that lags and is `behind_k`
+/// lower at the start than the thermometer's, 0.04 deg/s a kelvin.
+fn lagging(seed: u64, behind_k: f64) -> (Vec<String>, Reported) {
     let mut random = Random::new(seed);
     let degc = [triangle(ROWS / 2), triangle(ROWS / 2)].concat();
-    let time_s: Vec<f64> = (0..ROWS).map(|k| 10.0 * k as f64).collect();
-    let output = degc.iter().zip(&time_s).map(|(degc, t)| {
-        let u = degc / 35.0 - 1.0;
-        2.0 - 1.5 * u + 0.7 * u * u + added(*t) + 0.01 * random.normal()
+    let time_s: Vec<f64> = (0..ROWS).map(|k| 20.0 * k as f64).collect();
+    let late = lag(&time_s, &degc, TAU_S);
+    let output = (0..ROWS).map(|k| {
+        let late = late[k] - behind_k * (-time_s[k] / TAU_S).exp();
+        0.3 - 0.01 * degc[k] + 0.04 * (degc[k] - late) + 0.01 * random.normal()
     });
     let columns = BTreeMap::from([
         ("rate_out_dps".to_owned(), output.collect()),
-        ("time_since_power_on_s".to_owned(), time_s.clone()),
         ("die_degc".to_owned(), degc.clone()),
     ]);
     let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
@@ -35,41 +37,18 @@ fn named(seed: u64, added: impl Fn(f64) -> f64) -> (Vec<String>, Reported) {
 }
 
 #[test]
-fn a_straight_drift_over_one_power_on_is_no_warm_up() {
-    for (seed, dps) in [(0, 0.2), (1, -0.3), (2, 0.5), (3, -2.0), (4, 10.0)] {
-        let (names, reported) = named(seed, |t| dps * t / 3000.0);
-        assert_eq!(names, ["ageing_drift"], "{seed}, {dps}");
-        let ratio = reported["drift_dps_per_h"].0 / (1.2 * dps);
-        assert!((ratio - 1.0).abs() < 0.1, "{seed}, {dps}: {ratio}");
-    }
-}
-
-#[test]
-fn a_warm_up_that_ends_while_the_power_is_on_keeps_its_name() {
-    for tau_s in [300.0, 1000.0] {
-        let (names, reported) = named(5, |t| 0.5 * (-t / tau_s).exp());
-        assert_eq!(names, ["warmup_transient"], "{tau_s}");
-        let ratio = reported["tau_s"].0 / tau_s;
-        assert!((ratio - 1.0).abs() < 0.1, "{tau_s}: {ratio}");
-    }
-}
-
-#[test]
-fn no_warm_up_takes_longer_than_the_power_is_on() {
-    let columns = BTreeMap::from([
-        ("rate_out_dps".to_owned(), vec![0.0; 4]),
-        (
-            "time_since_power_on_s".to_owned(),
-            vec![50.0, 60.0, 0.0, 10.0],
-        ),
-        ("die_degc".to_owned(), vec![0.0, 1.0, 2.0, 3.0]),
-    ]);
-    let time_s = [0.0, 10.0, 20.0, 30.0];
-    let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
-    for (tau_s, due_s) in [(20.0, 20.0), (59.0, 59.0), (1e6, 60.0)] {
-        let point = Point::at(0, &[f64::ln(tau_s)]);
-        assert!((warm_s(&c, &point) - due_s).abs() < 1e-9, "{tau_s}");
-        let column = Warmup.columns(&c, &Bias::default(), &point).remove(0);
-        assert!((column[0] - (-50.0 / due_s).exp()).abs() < 1e-12, "{tau_s}");
+fn a_record_that_begins_before_the_gyro_is_soaked_is_a_lag_alone() {
+    for (seed, behind_k) in [(0, 12.0), (1, -12.0), (2, 40.0), (3, 0.0)] {
+        let (names, reported) = lagging(seed, behind_k);
+        assert_eq!(names, ["thermal_lag"], "{behind_k}");
+        let (tau_s, std_s) = reported["tau_s"];
+        assert!((tau_s - TAU_S).abs() < 4.0 * std_s + 10.0, "{reported:?}");
+        let found_k = reported.get("start_behind_k").copied();
+        match found_k {
+            Some((found_k, std_k)) => {
+                assert!((found_k - behind_k).abs() < 4.0 * std_k, "{reported:?}");
+            }
+            None => assert!(behind_k.abs() < 1.0, "{reported:?}"),
+        }
     }
 }

@@ -14,7 +14,9 @@ pub mod heat;
 pub mod outside;
 mod past;
 pub mod rate;
+pub mod step;
 pub mod structure;
+pub mod time;
 pub mod tone;
 pub mod user;
 
@@ -238,7 +240,7 @@ pub trait Candidate: Send + Sync {
     }
 
     /// Why firmware cannot subtract it, where there is more to say than [`Sheet::compensable`].
-    fn obstacle(&self, _c: &Channels) -> Option<String> {
+    fn obstacle(&self, _c: &Channels, _point: &Point) -> Option<String> {
         None
     }
 
@@ -322,7 +324,9 @@ pub fn from_log(name: &str, e: &Estimate, k: usize) -> (String, (f64, f64)) {
 pub fn catalogue(c: &Channels) -> Vec<Box<dyn Candidate>> {
     let mut out: Vec<Box<dyn Candidate>> = Vec::new();
     out.extend(heat::all());
+    out.extend(time::all());
     out.extend(structure::all());
+    out.extend(step::all());
     out.extend(drive::all());
     out.extend(demodulation::all());
     out.extend(rate::all());

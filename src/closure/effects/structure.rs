@@ -9,11 +9,7 @@ use crate::correction::Term;
 
 /// All of this file.
 pub fn all() -> Vec<Box<dyn Candidate>> {
-    vec![
-        Box::new(ThirdOrder),
-        Box::new(ModeCrossing),
-        Box::new(StressJump),
-    ]
+    vec![Box::new(ThirdOrder), Box::new(ModeCrossing)]
 }
 
 /// Third order of the thermometer.
@@ -76,7 +72,8 @@ const MODE_CROSSING: Sheet = Sheet {
     id: "mode_crossing",
     physics: "at one temperature a parasitic mode has the drive's frequency and takes energy from \
               it: a bump, or a swing to both sides, in temperature",
-    equation: "(a + d 2 x) / (1 + x^2), x = (T - T_c) / width",
+    equation: "(a + d 2 x) / (1 + x^2), or a exp(-x^2 / 2) where the crossing is blurred (several modes, a \
+               gradient over the die), x = (T - T_c) / width",
     parameters: &[
         Parameter {
             name: "centre_degc",
@@ -108,6 +105,17 @@ const WIDTHS: [f64; 5] = [0.03, 0.06, 0.12, 0.22, 0.4];
 /// The widest crossing, in u: of a wider one the record (-1..1) does not show both flanks, and what fits is any bend.
 const WIDEST: f64 = 0.6;
 
+/// A resonance, and one that is blurred.
+const FORMS: usize = 2;
+
+/// The shapes of a form, x in half widths from the centre.
+fn shapes(form: usize) -> &'static [fn(f64) -> f64] {
+    match form {
+        0 => &[|x| 1.0 / (1.0 + x * x), |x| 2.0 * x / (1.0 + x * x)],
+        _ => &[|x| (-0.5 * x * x).exp()],
+    }
+}
+
 /// Centre and half width of a crossing, in u: within the record.
 fn crossing(point: &Point) -> (f64, f64) {
     let (centre, width) = (point.theta[0], point.theta[1].exp());
@@ -129,7 +137,7 @@ impl Candidate for ModeCrossing {
             let count = (1.4 / width).clamp(8.0, 24.0) as usize;
             for k in 0..count {
                 let centre = -0.85 + 1.7 * k as f64 / (count - 1) as f64;
-                out.push(Point::at(0, &[centre, width.ln()]));
+                out.extend((0..FORMS).map(|form| Point::at(form, &[centre, width.ln()])));
             }
         }
         out
@@ -137,11 +145,10 @@ impl Candidate for ModeCrossing {
 
     fn columns(&self, c: &Channels, _bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
         let (centre, width) = crossing(point);
-        let at = |u: f64| (u - centre) / width;
-        vec![
-            map(&c.u, |u| 1.0 / (1.0 + at(u).powi(2))),
-            map(&c.u, |u| 2.0 * at(u) / (1.0 + at(u).powi(2))),
-        ]
+        let shapes = shapes(point.form).iter();
+        shapes
+            .map(|shape| map(&c.u, |u| shape((u - centre) / width)))
+            .collect()
     }
 
     fn spacing(&self, _c: &Channels, point: &Point) -> Vec<f64> {
@@ -157,10 +164,8 @@ impl Candidate for ModeCrossing {
         for k in 0..10 {
             let width = 0.02 * 1.45f64.powi(k);
             for j in 0..30 {
-                out.push(Point::at(
-                    0,
-                    &[-0.9 + 1.8 * f64::from(j) / 29.0, width.ln()],
-                ));
+                let theta = [-0.9 + 1.8 * f64::from(j) / 29.0, width.ln()];
+                out.extend((0..FORMS).map(|form| Point::at(form, &theta)));
             }
         }
         out
@@ -168,10 +173,10 @@ impl Candidate for ModeCrossing {
 
     fn correction(&self, _c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
         let (centre, width) = crossing(&e.point);
-        let (a, d) = (*e.beta.first()?, e.beta.get(1).copied().unwrap_or(0.0));
-        let shape = |u: f64| {
+        let shape = |u: f64| -> f64 {
             let x = (u - centre) / width;
-            (a + 2.0 * d * x) / (1.0 + x * x)
+            let pairs = shapes(e.point.form).iter().zip(&e.beta);
+            pairs.map(|(shape, b)| b * shape(x)).sum()
         };
         // Sixteen knots over a half width keep the linear interpolation a thousandth off.
         let count = (32.0 / width).clamp(65.0, 1025.0) as usize;
@@ -185,7 +190,7 @@ impl Candidate for ModeCrossing {
         let k = c.kelvin_per_u;
         let std = |i: usize| e.theta_std.get(i).copied().unwrap_or(0.0);
         let (centre, width) = crossing(&e.point);
-        [
+        let mut out: Reported = [
             entry(
                 "centre_degc",
                 c.middle_degc + k * centre,
@@ -193,260 +198,68 @@ impl Candidate for ModeCrossing {
             ),
             entry("width_k", (k * width).abs(), (k * width * std(1)).abs()),
             gain("absorptive_dps", e, 0, 1.0),
-            gain("dispersive_dps", e, 1, k.signum()),
-        ]
-        .into_iter()
-        .collect()
-    }
-}
-
-/// A step at a temperature.
-struct StressJump;
-
-const STRESS_JUMP: Sheet = Sheet {
-    id: "stress_jump",
-    physics: "a joint (die attach, solder, lid) gives way at a temperature and comes back at the \
-              same or a lower one, or never",
-    equation: "h H(T - T_s), T_s higher by the gap on the way up than on the way down",
-    parameters: &[
-        Parameter {
-            name: "step_dps",
-            plausible: (0.01, 5.0),
-        },
-        Parameter {
-            name: "centre_degc",
-            plausible: (-40.0, 125.0),
-        },
-        Parameter {
-            name: "gap_k",
-            plausible: (0.0, 20.0),
-        },
-    ],
-    compensable: true,
-    confounders: &["mode_crossing", "thermal_lag", "ageing_drift"],
-    experiment: "repeat the cycle with turning points on both sides of the step: a jump repeats, \
-                 a drift does not",
-    reference: "InterPACK 2007 (lead frames); Polimi 2025 (strain-gauge gyroscope)",
-};
-
-/// Gaps of the hysteresis that are tried, in u.
-const GAPS: [f64; 10] = [0.0, 0.04, 0.08, 0.14, 0.21, 0.3, 0.41, 0.54, 0.7, 0.9];
-
-/// How far from a threshold others are tried, in u, and how many at most.
-const NEAR: f64 = 0.1;
-const MOST_STAIRS: usize = 80;
-
-/// Thresholds near `centre`, in order, one between any two readings (every n-th where these are many).
-fn thresholds(u: &[f64], centre: f64) -> Vec<f64> {
-    let near = |v: &&f64| (**v - centre).abs() < NEAR;
-    let mut sorted: Vec<f64> = u.iter().filter(near).copied().collect();
-    sorted.sort_by(f64::total_cmp);
-    sorted.dedup();
-    let between: Vec<f64> = sorted.windows(2).map(|w| 0.5 * (w[0] + w[1])).collect();
-    let every = between.len().div_ceil(MOST_STAIRS).max(1);
-    between.into_iter().step_by(every).collect()
-}
-
-/// Gaps, in u, that firmware is tried with beyond the model's: what a noisy reading does not cross twice.
-const WIDER: [f64; 5] = [0.002, 0.005, 0.01, 0.02, 0.04];
-
-/// Centre and gap with which the relay of the firmware, which sees the thermometer's readings, is most often where the model's
-/// is, which sees their smooth course (`wanted`, 0 or 1 a row): among equals those nearest to the model's.
-fn in_readings(
-    c: &Channels,
-    f: &Words,
-    (centre, gap): (f64, f64),
-    wanted: &[f64],
-    term: impl Fn(f64, f64) -> Term,
-) -> Option<(f64, f64)> {
-    let trial = f.trial(c)?;
-    let step_dps = match term(centre, gap) {
-        Term::Step { gain_dps, .. } => gain_dps,
-        _ => return None,
-    };
-    let apart = |centre: f64, gap: f64| -> Option<usize> {
-        let taken = trial.taken_off(&[term(centre, gap)], 4.0 * step_dps.abs().max(1e-3))?;
-        let pairs = taken.iter().zip(wanted);
-        Some(
-            pairs
-                .filter(|(t, w)| (**t / step_dps - **w).abs() > 0.5)
-                .count(),
-        )
-    };
-    let nearer = |best: (usize, f64, f64), centre: f64, gap: f64| {
-        let rows = if best.0 > 0 { apart(centre, gap)? } else { 0 };
-        Some(if rows < best.0 {
-            (rows, centre, gap)
-        } else {
-            best
-        })
-    };
-    let mut best = (apart(centre, gap)?, centre, gap);
-    let mut others = thresholds(&c.u, centre);
-    others.sort_by(|a, b| (a - centre).abs().total_cmp(&(b - centre).abs()));
-    for other in others {
-        best = nearer(best, other, gap)?;
-    }
-    for more in WIDER {
-        best = nearer(best, best.1, gap + more)?;
-    }
-    Some((best.1, best.2))
-}
-
-/// 0 below, 1 above `centre`, by half the gap later in each direction; `once`: it never comes back.
-pub fn step(u: &[f64], centre: f64, gap: f64, once: bool) -> Vec<f64> {
-    let mut above = u.first().is_some_and(|u| *u > centre);
-    u.iter()
-        .map(|u| {
-            if *u > centre + 0.5 * gap {
-                above = true;
-            } else if *u < centre - 0.5 * gap && !once {
-                above = false;
-            }
-            f64::from(u8::from(above))
-        })
-        .collect()
-}
-
-/// The same for falling temperature first: the mirror image of [`step`] with `once`.
-fn once(u: &[f64], centre: f64) -> Vec<f64> {
-    if u.first().is_some_and(|u| *u > centre) {
-        let mirrored = map(u, |u| -u);
-        return step(&mirrored, -centre, 0.0, true);
-    }
-    step(u, centre, 0.0, true)
-}
-
-impl Candidate for StressJump {
-    fn sheet(&self) -> &Sheet {
-        &STRESS_JUMP
-    }
-
-    fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing> {
-        Ok(vec![heated(c)?, "time_s".to_owned()])
-    }
-
-    fn points(&self, _c: &Channels) -> Vec<Point> {
-        let mut out = Vec::new();
-        let centres =
-            |count: usize| (0..count).map(move |k| -0.85 + 1.7 * k as f64 / (count - 1) as f64);
-        for (k, gap) in GAPS.into_iter().enumerate() {
-            let form = usize::from(k > 0);
-            for centre in centres(if k == 0 { 40 } else { 30 }) {
-                let theta = [centre, gap];
-                out.push(Point::at(form, &theta[..1 + form]));
-            }
-        }
-        out.extend(centres(24).map(|centre| Point::at(2, &[centre])));
-        out
-    }
-
-    fn columns(&self, c: &Channels, _bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
-        let centre = point.theta[0];
-        vec![match point.form {
-            0 => step(&c.smooth_u, centre, 0.0, false),
-            1 => step(&c.smooth_u, centre, point.theta[1].abs(), false),
-            _ => once(&c.smooth_u, centre),
-        }]
-    }
-
-    fn is_local(&self) -> bool {
-        true
-    }
-
-    fn surcharge(&self, _c: &Channels, point: &Point) -> f64 {
-        // What happened once may be anything: a law that fits as well says what comes next.
-        if point.form == 2 { 4.0 } else { 0.0 }
-    }
-
-    fn fine(&self, _c: &Channels, _point: &Point) -> Vec<Point> {
-        // Where the temperature wanders, a step that is a little off switches at other times.
-        let mut out = Vec::new();
-        for j in 0..75 {
-            let centre = -0.9 + 1.8 * f64::from(j) / 74.0;
-            out.push(Point::at(0, &[centre]));
-            out.push(Point::at(2, &[centre]));
-            out.extend((1..25).map(|k| Point::at(1, &[centre, 0.04 * f64::from(k)])));
-        }
-        out
-    }
-
-    fn spacing(&self, _c: &Channels, point: &Point) -> Vec<f64> {
-        let mut out = vec![0.05];
-        if point.theta.len() > 1 {
-            out.push(0.05);
-        }
-        out
-    }
-
-    fn stairs(&self, c: &Channels, point: &Point) -> (Vec<Vec<Point>>, Vec<Point>) {
-        let centre = point.theta[0];
-        let gap = point.theta.get(1).map_or(0.0, |g| g.abs());
-        if point.form != 1 {
-            let along = thresholds(&c.smooth_u, centre);
-            let along = along.into_iter().map(|t| Point::at(point.form, &[t]));
-            return (vec![along.collect()], Vec::new());
-        }
-        let (up, down) = (centre + 0.5 * gap, centre - 0.5 * gap);
-        let of = |up: f64, down: f64| Point::at(1, &[0.5 * (up + down), up - down]);
-        let ups = thresholds(&c.smooth_u, up).into_iter();
-        let downs = thresholds(&c.smooth_u, down).into_iter();
-        let axes = vec![
-            ups.filter(|t| *t >= down).map(|t| of(t, down)).collect(),
-            downs.filter(|t| *t <= up).map(|t| of(up, t)).collect(),
-        ];
-        (axes, [up, centre, down].map(|t| Point::at(0, &[t])).into())
-    }
-
-    fn correction(&self, c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
-        let centre = e.point.theta[0];
-        if e.point.form == 2 && c.smooth_u.first().is_some_and(|u| *u > centre) {
-            // It waits for the cold: the relay of the firmware waits for the warm only.
-            return None;
-        }
-        let gap = match e.point.form {
-            1 => e.point.theta[1].abs(),
-            _ => 0.0,
-        };
-        let (gain_dps, input) = (*e.beta.first()?, f.thermometer()?);
-        let once = e.point.form == 2;
-        let term = |centre: f64, gap: f64| Term::Step {
-            gain_dps,
-            input,
-            centre,
-            gap,
-            once,
-        };
-        let wanted = self.columns(c, &f.bias, &e.point).pop()?;
-        let (centre, gap) =
-            in_readings(c, f, (centre, gap), &wanted, term).unwrap_or((centre, gap));
-        Some(vec![term(centre, gap)])
-    }
-
-    fn report(&self, c: &Channels, e: &Estimate) -> Reported {
-        let k = c.kelvin_per_u;
-        let std = |i: usize| e.theta_std.get(i).copied().unwrap_or(0.0);
-        let mut out: Reported = [
-            gain("step_dps", e, 0, k.signum()),
-            entry(
-                "centre_degc",
-                c.middle_degc + k * e.point.theta[0],
-                (k * std(0)).abs(),
-            ),
         ]
         .into_iter()
         .collect();
-        if e.point.form == 1 {
-            let gap = e.point.theta[1].abs();
-            out.insert("gap_k".to_owned(), ((k * gap).abs(), (k * std(1)).abs()));
-        }
-        if e.point.form == 2 {
-            out.insert("returns".to_owned(), (0.0, 0.0));
+        if shapes(e.point.form).len() > 1 {
+            out.extend([gain("dispersive_dps", e, 1, k.signum())]);
         }
         out
     }
 }
 
 #[cfg(test)]
-#[path = "structure_tests.rs"]
-mod tests;
+mod tests {
+    use super::*;
+    use crate::closure::search::{Effort, Search};
+    use crate::closure::synthetic::{Random, triangle};
+    use std::collections::BTreeMap;
+    #[test]
+    fn a_crossing_lies_within_the_record() {
+        for (theta, expected) in [
+            ([0.3, f64::ln(0.1)], (0.3, 0.1)),
+            ([-7.0, f64::ln(40.0)], (-1.0, WIDEST)),
+        ] {
+            let (centre, width) = crossing(&Point::at(0, &theta));
+            assert!((centre - expected.0).abs() < 1e-12 && (width - expected.1).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_bump_of_either_shape_is_a_crossing_with_its_own_width() {
+        let shapes: [fn(f64) -> f64; 3] = [
+            |x| 1.0 / (1.0 + x * x),
+            |x| 2.0 * x / (1.0 + x * x),
+            |x| (-0.5 * x * x).exp(),
+        ];
+        for (k, shape) in shapes.iter().enumerate() {
+            let (rows, mut random) = (400, Random::new(k as u64));
+            let degc = [triangle(rows / 2), triangle(rows / 2)].concat();
+            let output = degc
+                .iter()
+                .map(|t| 0.3 - 0.01 * t + 0.2 * shape((t - 30.0) / 4.0) + 0.01 * random.normal());
+            let columns = BTreeMap::from([
+                ("rate_out_dps".to_owned(), output.collect()),
+                ("die_degc".to_owned(), degc.clone()),
+            ]);
+            let time_s: Vec<f64> = (0..rows).map(|k| 10.0 * k as f64).collect();
+            let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+            let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+            let found = search.run().unwrap();
+            let names: Vec<String> = found.terms.iter().map(|t| t.id()).collect();
+            assert_eq!(
+                (names, found.left),
+                (vec!["mode_crossing".to_owned()], None),
+                "{k}"
+            );
+            let model = search.model(&found.terms).unwrap();
+            let estimate = &search.estimates(&model)[0];
+            assert_eq!(estimate.point.form, usize::from(k == 2));
+            let reported = found.terms[0].candidate.report(&c, estimate);
+            for (name, value) in [("centre_degc", 30.0), ("width_k", 4.0)] {
+                let (found, std) = reported[name];
+                assert!((found - value).abs() < 4.0 * std, "{k} {reported:?}");
+            }
+        }
+    }
+}

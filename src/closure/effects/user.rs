@@ -384,7 +384,7 @@ impl Candidate for User {
     }
 
     fn correction(&self, c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
-        if self.obstacle(c).is_some() {
+        if self.obstacle(c, &e.point).is_some() {
             return None;
         }
         let thermometer = f.thermometer();
@@ -401,7 +401,7 @@ impl Candidate for User {
         }
     }
 
-    fn obstacle(&self, c: &Channels) -> Option<String> {
+    fn obstacle(&self, c: &Channels, _point: &Point) -> Option<String> {
         let id = &self.effect.id;
         if self.effect.compensable == Some(false) {
             return Some(format!(

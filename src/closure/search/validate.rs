@@ -283,12 +283,16 @@ impl Search<'_> {
         !columns.is_empty() && columns.iter().all(once)
     }
 
-    /// How often a term's column switches between 0 and 1.
+    /// How often a term's column switches between 0 and 1, at once or by and by.
     fn switches(&self, term: &Term, model: &Model) -> usize {
         let columns = term
             .candidate
             .columns(self.channels, &model.acting, &term.point);
-        let count = |c: &Vec<f64>| c.windows(2).filter(|w| w[0] != w[1]).count();
+        let count = |c: &Vec<f64>| {
+            c.windows(2)
+                .filter(|w| (w[0] > 0.5) != (w[1] > 0.5))
+                .count()
+        };
         columns.iter().map(count).max().unwrap_or(0)
     }
 }

@@ -1,6 +1,5 @@
 //! A bias that steps at a temperature, closed: where the firmware's relay switches.
 
-use super::{Point, WIDEST, crossing};
 use crate::closure::channels::Channels;
 use crate::closure::close::close;
 use crate::closure::effects::Reported;
@@ -129,12 +128,41 @@ fn of_a_step_once_and_a_hysteresis_that_do_equally_well_the_law_is_taken() {
 }
 
 #[test]
-fn a_crossing_lies_within_the_record() {
-    for (theta, expected) in [
-        ([0.3, f64::ln(0.1)], (0.3, 0.1)),
-        ([-7.0, f64::ln(40.0)], (-1.0, WIDEST)),
-    ] {
-        let (centre, width) = crossing(&Point::at(0, &theta));
-        assert!((centre - expected.0).abs() < 1e-12 && (width - expected.1).abs() < 1e-12);
+fn a_step_by_and_by_is_a_step_with_a_width() {
+    for (seed, width_k) in [(0, 1.0), (1, 3.0), (2, 4.5)] {
+        let (rows, mut random) = (600, Random::new(seed));
+        let degc = [synthetic::triangle(rows / 2), synthetic::triangle(rows / 2)].concat();
+        let output = degc.iter().map(|t| {
+            let spread = 1.0 / (1.0 + (-2.0 * (t - 30.0) / width_k).exp());
+            0.3 - 0.01 * t + 0.3 * spread + 0.01 * random.normal()
+        });
+        let columns = BTreeMap::from([
+            ("rate_out_dps".to_owned(), output.collect()),
+            ("die_degc".to_owned(), degc.clone()),
+        ]);
+        let time_s: Vec<f64> = (0..rows).map(|k| 10.0 * k as f64).collect();
+        let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+        let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+        let found = search.run().unwrap();
+        let names: Vec<String> = found.terms.iter().map(|t| t.id()).collect();
+        assert_eq!(
+            (names, found.left),
+            (vec!["stress_jump".to_owned()], None),
+            "{width_k}"
+        );
+        let model = search.model(&found.terms).unwrap();
+        let estimate = &search.estimates(&model)[0];
+        let reported: Reported = found.terms[0].candidate.report(&c, estimate);
+        for (name, value) in [
+            ("centre_degc", 30.0),
+            ("width_k", width_k),
+            ("step_dps", 0.3),
+        ] {
+            let (found, std) = reported[name];
+            assert!(
+                (found - value).abs() < 4.0 * std + 0.02 * value,
+                "{width_k} {reported:?}"
+            );
+        }
     }
 }
