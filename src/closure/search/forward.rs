@@ -248,8 +248,8 @@ impl Search<'_> {
         let mut best: Option<(&Judged, f64)> = None;
         let names = || significant.iter().filter(|j| j.candidate.named()).take(4);
         for j in names() {
-            let one = match j.candidate.is_whole() {
-                // Its levels or widths lie between rows: as good as they get.
+            let one = match j.candidate.is_whole() || j.candidate.is_local() {
+                // Its levels, widths or form lie between those that were tried: as good as they get.
                 true => {
                     let mut terms = model.terms.clone();
                     terms.push(Term::of(j, Vec::new()));

@@ -20,6 +20,20 @@ const CLIMBS: usize = 4;
 /// Passes over all terms.
 const SWEEPS: usize = 2;
 
+/// The best place of every form.
+fn best_of_forms(places: &[(Point, f64)], net: impl Fn(&Point, f64) -> f64) -> Vec<&Point> {
+    let mut best: Vec<(&Point, f64)> = Vec::new();
+    for (point, there) in places {
+        let there = net(point, *there);
+        match best.iter_mut().find(|b| b.0.form == point.form) {
+            Some(b) if there > b.1 => *b = (point, there),
+            Some(_) => {}
+            None => best.push((point, there)),
+        }
+    }
+    best.into_iter().map(|b| b.0).collect()
+}
+
 impl Search<'_> {
     /// The non-linear parameters of every term again, with the other terms' columns in: with spikes at
     /// their weights, and with every row at full weight (a threshold that is off makes spikes of
@@ -148,16 +162,18 @@ impl Search<'_> {
                 *there = gain(point);
             }
         }
-        let mut start = term.point.clone();
-        let mut best = gain(&start) - price(candidate, c, &start);
-        for (point, there) in &fine {
-            // A form that costs more has to be worth it.
-            let net = there - price(candidate, c, point);
-            if net > best {
-                (start, best) = (point.clone(), net);
+        // A form that costs more has to be worth it.
+        let net = |p: &Point, there: f64| there - price(candidate, c, p);
+        let mut top = climbed(&term.point);
+        let mut best = net(&top, gain(&top));
+        for start in best_of_forms(&fine, net) {
+            // Between the places of another form its top may be far above them all.
+            let point = climbed(start);
+            let there = net(&point, gain(&point));
+            if there > best {
+                (top, best) = (point, there);
             }
         }
-        let top = climbed(&start);
         stairs::settled(candidate, c, &top, &fine, gain)
     }
 
