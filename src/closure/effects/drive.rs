@@ -145,7 +145,7 @@ impl Candidate for Coupling {
         (0..PULLS).map(Point::form).chain(large).collect()
     }
 
-    fn fine(&self, _c: &Channels, point: &Point) -> Vec<Point> {
+    fn fine(&self, _c: &Channels, point: &Point, _seen: &[bool]) -> Vec<Point> {
         let powers = [point.form, point.form ^ 1];
         let each = spaced(0.02, 2.0, 8).into_iter();
         each.flat_map(|most_u| [most_u, -most_u])

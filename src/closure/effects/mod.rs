@@ -165,8 +165,9 @@ pub trait Candidate: Send + Sync {
     /// Where the search starts.
     fn points(&self, c: &Channels) -> Vec<Point>;
 
-    /// Further places from which the last refinement starts, where the likelihood has many tops.
-    fn fine(&self, _c: &Channels, _point: &Point) -> Vec<Point> {
+    /// Further places from which the last refinement starts, where the likelihood has many tops; `seen`: the rows whose
+    /// errors may be looked at.
+    fn fine(&self, _c: &Channels, _point: &Point, _seen: &[bool]) -> Vec<Point> {
         Vec::new()
     }
 

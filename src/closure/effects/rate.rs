@@ -428,7 +428,7 @@ impl Candidate for Saturation {
         vec![map(&total, |x| x.max(low).min(high) - x)]
     }
 
-    fn fine(&self, _c: &Channels, point: &Point) -> Vec<Point> {
+    fn fine(&self, _c: &Channels, point: &Point, _seen: &[bool]) -> Vec<Point> {
         // A level that no reading reaches is none: it would clip rows that were not looked at.
         let (low, high) = limits(point);
         match point.form {

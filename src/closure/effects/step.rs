@@ -62,11 +62,12 @@ fn spread(point: &Point, u: f64) -> f64 {
 /// Gaps of the hysteresis that are tried, in u.
 const GAPS: [f64; 10] = [0.0, 0.04, 0.08, 0.14, 0.21, 0.3, 0.41, 0.54, 0.7, 0.9];
 
-/// How far from a threshold others are tried, in u, and how many at most.
+/// How far from a threshold others are tried, in u, and how many: all of the nearest to each side, and of the others.
 const NEAR: f64 = 0.1;
-const MOST_STAIRS: usize = 80;
+const NEAREST: usize = 20;
+const MOST_STAIRS: usize = 60;
 
-/// Thresholds near `centre`, in order, one between any two readings (every n-th where these are many).
+/// Thresholds near `centre`, in order, each between two readings: the nearest ones, and every n-th where these are many.
 fn thresholds(u: &[f64], centre: f64) -> Vec<f64> {
     let near = |v: &&f64| (**v - centre).abs() < NEAR;
     let mut sorted: Vec<f64> = u.iter().filter(near).copied().collect();
@@ -74,7 +75,84 @@ fn thresholds(u: &[f64], centre: f64) -> Vec<f64> {
     sorted.dedup();
     let between: Vec<f64> = sorted.windows(2).map(|w| 0.5 * (w[0] + w[1])).collect();
     let every = between.len().div_ceil(MOST_STAIRS).max(1);
-    between.into_iter().step_by(every).collect()
+    let own = between.partition_point(|t| *t < centre);
+    let is_tried = |k: usize| k.abs_diff(own) <= NEAREST || k.is_multiple_of(every);
+    let tried = between.into_iter().enumerate();
+    tried
+        .filter(|(k, _)| is_tried(*k))
+        .map(|(_, t)| t)
+        .collect()
+}
+
+/// Rows to each side of a jump over which its size is taken, and how many jumps are looked at.
+const ASIDE: usize = 3;
+const JUMPS: usize = 8;
+
+/// A jump of the error between two rows.
+#[derive(Debug, Clone, Copy)]
+struct Jump {
+    /// u between them.
+    at: f64,
+    /// The temperature rises.
+    rising: bool,
+    /// By which the error does, deg/s.
+    by_dps: f64,
+}
+
+/// The largest jumps of the error in the rows that are seen, each the largest within [`ASIDE`] rows.
+fn jumps(c: &Channels, seen: &[bool]) -> Vec<Jump> {
+    let pairs = c.error_dps.iter().zip(seen);
+    let e: Vec<f64> = pairs.map(|(e, s)| if *s { *e } else { f64::NAN }).collect();
+    let mean = |rows: std::ops::Range<usize>| {
+        let (sum, count) = e[rows]
+            .iter()
+            .filter(|v| v.is_finite())
+            .fold((0.0, 0), |s, v| (s.0 + v, s.1 + 1));
+        if count > 0 {
+            sum / f64::from(count)
+        } else {
+            f64::NAN
+        }
+    };
+    let sizes: Vec<f64> = (ASIDE..e.len().saturating_sub(ASIDE - 1))
+        .map(|i| mean(i..i + ASIDE) - mean(i - ASIDE..i))
+        .map(|d| if d.is_finite() { d } else { 0.0 })
+        .collect();
+    let tops = (0..sizes.len()).filter(|k| {
+        let around = &sizes[k.saturating_sub(ASIDE)..(k + ASIDE + 1).min(sizes.len())];
+        around.iter().all(|d| d.abs() <= sizes[*k].abs())
+    });
+    let mut all: Vec<Jump> = tops
+        .map(|k| {
+            let (before, after) = (c.smooth_u[k + ASIDE - 1], c.smooth_u[k + ASIDE]);
+            Jump {
+                at: 0.5 * (before + after),
+                rising: after > before,
+                by_dps: sizes[k],
+            }
+        })
+        .collect();
+    all.sort_by(|a, b| b.by_dps.abs().total_cmp(&a.by_dps.abs()));
+    all.truncate(JUMPS);
+    all
+}
+
+/// Steps that switch where the error jumps: to the row, which a grid of thresholds does not hit where readings are many.
+fn at_jumps(c: &Channels, seen: &[bool]) -> Vec<Point> {
+    let jumps = jumps(c, seen);
+    let mut out = Vec::new();
+    for jump in &jumps {
+        out.push(Point::at(0, &[jump.at]));
+        out.push(Point::at(2, &[jump.at]));
+        let back = |b: &&Jump| b.rising != jump.rising && b.by_dps * jump.by_dps < 0.0;
+        for other in jumps.iter().filter(back).filter(|_| jump.rising) {
+            let (up, down) = (jump.at, other.at);
+            if up > down {
+                out.push(Point::at(1, &[0.5 * (up + down), up - down]));
+            }
+        }
+    }
+    out
 }
 
 /// Gaps, in u, that firmware is tried with beyond the model's: what a noisy reading does not cross twice.
@@ -193,9 +271,9 @@ impl Candidate for StressJump {
         if point.form == 2 { 4.0 } else { 0.0 }
     }
 
-    fn fine(&self, _c: &Channels, _point: &Point) -> Vec<Point> {
+    fn fine(&self, c: &Channels, _point: &Point, seen: &[bool]) -> Vec<Point> {
         // Where the temperature wanders, a step that is a little off switches at other times.
-        let mut out = Vec::new();
+        let mut out = at_jumps(c, seen);
         for j in 0..75 {
             let centre = -0.9 + 1.8 * f64::from(j) / 74.0;
             out.push(Point::at(0, &[centre]));

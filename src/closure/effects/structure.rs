@@ -159,7 +159,7 @@ impl Candidate for ModeCrossing {
         true
     }
 
-    fn fine(&self, _c: &Channels, _point: &Point) -> Vec<Point> {
+    fn fine(&self, _c: &Channels, _point: &Point, _seen: &[bool]) -> Vec<Point> {
         let mut out = Vec::new();
         for k in 0..10 {
             let width = 0.02 * 1.45f64.powi(k);

@@ -80,7 +80,12 @@ impl Search<'_> {
     fn polished_once(&self, mut model: Model) -> Result<Model, Unusable> {
         for k in 0..model.terms.len() {
             let term = &model.terms[k];
-            let finer = || !term.candidate.fine(self.channels, &term.point).is_empty();
+            let finer = || {
+                !term
+                    .candidate
+                    .fine(self.channels, &term.point, &self.used)
+                    .is_empty()
+            };
             if term.evident || term.point.theta.is_empty() && !finer() {
                 continue;
             }
@@ -146,7 +151,7 @@ impl Search<'_> {
             refine::climbed(start, map(&steps, |s| 0.5 * s), gain)
         };
         let mut fine: Vec<(Point, f64)> = candidate
-            .fine(c, &term.point)
+            .fine(c, &term.point, &self.used)
             .into_iter()
             .map(|p| {
                 let there = gain(&p);

@@ -73,7 +73,7 @@ impl Search<'_> {
                 self.heldout_error(&model, &model),
                 self.heldout_error(&without, &model),
             );
-            let silent = term.p_value <= CERTAIN && self.unseen(&model, &term);
+            let silent = term.p_value <= CERTAIN && self.unseen(&model, &without);
             if !silent && a.innovations >= b.innovations && a.square >= b.square {
                 self.leaves(found, &term);
                 model = without;
@@ -84,20 +84,18 @@ impl Search<'_> {
         Ok(model)
     }
 
-    /// Whether a term adds next to nothing in held-out rows, so that these say nothing of it: a clip of a few rows,
-    /// a warm-up that is over before the first of them.
-    fn unseen(&self, model: &Model, term: &Term) -> bool {
-        let columns = term
-            .candidate
-            .columns(self.channels, &model.acting, &term.point);
-        let square = |column: &Vec<f64>, rows: &[bool]| -> f64 {
-            let pairs = column.iter().zip(rows);
-            pairs.filter(|(_, row)| **row).map(|(v, _)| v * v).sum()
+    /// Whether a model with and one without a term say next to the same of the held-out rows, so that these say nothing of
+    /// it: a clip of a few rows, a warm-up that is over before the first of them, a step that all of them lie above.
+    fn unseen(&self, with: &Model, without: &Model) -> bool {
+        let c = self.channels;
+        let (with, without) = (with.residual(c), without.residual(c));
+        let square = |rows: &[bool]| -> f64 {
+            let apart = with.iter().zip(&without).map(|(a, b)| a - b);
+            let pairs = apart.zip(rows).filter(|(d, row)| **row && d.is_finite());
+            pairs.map(|(d, _)| d * d).sum()
         };
-        columns.iter().all(|column| {
-            let held = square(column, &self.heldout);
-            held <= UNSEEN * (held + square(column, &self.used))
-        })
+        let held = square(&self.heldout);
+        held <= UNSEEN * (held + square(&self.used))
     }
 
     /// Tones of too few periods keep their shape and lose their name.
