@@ -24,6 +24,9 @@ const WORTH_WHOLE: f64 = 5.0;
 const LOOKED: usize = 5;
 const MARGIN: f64 = 4.0;
 
+/// Names that are asked whether they are enough where a shape without a name explains more.
+const ENOUGH: usize = 2;
+
 /// Most rounds of forward steps and sweeps.
 const ROUNDS: usize = 3;
 
@@ -134,6 +137,12 @@ impl Search<'_> {
         let significant: Vec<&Judged> =
             round.judged.iter().filter(|j| j.p_value <= LEVEL).collect();
         let leader = significant.first();
+        let begins = model.terms.iter().all(|t| t.evident);
+        if let Some(opening) = self.beginning.borrow().opening.as_ref().filter(|_| begins)
+            && let Some(name) = significant.iter().find(|j| j.candidate.id() == *opening)
+        {
+            return Ok(decided(Term::of(name, round.rivals(name))));
+        }
         if let Some(term) = self.of_spikes(model, &significant)? {
             return Ok(Next::Add(term));
         }
@@ -276,7 +285,20 @@ impl Search<'_> {
                 best = Some((j, both));
             }
         }
-        Ok(best.map(|b| b.0))
+        if let Some((j, _)) = best {
+            return Ok(Some(j));
+        }
+        // A shape with more coefficients follows the noise as well: a name beside which nothing is beyond chance is enough.
+        for j in names().take(ENOUGH) {
+            let mut terms = model.terms.clone();
+            terms.push(Term::of(j, Vec::new()));
+            let with = self.polished(self.model(&terms)?)?;
+            let left = self.round(&with, self.effort.surrogates);
+            if left.judged.iter().all(|j| j.p_value > LEVEL) && !self.coloured(&with) {
+                return Ok(Some(j));
+            }
+        }
+        Ok(None)
     }
 }
 

@@ -7,6 +7,7 @@ use crate::closure::effects::tone::{Pickup, returns};
 use crate::closure::effects::{Bias, Candidate, Missing, Point, map};
 use crate::closure::likelihood::candidates::Group;
 use crate::closure::likelihood::linear::add_scaled;
+use crate::closure::likelihood::noise::Shape;
 use crate::closure::likelihood::reml::Fit;
 use crate::closure::likelihood::score::{self, Scores};
 use std::cmp::Ordering;
@@ -26,6 +27,12 @@ pub const EQUAL: f64 = 4.0;
 /// The same where the temperature goes one way: what depends on temperature is then a function of time and
 /// the other way round, so that a catalogue's idealised forms differ by less than the truth from each.
 const EQUAL_ONE_WAY: f64 = 12.0;
+
+/// No slow noise.
+const WHITE: Shape = Shape {
+    flicker: 0.0,
+    walk: 0.0,
+};
 
 /// How good two explanations of a record are equal.
 pub fn equal(c: &Channels) -> f64 {
@@ -102,8 +109,8 @@ impl Search<'_> {
         let mut missing = Vec::new();
         let mut running: Running = Vec::new();
         let taken: Vec<String> = model.terms.iter().map(|t| t.id()).collect();
-        let barred = self.barred.borrow();
-        let is_out = |id: String| taken.contains(&id) || barred.contains(&id);
+        let beginning = self.beginning.borrow();
+        let is_out = |id: String| taken.contains(&id) || beginning.barred.contains(&id);
         for candidate in &self.candidates {
             if is_out(candidate.id()) {
                 continue;
@@ -128,6 +135,7 @@ impl Search<'_> {
             _ => scores.grid.clone(),
         };
         let tone = tones::strongest(c, fit, &grid);
+        let tone = tone.map(|tone| tones::unaliased(c, fit, &model.residual(c), tone));
         if let Some(tone) = tone {
             let taken = taken.iter().any(|id| id == "periodic_pickup");
             let pickup: Arc<dyn Candidate> = Arc::new(Pickup {
@@ -206,12 +214,27 @@ impl Search<'_> {
                 None => (point, None),
             };
             // At one noise; the null hypothesis may choose the one that suits it best.
-            let bench = bench.filter(|_| candidate.is_sized(&point));
-            let whole = bench.map(|bench| {
+            let mut at = vec![(shape, bench)];
+            if near && (candidate.is_whole() || candidate.is_local()) {
+                at.push((WHITE, Some(Bench::new(fit, WHITE))));
+            }
+            let value = |p: &Point, (shape, bench): &(Shape, Option<Bench<'_>>)| {
                 let bias = bias.as_ref().unwrap_or(&model.bias);
-                refine::gain(&bench, candidate.as_ref(), c, bias, &point)
-            });
-            let whole = whole.map(|g| g + fit.problem.evaluate(shape).loglik - fit.at.loglik);
+                let there = refine::gain(bench.as_ref()?, candidate.as_ref(), c, bias, p);
+                Some(there + fit.problem.evaluate(*shape).loglik - fit.at.loglik)
+            };
+            let best = |p: &Point| at.iter().filter_map(|a| value(p, a)).max_by(f64::total_cmp);
+            // A residual with sharp ends looks like a walk without white noise, to which a threshold that is off by a row is
+            // no better than none: it is found where the noise is white.
+            let sharp = at
+                .get(1)
+                .and_then(|a| self.sharpened(model, candidate.as_ref(), points, a.1.as_ref()?));
+            let net = |p: &Point| best(p).map(|v| v - price(candidate.as_ref(), c, p));
+            let point = match sharp {
+                Some(sharp) if net(&sharp) > net(&point) => sharp,
+                _ => point,
+            };
+            let whole = best(&point).filter(|_| candidate.is_sized(&point));
             starts.push((candidate.clone(), point, p_value));
             wholes.push(whole);
             biases.push(bias);
@@ -247,6 +270,23 @@ impl Search<'_> {
 }
 
 impl Search<'_> {
+    /// The best point of a shape with thresholds on a bench.
+    fn sharpened(
+        &self,
+        model: &Model,
+        candidate: &dyn Candidate,
+        points: &[Point],
+        bench: &Bench<'_>,
+    ) -> Option<Point> {
+        let c = self.channels;
+        let gain = |p: &Point| refine::gain(bench, candidate, c, &model.bias, p);
+        let net = |p: &Point| gain(p) - price(candidate, c, p);
+        let each = points.iter().map(|p| (net(p), p));
+        let (_, start) = each.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let steps = map(&candidate.spacing(c, start), |s| 0.5 * s);
+        Some(refine::climbed(start, steps, gain))
+    }
+
     /// The best of `points` whose coefficients physics admits, each with the declared bias that is there beside it: a
     /// strong effect that acts on the bias bends what the declared model finds without it, and would be judged by
     /// a bias that it made itself.

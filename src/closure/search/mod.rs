@@ -9,6 +9,7 @@
 
 mod acting;
 mod clip;
+
 pub mod constancy;
 pub mod estimate;
 mod evident;
@@ -38,6 +39,7 @@ use super::rails::{self, Rails};
 use clip::{Kind, clip};
 use judge::{Judged, Round};
 use memo::Memo;
+use otherwise::Beginning;
 use std::cell::RefCell;
 use std::sync::Arc;
 
@@ -178,7 +180,7 @@ pub struct Search<'a> {
     candidates: Vec<Arc<dyn Candidate>>,
     models: Memo<Arc<Model>>,
     rounds: Memo<Arc<Round>>,
-    barred: RefCell<Vec<String>>,
+    beginning: RefCell<Beginning>,
 }
 
 /// The regressors of the declared model: 1, u, u^2.
@@ -240,13 +242,13 @@ impl<'a> Search<'a> {
             candidates,
             models: Memo::default(),
             rounds: Memo::default(),
-            barred: RefCell::default(),
+            beginning: RefCell::default(),
         }
     }
 
     /// Never again a candidate: it was taken and did not hold. Rounds with it are forgotten.
     fn bar(&self, id: String) {
-        self.barred.borrow_mut().push(id);
+        self.beginning.borrow_mut().barred.push(id);
         self.rounds.clear();
     }
 

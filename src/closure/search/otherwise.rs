@@ -3,14 +3,29 @@
 //! Steps are taken one by one. Beside causes that are not in yet, a narrow resonance may look like the step that is there
 //! (both are sudden at one temperature, and slow noise hides the rest), and a curve without a name follows a little of
 //! all causes; what comes after mends the wrong model. Without such a shape the steps may lead to names that
-//! explain more: then it was not called for.
+//! explain more: then it was not called for. And of two causes the one that comes first is fitted to both, so that the
+//! other finds its place taken: what comes second may have to come first.
 
-use super::judge::{PRICE, price};
+use super::judge::{Judged, PRICE, price};
 use super::{Found, LEVEL, Model, Search, Term};
 use crate::closure::likelihood::Unusable;
 
-/// Most other beginnings.
+/// Most other beginnings without a shape, and most with another name first.
 const BEGINNINGS: usize = 3;
+const OPENINGS: usize = 2;
+
+/// Neighbouring rows that both stand out: so many pairs may be accidents, and so many times what is expected of
+/// rows that stand out independently of each other.
+const PAIRS: f64 = 4.0;
+
+/// How a search begins.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub(super) struct Beginning {
+    /// Never candidates: what was taken and did not hold, or what this run does without.
+    pub barred: Vec<String>,
+    /// The first step, if it is beyond chance.
+    pub opening: Option<String>,
+}
 
 impl Search<'_> {
     /// Runs the search.
@@ -18,18 +33,19 @@ impl Search<'_> {
     /// # Errors
     /// Too few rows to fit anything.
     pub fn run(&self) -> Result<Found, Unusable> {
-        let (first, reached) = self.run_once(false)?;
-        if first.left.is_none() || !first.undecided.is_empty() {
+        let (mut first, reached) = self.run_once(false)?;
+        let clustered = self.clustered(&self.model(&first.terms)?);
+        if first.left.is_none() && !clustered || !first.undecided.is_empty() {
             return Ok(first);
         }
         let due = self.net(&reached);
-        let barred = self.begin_without(Vec::new());
-        for without in beginnings(&reached.terms) {
-            self.begin_without(without);
+        let barred = self.begin(Beginning::default());
+        for beginning in beginnings(&reached.terms, &first) {
+            self.begin(beginning);
             let (other, _) = self.run_once(true)?;
-            let own = self.begin_without(Vec::new());
+            let own = self.begin(Beginning::default());
             if let Some(found) = self.better(other, due)? {
-                self.begin_without(own);
+                self.begin(own);
                 return Ok(Found {
                     first: first.first,
                     missing: first.missing,
@@ -37,15 +53,27 @@ impl Search<'_> {
                 });
             }
         }
-        self.begin_without(barred);
+        self.begin(barred);
+        if clustered {
+            first.left = first.left.or_else(|| Some("time_s".to_owned()));
+        }
         Ok(first)
     }
 
-    /// What is judged next does without these; what was barred until now. The report's rounds do without what the
-    /// accepted run did without: else a name that was taken without it competes with it again.
-    fn begin_without(&self, ids: Vec<String>) -> Vec<String> {
+    /// Whether the rows that stand out of a model stand together: accidents do not.
+    fn clustered(&self, model: &Model) -> bool {
+        let rows = model.fit.row_weights.iter().zip(&self.used);
+        let out: Vec<bool> = rows.filter(|(_, u)| **u).map(|(w, _)| *w < 0.5).collect();
+        let count = out.iter().filter(|o| **o).count() as f64;
+        let pairs = out.windows(2).filter(|w| w[0] && w[1]).count() as f64;
+        pairs > PAIRS * (1.0 + count * count / out.len().max(1) as f64)
+    }
+
+    /// How the next run begins; how the last one did. The report's rounds do without what the accepted run did
+    /// without: else a name that was taken without it competes with it again.
+    fn begin(&self, how: Beginning) -> Beginning {
         self.rounds.clear();
-        self.barred.replace(ids)
+        self.beginning.replace(how)
     }
 
     /// A run's names, if they explained everything to it and are worth more than `due`, the model that the first run came
@@ -55,7 +83,7 @@ impl Search<'_> {
             return Ok(None);
         }
         let model = self.model(&found.terms)?;
-        if self.net(&model) <= due {
+        if self.net(&model) <= due || self.clustered(&model) {
             return Ok(None);
         }
         let round = self.round(&model, self.effort.surrogates);
@@ -75,9 +103,22 @@ impl Search<'_> {
     }
 }
 
-/// What to do without, one at a time: the shapes of a model without a name, and those at one temperature.
-fn beginnings(terms: &[Term]) -> Vec<Vec<String>> {
+/// What to do without, one at a time: the shapes of a model without a name, and those at one temperature; then which of
+/// the first round's names to begin with instead of its best.
+fn beginnings(terms: &[Term], first: &Found) -> Vec<Beginning> {
     let doubted = |t: &&Term| !t.candidate.named() || t.candidate.is_local();
-    let each = terms.iter().filter(doubted).map(|t| vec![t.id()]);
-    each.take(BEGINNINGS).collect()
+    let without = terms.iter().filter(doubted).take(BEGINNINGS);
+    let mut out: Vec<Beginning> = without
+        .map(|t| Beginning {
+            barred: vec![t.id()],
+            opening: None,
+        })
+        .collect();
+    let names = first.first.iter().filter(|j| Judged::is_found(j));
+    let openings = names.map(|j| j.candidate.id()).skip(1).take(OPENINGS);
+    out.extend(openings.map(|id| Beginning {
+        barred: Vec::new(),
+        opening: Some(id),
+    }));
+    out
 }

@@ -153,3 +153,48 @@ pub fn strongest(c: &Channels, fit: &Fit, grid: &Grid) -> Option<Tone> {
         p_value: (p_value / weights.max(f64::MIN_POSITIVE)).min(1.0),
     })
 }
+
+/// Places around a frequency at which the rows are looked at, within one over the record's length to each side.
+const AROUND: i32 = 4;
+
+/// The tone that the rows have, where the fit sees the means of blocks of rows: a faster one looks slower there. `rest`:
+/// what the model leaves, deg/s, every row.
+pub fn unaliased(c: &Channels, fit: &Fit, rest: &[f64], tone: Tone) -> Tone {
+    let Some(blocks) = &fit.decimated else {
+        return tone;
+    };
+    let block_hz = 1.0 / (blocks.rows as f64 * c.period_s());
+    let fastest_hz = 0.5 / c.period_s();
+    let near = |hz: f64| {
+        (-AROUND..=AROUND).map(move |k| hz + f64::from(k) / f64::from(AROUND) / c.span_s())
+    };
+    let order = (blocks.rows / 2 + 1) as i32;
+    let each = (-order..=order).map(|k| (tone.frequency_hz + f64::from(k) * block_hz).abs());
+    let lowest_hz = LEAST_PERIODS / c.span_s();
+    let within = each
+        .flat_map(near)
+        .filter(|hz| (lowest_hz..=fastest_hz).contains(hz));
+    let with_power = within.map(|hz| (power(&c.time_s, rest, &blocks.weights, hz), hz));
+    match with_power.max_by(|a, b| a.0.total_cmp(&b.0)) {
+        Some((_, frequency_hz)) => Tone {
+            frequency_hz,
+            ..tone
+        },
+        None => tone,
+    }
+}
+
+/// Square of a signal's product with a unit phasor, over the rows of a weight (Schuster's periodogram).
+fn power(time_s: &[f64], y: &[f64], weights: &[f64], hz: f64) -> f64 {
+    let rows = time_s.iter().zip(y).zip(weights);
+    let used = rows.filter(|((_, y), w)| **w > 0.0 && y.is_finite());
+    let (s, c) = used.fold((0.0, 0.0), |(s, c), ((t, y), _)| {
+        let (sine, cosine) = (TAU * hz * t).sin_cos();
+        (s + y * sine, c + y * cosine)
+    });
+    s * s + c * c
+}
+
+#[cfg(test)]
+#[path = "tones_tests.rs"]
+mod tests;

@@ -128,7 +128,10 @@ mod tests {
         let left = search.without_undone(model).unwrap();
         assert_eq!(left.terms.len(), 2 - usize::from(before.is_some()));
         // It never comes back.
-        assert_eq!(search.barred.borrow().len(), usize::from(before.is_some()));
+        assert_eq!(
+            search.beginning.borrow().barred.len(),
+            usize::from(before.is_some())
+        );
         before
     }
 
