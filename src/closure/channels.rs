@@ -122,12 +122,12 @@ impl Channels {
     /// # Errors
     /// Too few rows.
     pub fn split(&self) -> Result<Split, Unusable> {
-        let rate = self.columns.get("rate_dps").filter(|rate| {
-            let (low, high) = range(rate);
-            high > low
-        });
-        let output = rate.map(|_| self.output_dps());
-        blocks::split(&self.time_s, &self.u, output.as_deref())
+        let output = self.moving("rate_dps").map(|_| self.output_dps());
+        let moving = |name: &&String| *name != "rate_dps" && *name != "time_s";
+        let names = self.columns.keys().filter(moving);
+        let mut cared: Vec<&[f64]> = names.filter_map(|name| self.moving(name)).collect();
+        cared.extend(output.as_deref());
+        blocks::split(&self.time_s, &self.u, &cared)
     }
 
     /// (temperature at u = 0, change per u): the thermometer itself, another one by regression, or

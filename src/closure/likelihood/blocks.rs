@@ -10,8 +10,8 @@
 //!    extrapolated).
 //! 3. Of the 35 ways to do that, the one is taken whose training rows leave the narrowest gaps in the
 //!    thermometer's range, taken as a whole and on the way up and down, and, where a rate was applied, hold
-//!    out no more than a third of the highest and of the lowest readings, the first among equals:
-//!    held-out error is about interpolation, and a clip shows in few rows.
+//!    out no more than a third of the highest and of the lowest readings, nor of those of any other channel; the first
+//!    among equals: held-out error is about interpolation, and a clip shows in few rows.
 //!
 //! Held-out rows are not used in any estimate, and predictions for them are those of the
 //! regressors alone: the noise's memory never carries a training row's noise across the border.
@@ -47,17 +47,14 @@ pub struct Split {
     pub segment: Vec<usize>,
 }
 
-/// The split of a record; `output`: its readings, where a rate was applied (their outermost rows are then cared for).
+/// The split of a record; `cared`: columns whose outermost rows are cared for (the output where a rate was applied, and every
+/// channel that may be a cause).
 ///
 /// A record of less than three rows a span is cut into spans of three.
 ///
 /// # Errors
 /// Fewer than [`LEAST`] rows, lengths that differ.
-pub fn split(
-    times_s: &[f64],
-    thermometer: &[f64],
-    output: Option<&[f64]>,
-) -> Result<Split, Unusable> {
+pub fn split(times_s: &[f64], thermometer: &[f64], cared: &[&[f64]]) -> Result<Split, Unusable> {
     let n = times_s.len();
     if thermometer.len() != n {
         return Err(Unusable::NotFinite("the thermometer"));
@@ -73,7 +70,7 @@ pub fn split(
     let of_rows = |spans: usize| (0..n).map(|i| i * spans / n).collect();
     let judge = Judge {
         direction: directions(thermometer),
-        outermost: output.map(outermost).unwrap_or_default(),
+        outermost: cared.iter().flat_map(|column| outermost(column)).collect(),
         thermometer,
     };
     let (_, heldout, segment) = if count >= RAMPS && evenly_long(&ramps, count) {
@@ -333,7 +330,7 @@ mod tests {
 
     fn shares(thermometer: &[f64]) -> (f64, usize, Split) {
         let times: Vec<f64> = (0..thermometer.len()).map(|i| i as f64).collect();
-        let split = split(&times, thermometer, None).unwrap();
+        let split = split(&times, thermometer, &[]).unwrap();
         let held = split.heldout.iter().filter(|h| **h).count();
         let starts = split.heldout.windows(2).filter(|w| !w[0] && w[1]).count();
         (held as f64 / thermometer.len() as f64, starts, split)
@@ -358,7 +355,7 @@ mod tests {
                 assert!(open < most, "{what}: {open}");
             }
         }
-        assert!(super::split(&[0.0; 10], &[0.0; 10], None).is_err());
+        assert!(super::split(&[0.0; 10], &[0.0; 10], &[]).is_err());
     }
 
     #[test]
@@ -401,12 +398,12 @@ mod tests {
                 })
                 .collect();
             let lost = |output| {
-                let split = super::split(&times, &t, output).unwrap();
+                let split = super::split(&times, &t, &[output]).unwrap();
                 split.heldout[30 * highest as usize]
             };
-            assert!(!lost(Some(output.as_slice())), "{highest}");
+            assert!(!lost(output.as_slice()), "{highest}");
         }
-        let blind = super::split(&times, &t, None).unwrap();
+        let blind = super::split(&times, &t, &[]).unwrap();
         assert!((0..15).any(|s| blind.heldout[30 * s]));
     }
 

@@ -7,6 +7,8 @@
 //! other finds its place taken: what comes second may have to come first.
 
 use super::judge::{Judged, PRICE, price};
+use super::reported::WANDER;
+use super::structure::slowness;
 use super::{Found, LEVEL, Model, Search, Term};
 use crate::closure::likelihood::Unusable;
 
@@ -34,8 +36,13 @@ impl Search<'_> {
     /// Too few rows to fit anything.
     pub fn run(&self) -> Result<Found, Unusable> {
         let (mut first, reached) = self.run_once(false)?;
-        let clustered = self.clustered(&self.model(&first.terms)?);
-        if first.left.is_none() && !clustered || !first.undecided.is_empty() {
+        let model = self.model(&first.terms)?;
+        let clustered = self.clustered(&model);
+        // Names that leave a wander may be the wrong ones, or not all.
+        let slow = slowness(model.fit.at.shape, model.fit.problem.line.used());
+        let wanders = !first.terms.is_empty() && slow > WANDER;
+        let clean = first.left.is_none() && !clustered && !wanders;
+        if clean || !first.undecided.is_empty() {
             return Ok(first);
         }
         let due = self.net(&reached);

@@ -13,7 +13,7 @@ const BESIDE: f64 = 0.87;
 /// Slow noise, rms in units of the white, from which on a name needs more than the usual probability, and the powers of
 /// ten that each further unit asks for: what was not recorded wanders as slow noise does, but probabilities are reckoned
 /// with noise that is Gaussian and everywhere the same.
-const WANDER: f64 = 1.0;
+pub(super) const WANDER: f64 = 1.0;
 const DECADES: f64 = 4.0;
 
 /// A probability that is enough beside anything, and a held-out error without the name that is, times the one with it.
