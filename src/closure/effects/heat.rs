@@ -22,8 +22,7 @@ const THERMAL_LAG: Sheet = Sheet {
     id: "thermal_lag",
     physics: "part of the bias (electronics, package) follows a temperature that lags the \
               structure's: a loop between heating and cooling that closes in dwells",
-    equation: "k (T - T_l), or k (T - T_l) + q (T^2 - T_l^2), T from the middle; tau dT_l/dt = T - T_l, T_l = T at \
-               the start, or not (a record that begins before the gyro is soaked)",
+    equation: "k (T - T_l), or k (T - T_l) + q (T^2 - T_l^2), T from the middle; tau dT_l/dt = T - T_l",
     parameters: &[
         Parameter {
             name: "gain_dps_per_k",
@@ -55,7 +54,7 @@ impl Candidate for ThermalLag {
         let fastest = (1.5 * c.period_s()).max(1e-3);
         let slowest = (c.span_s() / 2.5).max(2.0 * fastest);
         let taus = spaced(fastest, slowest, 18);
-        let forms = if c.span_s() > 0.0 { 3 * c.heats() } else { 0 };
+        let forms = if c.span_s() > 0.0 { 2 * c.heats() } else { 0 };
         (0..forms)
             .flat_map(|form| taus.iter().map(move |t| Point::at(form, &[t.ln()])))
             .collect()
@@ -71,20 +70,11 @@ impl Candidate for ThermalLag {
         match Lagging::of(c, point) {
             Lagging::Linear => vec![behind(1)],
             Lagging::Curved => vec![behind(1), behind(2)],
-            Lagging::Unsoaked => vec![behind(1), fading(c, tau_s(c, point))],
         }
     }
 
     fn spacing(&self, c: &Channels, _point: &Point) -> Vec<f64> {
         vec![((c.span_s() / c.period_s()).max(4.0)).ln() / 18.0]
-    }
-
-    fn surcharge(&self, c: &Channels, point: &Point) -> f64 {
-        // A transient at the start alone is a warm-up's.
-        match Lagging::of(c, point) {
-            Lagging::Unsoaked => 4.0,
-            _ => 0.0,
-        }
     }
 
     fn correction(&self, c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
@@ -121,11 +111,7 @@ impl Candidate for ThermalLag {
             tau_s,
             kept,
         };
-        let mut columns = self.columns(c, &f.bias, &e.point);
-        if lagging == Lagging::Unsoaked {
-            // How this record began is no law: the firmware starts soaked.
-            columns.truncate(1);
-        }
+        let columns = self.columns(c, &f.bias, &e.point);
         // A curve of a lagging tangent is neither of the last two: what comes nearest is taken.
         let terms: &[&LagTerm<'_>] = match (tangent, lagging) {
             (_, Lagging::Curved) => &[&curve_of_late, &late_curve],
@@ -145,12 +131,8 @@ impl Candidate for ThermalLag {
         let mut out: Reported = [gain("gain_dps_per_k", e, 0, per_k), from_log("tau_s", e, 0)]
             .into_iter()
             .collect();
-        match (Lagging::of(c, &e.point), &e.beta[..]) {
-            (Lagging::Curved, _) => out.extend([gain("curvature_dps_per_k2", e, 1, per_k * per_k)]),
-            (Lagging::Unsoaked, [of_u, _]) if *of_u != 0.0 => {
-                out.extend([gain("start_behind_k", e, 1, c.kelvin_per_u / of_u)]);
-            }
-            _ => {}
+        if Lagging::of(c, &e.point) == Lagging::Curved {
+            out.extend([gain("curvature_dps_per_k2", e, 1, per_k * per_k)]);
         }
         out
     }
@@ -163,24 +145,15 @@ enum Lagging {
     Linear,
     /// One with a curve of its own.
     Curved,
-    /// A linear one whose temperature was another one when the record began.
-    Unsoaked,
 }
 
 impl Lagging {
     fn of(c: &Channels, point: &Point) -> Self {
         match point.form / c.heats() {
             0 => Lagging::Linear,
-            1 => Lagging::Curved,
-            _ => Lagging::Unsoaked,
+            _ => Lagging::Curved,
         }
     }
-}
-
-/// What is left of a difference at the start of the record.
-fn fading(c: &Channels, tau_s: f64) -> Vec<f64> {
-    let start_s = c.time_s.first().copied().unwrap_or(0.0);
-    map(&c.time_s, |t| (-(t - start_s) / tau_s).exp())
 }
 
 /// The time constant of a lag: shorter ones are a rate of change, longer ones a drift in time.
@@ -252,7 +225,3 @@ impl Candidate for TemperatureRate {
 
 /// Rows to each side of a slope.
 const SLOPES: [usize; 5] = [1, 2, 3, 5, 9];
-
-#[cfg(test)]
-#[path = "heat_tests.rs"]
-mod tests;

@@ -49,14 +49,19 @@ const STRESS_JUMP: Sheet = Sheet {
 /// Form of a step that is spread over a width.
 const SPREAD: usize = 3;
 
-/// Widths that are tried, in u, and the widest: a wider one is a bend of the bias.
+/// Widths that are tried, in u, the narrowest (a narrower one is sharp) and the widest (a wider one is a bend of the bias).
 const WIDTHS: [f64; 3] = [0.012, 0.03, 0.08];
+const NARROWEST: f64 = 0.01;
 const WIDEST: f64 = 0.15;
+
+/// Of a step that is spread, in u.
+fn width(point: &Point) -> f64 {
+    point.theta[1].exp().clamp(NARROWEST, WIDEST)
+}
 
 /// A step from 0 to 1 that is spread: the mean of sharp ones.
 fn spread(point: &Point, u: f64) -> f64 {
-    let width = point.theta[1].exp().min(WIDEST);
-    1.0 / (1.0 + (-2.0 * (u - point.theta[0]) / width).exp())
+    1.0 / (1.0 + (-2.0 * (u - point.theta[0]) / width(point)).exp())
 }
 
 /// Gaps of the hysteresis that are tried, in u.
@@ -286,7 +291,7 @@ impl Candidate for StressJump {
 
     fn spacing(&self, _c: &Channels, point: &Point) -> Vec<f64> {
         match point.form {
-            SPREAD => vec![point.theta[1].exp().min(WIDEST), 0.5],
+            SPREAD => vec![width(point), 0.5],
             1 => vec![0.05; 2],
             _ => vec![0.05],
         }
@@ -328,7 +333,7 @@ impl Candidate for StressJump {
         if e.point.form == SPREAD {
             let shape = |u: f64| gain_dps * spread(&e.point, u);
             // Eight knots over a width keep the linear interpolation two thousandths off.
-            let count = (16.0 / e.point.theta[1].exp()).clamp(129.0, 1025.0) as usize;
+            let count = (16.0 / width(&e.point)).clamp(129.0, 1025.0) as usize;
             return Some(vec![Term::Curve {
                 input,
                 values_dps: knots(count).map(shape).collect(),
@@ -366,7 +371,7 @@ impl Candidate for StressJump {
             out.insert("gap_k".to_owned(), ((k * gap).abs(), (k * std(1)).abs()));
         }
         if e.point.form == SPREAD {
-            let width = e.point.theta[1].exp().min(WIDEST);
+            let width = width(&e.point);
             let std = (k * width * std(1)).abs();
             out.insert("width_k".to_owned(), ((k * width).abs(), std));
         }

@@ -253,19 +253,22 @@ impl Search<'_> {
             let price: f64 = added.iter().map(|j| j.gain - j.net).sum();
             Ok(self.model_with(&terms, &near)?.value - price)
         };
+        // Levels, widths and forms lie between those that were tried: as good as they get.
+        let as_good = |added: &[&Judged]| -> Result<f64, Unusable> {
+            let sharp = |j: &&Judged| j.candidate.is_whole() || j.candidate.is_local();
+            if !added.iter().any(sharp) {
+                return value(added);
+            }
+            let mut terms = model.terms.clone();
+            terms.extend(added.iter().map(|j| Term::of(j, Vec::new())));
+            let price: f64 = added.iter().map(|j| j.gain - j.net).sum();
+            Ok(self.polished(self.model(&terms)?)?.value - price)
+        };
         let alone = value(&[leader])?;
         let mut best: Option<(&Judged, f64)> = None;
         let names = || significant.iter().filter(|j| j.candidate.named()).take(4);
         for j in names() {
-            let one = match j.candidate.is_whole() || j.candidate.is_local() {
-                // Its levels, widths or form lie between those that were tried: as good as they get.
-                true => {
-                    let mut terms = model.terms.clone();
-                    terms.push(Term::of(j, Vec::new()));
-                    self.polished(self.model(&terms)?)?.value - (j.gain - j.net)
-                }
-                false => value(&[j])?,
-            };
+            let one = as_good(&[j])?;
             if one > alone - STRANGER && best.is_none_or(|b| one > b.1) {
                 best = Some((j, one));
             }
@@ -280,7 +283,7 @@ impl Search<'_> {
             let Some(second) = second.judged.iter().find(|j| j.candidate.named()) else {
                 continue;
             };
-            let both = value(&[j, second])?;
+            let both = as_good(&[j, second])?;
             if both > alone - STRANGER && best.is_none_or(|b| both > b.1) {
                 best = Some((j, both));
             }

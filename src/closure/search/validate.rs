@@ -3,8 +3,12 @@
 use super::judge::Judged;
 use super::reported::BEYOND;
 use super::{Found, LEVEL, Model, Search, Term, structure};
+use crate::closure::channels::Channels;
+use crate::closure::effects::map;
 use crate::closure::effects::tone::{self, Pickup};
 use crate::closure::likelihood::Unusable;
+use crate::closure::likelihood::linear::{Basis, dot};
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 /// Slow noise, in units of white noise over the record, from which on a single step is no evidence.
@@ -18,6 +22,9 @@ const UNSEEN: f64 = 0.01;
 /// A sinusoid beside which another one of this share of its gain is needed is none: a drifting tone, or
 /// something else that repeats.
 const OVERTONE: f64 = 0.1;
+
+/// Share of a channel's square about its mean from which on a tone of that frequency is the channel's.
+const WAVING: f64 = 0.5;
 
 /// Share of a shape's square that a single row may hold: what shows in one row, anything may have made.
 const ONE_ROW: f64 = 0.8;
@@ -98,24 +105,27 @@ impl Search<'_> {
         held <= UNSEEN * (held + square(&self.used))
     }
 
-    /// Tones of too few periods keep their shape and lose their name.
+    /// Tones of too few periods keep their shape and lose their name, as do those of a channel's own frequency: what follows
+    /// the rate late, where the rate is a sinusoid, is one as well.
     fn without_waves(&self, model: Model, found: &mut Found) -> Result<Model, Unusable> {
+        let c = self.channels;
         let mut terms = model.terms.clone();
-        let mut waves = false;
+        let mut waves = None;
         for term in terms.iter_mut().filter(|t| t.id() == "periodic_pickup") {
             let frequency_hz = term.point.theta.first().copied().unwrap_or(0.0);
-            if !tone::returns(self.channels, frequency_hz) {
-                waves = true;
+            let few = (!tone::returns(c, frequency_hz)).then(|| "time_s".to_owned());
+            if let Some(channel) = few.or_else(|| waving(c, frequency_hz)) {
+                waves = Some(channel);
                 term.candidate = Arc::new(Pickup {
                     frequency_hz,
                     further: true,
                 });
             }
         }
-        if !waves {
+        if waves.is_none() {
             return Ok(model);
         }
-        found.left = found.left.take().or_else(|| Some("time_s".to_owned()));
+        found.left = found.left.take().or(waves);
         self.model(&terms)
     }
 
@@ -293,6 +303,26 @@ impl Search<'_> {
         };
         columns.iter().map(count).max().unwrap_or(0)
     }
+}
+
+/// A channel most of whose square is a sinusoid of a frequency.
+fn waving(c: &Channels, frequency_hz: f64) -> Option<String> {
+    let wave = |f: fn(f64) -> f64| map(&c.time_s, |t| f(TAU * frequency_hz * t));
+    let pair = [wave(f64::sin), wave(f64::cos)];
+    let constant = Basis::new(&[vec![1.0; c.len()]]);
+    let both = Basis::new(&[vec![vec![1.0; c.len()]], pair.to_vec()].concat());
+    let left = |basis: &Basis, column: &[f64]| {
+        let mut rest = column.to_vec();
+        basis.project_off(&mut rest);
+        dot(&rest, &rest)
+    };
+    let is_waving = |column: &[f64]| left(&both, column) < (1.0 - WAVING) * left(&constant, column);
+    if is_waving(&c.u) {
+        return Some(c.thermometer.clone());
+    }
+    let names = c.columns.keys().filter(|name| *name != "time_s");
+    let mut moving = names.filter(|name| c.moving(name).is_some_and(is_waving));
+    moving.next().cloned()
 }
 
 #[cfg(test)]

@@ -1,13 +1,11 @@
 //! Records whose residual only resembles an effect, and the effect itself beside each.
 
 use super::*;
-use crate::closure::channels::Channels;
 use crate::closure::effects::{Candidate, Point};
 use crate::closure::likelihood::blocks::Split;
 use crate::closure::search::Effort;
 use crate::closure::synthetic::{Random, triangle};
 use std::collections::BTreeMap;
-use std::f64::consts::TAU;
 
 const ROWS: usize = 300;
 
@@ -93,6 +91,25 @@ fn a_phase_error_that_hardly_drifts_is_leakage() {
             let first = names.first().map(String::as_str);
             assert_eq!(first, Some(name), "{zero_degc} degC, {seed}: {names:?}");
         }
+    }
+}
+
+#[test]
+fn a_tone_of_a_channels_own_frequency_is_that_channels() {
+    let wave = |k: usize, periods: f64| (TAU * periods * k as f64 / ROWS as f64 + 0.7).sin();
+    for seed in 0..3 {
+        let tilt: Vec<f64> = (0..ROWS).map(|k| 0.4 * wave(k, 11.0)).collect();
+        let more = [("heater_w", tilt)];
+        // A quarter of a period late: no function of the column.
+        let late = |k: usize, _: f64| 8.0 * (TAU * 11.0 * k as f64 / ROWS as f64 + 2.3).sin();
+        let (names, left) = closed(seed, &more, late);
+        assert_eq!(
+            (names, left.as_deref()),
+            (vec![], Some("heater_w")),
+            "{seed}"
+        );
+        let (names, _) = closed(seed, &more, |k, _| 8.0 * wave(k, 17.0));
+        assert_eq!(names, ["periodic_pickup"], "{seed}");
     }
 }
 

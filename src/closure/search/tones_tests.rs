@@ -1,0 +1,44 @@
+//! Tones faster than the blocks of rows that a long record's noise is estimated on.
+
+use crate::closure::channels::Channels;
+use crate::closure::search::{Effort, Search};
+use crate::closure::synthetic::{Random, triangle};
+use std::collections::BTreeMap;
+
+#[test]
+fn a_fast_tone_in_a_long_record_keeps_its_frequency() {
+    let rows = 2000;
+    // Means of three rows have nothing of a third of a cycle a row: such a tone is not found.
+    for (seed, cycles_a_row) in [(1, 0.36), (2, 0.41), (3, 0.07), (4, 0.19)] {
+        let mut random = Random::new(seed);
+        let degc = [triangle(rows / 2), triangle(rows / 2)].concat();
+        let output = degc.iter().enumerate().map(|(k, degc)| {
+            let tone = (std::f64::consts::TAU * cycles_a_row * k as f64).sin();
+            0.3 - 0.01 * degc + 0.05 * tone + 0.01 * random.normal()
+        });
+        let columns = BTreeMap::from([
+            ("rate_out_dps".to_owned(), output.collect()),
+            ("die_degc".to_owned(), degc.clone()),
+        ]);
+        let time_s: Vec<f64> = (0..rows).map(|k| 10.0 * k as f64).collect();
+        let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+        let effort = Effort {
+            rows: 500,
+            ..Effort::default()
+        };
+        let search = Search::new(&c, &c.split().unwrap(), effort, Vec::new());
+        let found = search.run().unwrap();
+        let names: Vec<String> = found.terms.iter().map(|t| t.id()).collect();
+        assert_eq!(
+            (names, found.left),
+            (vec!["periodic_pickup".to_owned()], None)
+        );
+        let hz = found.terms[0].point.theta[0];
+        // A twentieth of what the record resolves.
+        let wanted_hz = cycles_a_row / 10.0;
+        assert!(
+            (hz - wanted_hz).abs() < 0.05 / c.span_s(),
+            "{hz} {wanted_hz}"
+        );
+    }
+}
