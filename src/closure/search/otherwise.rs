@@ -25,6 +25,10 @@ const PAIRS: f64 = 4.0;
 const USUAL: f64 = 0.9;
 const FAR: f64 = 4.0;
 
+/// Slow noise, in units of the white, from which on it is said that something is left: a walk of the rate, or a cause
+/// that wanders as one.
+const MUCH: f64 = 3.0;
+
 /// How a search begins.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(super) struct Beginning {
@@ -41,7 +45,8 @@ impl Search<'_> {
     /// Too few rows to fit anything.
     pub fn run(&self) -> Result<Found, Unusable> {
         let mut found = self.run_any()?;
-        if found.left.is_none() && self.missed(&self.model(&found.terms)?) {
+        let model = self.model(&found.terms)?;
+        if found.left.is_none() && (self.missed(&model) || wander(&model) > MUCH) {
             found.left = Some("time_s".to_owned());
         }
         Ok(found)
@@ -53,8 +58,7 @@ impl Search<'_> {
         let model = self.model(&first.terms)?;
         let clustered = self.clustered(&model);
         // Names that leave a wander may be the wrong ones, or not all.
-        let slow = slowness(model.fit.at.shape, model.fit.problem.line.used());
-        let wanders = !first.terms.is_empty() && slow > WANDER;
+        let wanders = !first.terms.is_empty() && wander(&model) > WANDER;
         let clean = first.left.is_none() && !clustered && !wanders;
         if clean || !first.undecided.is_empty() {
             return Ok(first);
@@ -133,12 +137,17 @@ impl Search<'_> {
     }
 
     /// Log-likelihood less the price of the terms.
-    fn net(&self, model: &Model) -> f64 {
+    pub(super) fn net(&self, model: &Model) -> f64 {
         let c = self.channels;
         let terms = model.terms.iter();
         let paid = terms.map(|t| price(t.candidate.as_ref(), c, &t.point));
         model.value - paid.sum::<f64>() - PRICE * model.beta.len() as f64
     }
+}
+
+/// Slow noise of a model, rms over the record, in units of the white.
+fn wander(model: &Model) -> f64 {
+    slowness(model.fit.at.shape, model.fit.problem.line.used())
 }
 
 /// Whether marked rows have more marked neighbours than chance gives them.

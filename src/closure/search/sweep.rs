@@ -230,6 +230,47 @@ impl Search<'_> {
         Ok(model)
     }
 
+    /// Two names that the same third one would do for, each beside the other, give their place to it where it is worth as much
+    /// as both: a shape that is not quite the one that is there needs a second one for what it is off.
+    ///
+    /// # Errors
+    /// Too few rows.
+    pub fn united(&self, model: Model) -> Result<Model, Unusable> {
+        let named = |k: &usize| model.terms[*k].candidate.named() && !model.terms[*k].evident;
+        let names: Vec<usize> = (0..model.terms.len()).filter(named).collect();
+        for (i, first) in names.iter().enumerate() {
+            for second in &names[i + 1..] {
+                let (a, b) = (&model.terms[*first], &model.terms[*second]);
+                let common = a.rivals.iter().filter(|r| b.rivals.contains(r));
+                for id in common {
+                    let mut terms = model.terms.clone();
+                    terms.remove(*second);
+                    terms.remove(*first);
+                    if let Some(united) = self.with_instead(terms, id)?
+                        && self.net(&united) >= self.net(&model)
+                    {
+                        return Ok(united);
+                    }
+                }
+            }
+        }
+        Ok(model)
+    }
+
+    /// The model with a name more, if it is called for.
+    fn with_instead(&self, mut terms: Vec<Term>, id: &str) -> Result<Option<Model>, Unusable> {
+        let others = self.model(&terms)?;
+        let round = self.round(&others, self.effort.surrogates);
+        let same = round.judged.iter().find(|j| j.candidate.id() == *id);
+        let Some(name) = same.filter(|j| j.is_found()) else {
+            return Ok(None);
+        };
+        let mut term = Term::of(name, round.rivals(name));
+        term.beside = terms.iter().map(Term::id).collect();
+        terms.push(term);
+        Ok(Some(self.polished(self.model(&terms)?)?))
+    }
+
     /// What takes a term's place beside the others; `None`: nothing is needed.
     fn again(
         &self,
