@@ -120,3 +120,13 @@ fn a_step_among_other_causes_is_no_resonance() {
         assert_eq!(all, (3, 3, 3), "{}: {}", mark.planted, mark.answered);
     }
 }
+
+#[test]
+fn one_shape_is_not_named_as_two() {
+    // The crossing's swing to both sides begins as a step; what a step is off looks like a phase that drifts.
+    let scenario = Scenario::drawn(Class::Pair, 5_400_024);
+    for mark in tally::run(&[scenario], answer) {
+        assert_eq!(mark.planted, "warmup_transient+mode_crossing");
+        assert_eq!((mark.found, mark.named), (2, 2), "{}", mark.answered);
+    }
+}

@@ -39,3 +39,34 @@ fn a_dead_band_of_a_hundred_thousandth_of_the_rate_shows_by_what_it_subtracts() 
         assert_eq!(reported["subtracts"].0, 1.0);
     }
 }
+
+#[test]
+fn a_hard_dead_band_is_found_where_a_sweep_passes_its_edge_row_by_row() {
+    for (seed, half_dps) in [(1, 0.174), (2, 0.071), (3, 0.22)] {
+        let (rows, mut random) = (1800, Random::new(seed));
+        let degc = [triangle(rows / 2), triangle(rows / 2)].concat();
+        let rate = |k: usize| 0.27 * (k as f64 / 61.0).sin();
+        let passed = |o: f64| if o.abs() <= half_dps { 0.0 } else { o };
+        let output =
+            (0..rows).map(|k| 0.3 - 0.01 * degc[k] + passed(rate(k)) + 0.005 * random.normal());
+        let columns = BTreeMap::from([
+            ("rate_out_dps".to_owned(), output.collect()),
+            ("rate_dps".to_owned(), (0..rows).map(rate).collect()),
+            ("die_degc".to_owned(), degc.clone()),
+        ]);
+        let time_s: Vec<f64> = (0..rows).map(|k| 10.0 * k as f64).collect();
+        let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+        let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+        let found = search.run().unwrap();
+        let names: Vec<String> = found.terms.iter().map(|t| t.id()).collect();
+        assert_eq!(
+            (names, found.left),
+            (vec!["output_deadband".to_owned()], None)
+        );
+        let found_dps = found.terms[0].point.theta[0].exp();
+        assert!(
+            (found_dps - half_dps).abs() < 0.002,
+            "{found_dps} {half_dps}"
+        );
+    }
+}

@@ -1,5 +1,6 @@
 //! A bias that steps at a temperature, closed: where the firmware's relay switches.
 
+use super::{Point, at_jumps};
 use crate::closure::channels::Channels;
 use crate::closure::close::close;
 use crate::closure::effects::Reported;
@@ -164,5 +165,47 @@ fn a_step_by_and_by_is_a_step_with_a_width() {
                 "{width_k} {reported:?}"
             );
         }
+    }
+}
+
+/// Two slow heatings of many rows with noise in the thermometer, whose bias steps by 3 deg/s at 18 degC down and 24 degC up.
+fn dense(seed: u64) -> Channels {
+    let (rows, mut random) = (3600, Random::new(seed));
+    let degc: Vec<f64> = [synthetic::triangle(rows / 2), synthetic::triangle(rows / 2)].concat();
+    let mut above = false;
+    let output = degc.iter().map(|t| {
+        above = *t > if above { 18.0 } else { 24.0 };
+        0.3 - 0.01 * t + 3.0 * f64::from(u8::from(above)) + 0.05 * random.normal()
+    });
+    let columns = BTreeMap::from([
+        ("rate_out_dps".to_owned(), output.collect()),
+        ("die_degc".to_owned(), degc.clone()),
+    ]);
+    let time_s: Vec<f64> = (0..rows).map(|k| 2.0 * k as f64).collect();
+    Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap()
+}
+
+#[test]
+fn a_loop_switches_at_the_row_where_the_error_jumps() {
+    for seed in 0..3 {
+        let c = dense(seed);
+        let split = c.split().unwrap();
+        let places = at_jumps(&c, &split.train);
+        let is_loop = |p: &&Point| p.form == 1 && (p.theta[1] - 6.0 / 35.0).abs() < 1e-2;
+        assert!(places.iter().any(|p| is_loop(&p)), "{seed}: {places:?}");
+        let found = Search::new(&c, &split, Effort::default(), Vec::new()).run();
+        let found = found.unwrap();
+        let names: Vec<String> = found.terms.iter().map(|t| t.id()).collect();
+        assert_eq!(
+            (names, found.left),
+            (vec!["stress_jump".to_owned()], None),
+            "{seed}"
+        );
+        // No place is taken from rows that are held out.
+        assert!(
+            at_jumps(&c, &vec![false; c.len()])
+                .iter()
+                .all(|p| p.form != 1)
+        );
     }
 }

@@ -176,3 +176,28 @@ fn beginnings(terms: &[Term], first: &Found) -> Vec<Beginning> {
     }));
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn accidents_stand_alone() {
+        let marked = |rows: &[usize]| {
+            let mut out = vec![false; 300];
+            for row in rows {
+                out[*row] = true;
+            }
+            stand_together(&out)
+        };
+        assert!(!marked(&[]));
+        let alone: Vec<usize> = (0..60).map(|k| 5 * k).collect();
+        assert!(!marked(&alone));
+        assert!(!marked(&[10, 11, 90, 91, 200, 201]));
+        assert!(marked(&[40, 41, 42, 43, 44, 45]));
+        // Half of all rows, at random, have neighbours.
+        let mut random = crate::closure::synthetic::Random::new(5);
+        let half: Vec<usize> = (0..300).filter(|_| random.normal() > 0.0).collect();
+        assert!(!marked(&half));
+    }
+}
