@@ -291,7 +291,12 @@ impl Told<'_> {
                 );
                 (Fate::Rejected, remark)
             } else if j.p_value <= LEVEL {
-                let remark = "seen alone it helps, but what was taken explains more";
+                let remark = match steps.is_empty() {
+                    false => "seen alone it helps, but what was taken explains more",
+                    true => {
+                        "beyond chance, but it does not hold over the whole record, or a shape without a name explains more"
+                    }
+                };
                 (Fate::Rejected, remark.to_owned())
             } else {
                 let remark = "chance does as well among so many candidates";

@@ -30,6 +30,10 @@ const WARMUP: Sheet = Sheet {
             name: "tau_s",
             plausible: (10.0, 3000.0),
         },
+        Parameter {
+            name: "cooling_tau_s",
+            plausible: (1.0, 30_000.0),
+        },
     ],
     compensable: true,
     confounders: &["ageing_drift", "thermal_lag", "stress_jump"],

@@ -9,7 +9,6 @@
 
 mod acting;
 mod clip;
-
 pub mod constancy;
 pub mod estimate;
 mod evident;
@@ -244,12 +243,6 @@ impl<'a> Search<'a> {
             rounds: Memo::default(),
             beginning: RefCell::default(),
         }
-    }
-
-    /// Never again a candidate: it was taken and did not hold. Rounds with it are forgotten.
-    fn bar(&self, id: String) {
-        self.beginning.borrow_mut().barred.push(id);
-        self.rounds.clear();
     }
 
     /// All candidates but tones, named or not.

@@ -111,6 +111,12 @@ impl Search<'_> {
         stand_together(&out)
     }
 
+    /// Never again a candidate: it was taken and did not hold. Rounds with it are forgotten.
+    pub(super) fn bar(&self, id: String) {
+        self.beginning.borrow_mut().barred.push(id);
+        self.rounds.clear();
+    }
+
     /// How the next run begins; how the last one did. The report's rounds do without what the accepted run did
     /// without: else a name that was taken without it competes with it again.
     fn begin(&self, how: Beginning) -> Beginning {
