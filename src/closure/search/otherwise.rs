@@ -10,6 +10,7 @@ use super::judge::{Judged, PRICE, price};
 use super::reported::WANDER;
 use super::structure::slowness;
 use super::{Found, LEVEL, Model, Search, Term};
+use crate::closure::channels::range;
 use crate::closure::likelihood::Unusable;
 
 /// Most other beginnings without a shape, and most with another name first.
@@ -24,6 +25,9 @@ const PAIRS: f64 = 4.0;
 /// deviate exceeds the first once in ten rows (1.64 deviations), and four times that never.
 const USUAL: f64 = 0.9;
 const FAR: f64 = 4.0;
+
+/// Share of the error's range that is nothing.
+const NOTHING: f64 = 1e-4;
 
 /// Slow noise, in units of the white, from which on it is said that something is left: a walk of the rate, or a cause
 /// that wanders as one.
@@ -106,7 +110,10 @@ impl Search<'_> {
         let mut fitted = of(&self.used);
         fitted.sort_by(f64::total_cmp);
         let usual = fitted.get((USUAL * fitted.len() as f64) as usize);
-        let far_dps = FAR * usual.copied().unwrap_or(f64::INFINITY);
+        // A record without noise has none that is usual.
+        let (low, high) = range(&self.channels.error_dps);
+        let least_dps = NOTHING * (high - low);
+        let far_dps = (FAR * usual.copied().unwrap_or(f64::INFINITY)).max(least_dps);
         let out: Vec<bool> = of(&self.heldout).iter().map(|r| *r > far_dps).collect();
         stand_together(&out)
     }
