@@ -262,7 +262,7 @@ impl Search<'_> {
             let mut terms = model.terms.clone();
             terms.extend(added.iter().map(|j| Term::of(j, Vec::new())));
             let price: f64 = added.iter().map(|j| j.gain - j.net).sum();
-            Ok(self.polished(self.model(&terms)?)?.value - price)
+            Ok(self.tried(&terms, model.terms.len())?.value - price)
         };
         let alone = value(&[leader])?;
         let mut best: Option<(&Judged, f64)> = None;
@@ -295,7 +295,7 @@ impl Search<'_> {
         for j in names().take(ENOUGH) {
             let mut terms = model.terms.clone();
             terms.push(Term::of(j, Vec::new()));
-            let with = self.polished(self.model(&terms)?)?;
+            let with = self.tried(&terms, model.terms.len())?;
             let left = self.round(&with, self.effort.surrogates);
             if left.judged.iter().all(|j| j.p_value > LEVEL) && !self.coloured(&with) {
                 return Ok(Some(j));

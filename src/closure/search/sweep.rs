@@ -45,7 +45,7 @@ impl Search<'_> {
         let mut model = model;
         for _ in 0..POLISHES {
             let before: Vec<Point> = model.terms.iter().map(|t| t.point.clone()).collect();
-            model = self.polished_once(model)?;
+            model = self.polished_once(model, 0)?;
             // What acts on the bias and the bias move each other; other shapes are done at once.
             let acting = model.terms.iter().any(|t| t.candidate.acts_on_bias());
             if !acting || model.terms.iter().map(|t| &t.point).eq(before.iter()) {
@@ -77,8 +77,17 @@ impl Search<'_> {
         Ok(if nearer { levelled } else { model })
     }
 
-    fn polished_once(&self, mut model: Model) -> Result<Model, Unusable> {
-        for k in 0..model.terms.len() {
+    /// A quick polish of the terms from the given one on: what they are worth beside the others.
+    ///
+    /// # Errors
+    /// Too few rows.
+    pub fn tried(&self, terms: &[Term], from: usize) -> Result<Model, Unusable> {
+        let model = self.polished_once(self.model(terms)?, from)?;
+        self.levelled(self.model(&model.terms)?)
+    }
+
+    fn polished_once(&self, mut model: Model, from: usize) -> Result<Model, Unusable> {
+        for k in from..model.terms.len() {
             let term = &model.terms[k];
             let finer = || {
                 !term
