@@ -7,21 +7,25 @@ use std::collections::BTreeMap;
 
 const ROWS: usize = 300;
 
-/// Names of a record of two heatings with one power-on, and the first one's parameters; `added`, deg/s, at a time, s.
-fn named(seed: u64, added: impl Fn(f64) -> f64) -> (Vec<String>, Reported) {
+/// Names of a record of two heatings, and the first one's parameters; `on_s`: since power-on; `added`, deg/s, in each row.
+fn named_at(
+    seed: u64,
+    time_s: &[f64],
+    on_s: Vec<f64>,
+    added: impl Fn(usize) -> f64,
+) -> (Vec<String>, Reported) {
     let mut random = Random::new(seed);
     let degc = [triangle(ROWS / 2), triangle(ROWS / 2)].concat();
-    let time_s: Vec<f64> = (0..ROWS).map(|k| 10.0 * k as f64).collect();
-    let output = degc.iter().zip(&time_s).map(|(degc, t)| {
+    let output = degc.iter().enumerate().map(|(k, degc)| {
         let u = degc / 35.0 - 1.0;
-        2.0 - 1.5 * u + 0.7 * u * u + added(*t) + 0.01 * random.normal()
+        2.0 - 1.5 * u + 0.7 * u * u + added(k) + 0.01 * random.normal()
     });
     let columns = BTreeMap::from([
         ("rate_out_dps".to_owned(), output.collect()),
-        ("time_since_power_on_s".to_owned(), time_s.clone()),
+        ("time_since_power_on_s".to_owned(), on_s),
         ("die_degc".to_owned(), degc.clone()),
     ]);
-    let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+    let c = Channels::new(time_s, &columns, "die_degc", |t| t).unwrap();
     let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
     let found = search.run().unwrap();
     let model = search.model(&found.terms).unwrap();
@@ -32,6 +36,12 @@ fn named(seed: u64, added: impl Fn(f64) -> f64) -> (Vec<String>, Reported) {
         found.terms.iter().map(Step::id).collect(),
         reported.unwrap_or_default(),
     )
+}
+
+/// The same with one power-on; `added`, deg/s, at a time, s.
+fn named(seed: u64, added: impl Fn(f64) -> f64) -> (Vec<String>, Reported) {
+    let time_s: Vec<f64> = (0..ROWS).map(|k| 10.0 * k as f64).collect();
+    named_at(seed, &time_s, time_s.clone(), |k| added(time_s[k]))
 }
 
 #[test]
@@ -74,37 +84,13 @@ fn no_warm_up_takes_longer_than_the_power_is_on() {
     }
 }
 
-/// Names of a record of four power-ons of 750 s, each after a rest; `start` of each.
+/// The same with four power-ons of 750 s, each after a rest; `start` of each.
 fn restarted(seed: u64, rest_s: [f64; 3], start: [f64; 4]) -> (Vec<String>, Reported) {
-    let mut random = Random::new(seed);
     let on_s = |k: usize| 10.0 * (k % 75) as f64;
     let since: Vec<f64> = (0..4).map(|k| rest_s.iter().take(k).sum::<f64>()).collect();
     let time_s: Vec<f64> = (0..ROWS).map(|k| 10.0 * k as f64 + since[k / 75]).collect();
-    let degc = [triangle(ROWS / 2), triangle(ROWS / 2)].concat();
-    let output = (0..ROWS).map(|k| {
-        let u = degc[k] / 35.0 - 1.0;
-        let transient = 0.3 * start[k / 75] * (-on_s(k) / 150.0).exp();
-        2.0 - 1.5 * u + 0.7 * u * u + transient + 0.01 * random.normal()
-    });
-    let columns = BTreeMap::from([
-        ("rate_out_dps".to_owned(), output.collect()),
-        (
-            "time_since_power_on_s".to_owned(),
-            (0..ROWS).map(on_s).collect(),
-        ),
-        ("die_degc".to_owned(), degc.clone()),
-    ]);
-    let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
-    let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
-    let found = search.run().unwrap();
-    let model = search.model(&found.terms).unwrap();
-    let estimates = search.estimates(&model);
-    let first = found.terms.first().zip(estimates.first());
-    let reported = first.map(|(term, estimate)| term.candidate.report(&c, estimate));
-    (
-        found.terms.iter().map(Step::id).collect(),
-        reported.unwrap_or_default(),
-    )
+    let transient = |k: usize| 0.3 * start[k / 75] * (-on_s(k) / 150.0).exp();
+    named_at(seed, &time_s, (0..ROWS).map(on_s).collect(), transient)
 }
 
 #[test]
