@@ -21,7 +21,8 @@ const DAMPING: Sheet = Sheet {
     id: "damping_bias",
     physics: "anisotropic damping turns part of the drive's motion into the sense axis in phase with \
               the rate: it goes as 1/Q, as the drive gain does; a changing Q also bends the phase",
-    equation: "k (g - 1), g = 1 / Q relative; and B(p) - B(p'), tan(p' - p_r) = g tan(p - p_r)",
+    equation: "k (g - 1), g = 1 / Q relative; and B(p') - B(p), tan(p' - p_r) = g tan(p - p_r), p_r at or near a \
+               quarter turn",
     parameters: &[
         Parameter {
             name: "gain_dps",
@@ -31,12 +32,20 @@ const DAMPING: Sheet = Sheet {
             name: "share_of_phase_bend",
             plausible: (0.5, 1.5),
         },
+        Parameter {
+            name: "resonance_off_rad",
+            plausible: (-0.6, 0.6),
+        },
     ],
     compensable: true,
     confounders: &["amplitude_phase_coupling", "bias_third_order"],
     experiment: "ring the drive down: Q directly; or step the amplitude's set point at constant Q",
     reference: "IEEE Std 1431, annex B; Weinberg & Kourepenis 2006",
 };
+
+/// Where the phase's own delay puts the resonance beside a quarter turn: places of the search, and the most, rad.
+const OFF_RAD: [f64; 4] = [-0.35, -0.15, 0.15, 0.35];
+const MOST_OFF_RAD: f64 = 0.6;
 
 impl Candidate for Damping {
     fn sheet(&self) -> &Sheet {
@@ -49,8 +58,21 @@ impl Candidate for Damping {
     }
 
     fn points(&self, c: &Channels) -> Vec<Point> {
-        let forms = if c.thermometer == "phase_rad" { 3 } else { 1 };
-        (0..forms).map(Point::form).collect()
+        if c.thermometer != "phase_rad" {
+            return vec![Point::form(0)];
+        }
+        let off = [1, 2].into_iter();
+        let off = off.flat_map(|form| OFF_RAD.map(|off_rad| Point::at(form, &[off_rad])));
+        (0..3).map(Point::form).chain(off).collect()
+    }
+
+    fn spacing(&self, _c: &Channels, point: &Point) -> Vec<f64> {
+        map(&point.theta, |_| OFF_RAD[2])
+    }
+
+    /// Each of its forms: the step is often taken in one that has half of the effect.
+    fn fine(&self, c: &Channels, _point: &Point, _seen: &[bool]) -> Vec<Point> {
+        self.points(c)
     }
 
     fn columns(&self, c: &Channels, bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
@@ -61,7 +83,8 @@ impl Candidate for Damping {
         if point.form == 0 {
             return vec![plain];
         }
-        let resonance = c.resonance_rad();
+        let off_rad = point.theta.first().copied().unwrap_or(0.0);
+        let resonance = c.resonance_rad() + off_rad.clamp(-MOST_OFF_RAD, MOST_OFF_RAD);
         let bend =
             c.u.iter()
                 .zip(g)
@@ -103,7 +126,11 @@ impl Candidate for Damping {
             _ => &["gain_dps", "share_of_phase_bend"],
         };
         let each = names.iter().enumerate();
-        each.map(|(k, name)| gain(name, e, k, 1.0)).collect()
+        let off = e.point.theta.iter().zip(&e.theta_std);
+        let off = off.map(|(off_rad, std)| entry("resonance_off_rad", *off_rad, *std));
+        each.map(|(k, name)| gain(name, e, k, 1.0))
+            .chain(off)
+            .collect()
     }
 }
 
@@ -145,12 +172,12 @@ impl Candidate for Coupling {
         (0..PULLS).map(Point::form).chain(large).collect()
     }
 
-    fn fine(&self, _c: &Channels, point: &Point, _seen: &[bool]) -> Vec<Point> {
-        let powers = [point.form, point.form ^ 1];
-        let each = spaced(0.02, 2.0, 8).into_iter();
-        each.flat_map(|most_u| [most_u, -most_u])
-            .flat_map(|most_u| powers.map(|form| Point::at(form, &[most_u])))
-            .collect()
+    /// Every form: which one it is shows only when the others' spikes are gone.
+    fn fine(&self, _c: &Channels, _point: &Point, _seen: &[bool]) -> Vec<Point> {
+        let large = spaced(0.02, 2.0, 8).into_iter();
+        let large = large.flat_map(|most_u| [most_u, -most_u]);
+        let large = large.flat_map(|most_u| (0..PULLS).map(move |f| Point::at(f, &[most_u])));
+        (0..PULLS).map(Point::form).chain(large).collect()
     }
 
     fn columns(&self, c: &Channels, bias: &Bias, point: &Point) -> Vec<Vec<f64>> {

@@ -10,7 +10,6 @@ use crate::closure::likelihood::linear::add_scaled;
 use crate::closure::likelihood::noise::Shape;
 use crate::closure::likelihood::reml::Fit;
 use crate::closure::likelihood::score::{self, Scores};
-use std::cmp::Ordering;
 use std::sync::Arc;
 
 /// What a coefficient or parameter costs in log-likelihood when explanations are compared.
@@ -68,6 +67,15 @@ impl Judged {
     pub fn is_found(&self) -> bool {
         self.candidate.named() && self.p_value <= LEVEL
     }
+}
+
+/// A candidate's best shape.
+struct Top {
+    point: Point,
+    /// The declared bias beside it, where it moves that.
+    bias: Option<Bias>,
+    /// Gain in log-likelihood of a shape that has its size in it.
+    whole: Option<f64>,
 }
 
 /// Candidates with their shapes, in order.
@@ -183,61 +191,10 @@ impl Search<'_> {
             };
             let Some(point) = point else { continue };
             let near = gain > 0.5 * best - 10.0;
-            let acting = candidate.acts_on_bias() && !candidate.is_last();
-            let looked = near || acting || candidate.is_whole();
-            let bench = looked.then(|| Bench::new(fit, shape));
-            let gain = |p: &Point| {
-                let bench = bench.as_ref()?;
-                Some(refine::gain(bench, candidate.as_ref(), c, &model.bias, p))
-            };
-            // Where physics gives the coefficient, the best shape is not that of a free one.
-            let start = if candidate.is_whole() {
-                let best = points
-                    .iter()
-                    .max_by(|a, b| gain(a).partial_cmp(&gain(b)).unwrap_or(Ordering::Equal));
-                best.unwrap_or(point)
-            } else {
-                point
-            };
-            let point = match &bench {
-                Some(bench) if near => {
-                    refine::refined(bench, candidate.as_ref(), c, &model.bias, start, 0.5)
-                }
-                _ => start.clone(),
-            };
-            let beside = match (acting, &bench) {
-                (true, Some(bench)) => self.admitted(model, candidate.as_ref(), points, bench),
-                _ => None,
-            };
-            let (point, bias) = match beside {
-                Some((point, bias)) => (point, Some(bias)),
-                None => (point, None),
-            };
-            // At one noise; the null hypothesis may choose the one that suits it best.
-            let mut at = vec![(shape, bench)];
-            if near && (candidate.is_whole() || candidate.is_local()) {
-                at.push((WHITE, Some(Bench::new(fit, WHITE))));
-            }
-            let value = |p: &Point, (shape, bench): &(Shape, Option<Bench<'_>>)| {
-                let bias = bias.as_ref().unwrap_or(&model.bias);
-                let there = refine::gain(bench.as_ref()?, candidate.as_ref(), c, bias, p);
-                Some(there + fit.problem.evaluate(*shape).loglik - fit.at.loglik)
-            };
-            let best = |p: &Point| at.iter().filter_map(|a| value(p, a)).max_by(f64::total_cmp);
-            // A residual with sharp ends looks like a walk without white noise, to which a threshold that is off by a row is
-            // no better than none: it is found where the noise is white.
-            let sharp = at
-                .get(1)
-                .and_then(|a| self.sharpened(model, candidate.as_ref(), points, a.1.as_ref()?));
-            let net = |p: &Point| best(p).map(|v| v - price(candidate.as_ref(), c, p));
-            let point = match sharp {
-                Some(sharp) if net(&sharp) > net(&point) => sharp,
-                _ => point,
-            };
-            let whole = best(&point).filter(|_| candidate.is_sized(&point));
-            starts.push((candidate.clone(), point, p_value));
-            wholes.push(whole);
-            biases.push(bias);
+            let top = self.top(model, candidate.as_ref(), (points, point), shape, near);
+            starts.push((candidate.clone(), top.point, p_value));
+            wholes.push(top.whole);
+            biases.push(top.bias);
         }
         let columns: Vec<Vec<Vec<f64>>> = starts
             .iter()
@@ -270,6 +227,68 @@ impl Search<'_> {
 }
 
 impl Search<'_> {
+    /// The best shape of a candidate, of its `points` one of which is best at the noise `shape`; roughly, where it is not
+    /// `near` the leader.
+    fn top(
+        &self,
+        model: &Model,
+        candidate: &dyn Candidate,
+        (points, point): (&[Point], &Point),
+        shape: Shape,
+        near: bool,
+    ) -> Top {
+        let c = self.channels;
+        let fit = &model.fit;
+        let acting = candidate.acts_on_bias() && !candidate.is_last();
+        let mut top = Top {
+            point: point.clone(),
+            bias: None,
+            whole: None,
+        };
+        if !(near || acting || candidate.is_whole()) {
+            return top;
+        }
+        // At one noise; the null hypothesis may choose the one that suits it best.
+        let mut benches = vec![(shape, Bench::new(fit, shape))];
+        // A residual with sharp ends looks like a walk without white noise, to which a threshold that is off by a row, or
+        // a form that is not quite the one, is no better than none: it is found where the noise is white.
+        if near && (acting || candidate.is_whole() || candidate.is_local()) {
+            benches.push((WHITE, Bench::new(fit, WHITE)));
+        }
+        let best = |point: &Point, bias: &Option<Bias>| {
+            let bias = bias.as_ref().unwrap_or(&model.bias);
+            let at = |(shape, bench): &(Shape, Bench<'_>)| {
+                let there = refine::gain(bench, candidate, c, bias, point);
+                there + fit.problem.evaluate(*shape).loglik - fit.at.loglik
+            };
+            benches
+                .iter()
+                .map(at)
+                .fold(f64::NEG_INFINITY, |m, v| m.max(v))
+        };
+        let mut reached = f64::NEG_INFINITY;
+        for (k, (_, bench)) in benches.iter().enumerate() {
+            let found = match (acting, k) {
+                (true, _) => self.admitted(model, candidate, points, bench),
+                // Where physics gives the coefficient, the best shape is not that of a free one.
+                (false, 0) if !candidate.is_whole() => {
+                    let top = refine::refined(bench, candidate, c, &model.bias, point, 0.5);
+                    Some((top, None))
+                }
+                _ => self.sharpened(model, candidate, points, bench),
+            };
+            let Some((point, bias)) = found else { continue };
+            let net = best(&point, &bias) - price(candidate, c, &point);
+            if net > reached {
+                (reached, top.point, top.bias) = (net, point, bias);
+            }
+        }
+        top.whole = candidate
+            .is_sized(&top.point)
+            .then(|| best(&top.point, &top.bias));
+        top
+    }
+
     /// The best point of a shape with thresholds on a bench.
     fn sharpened(
         &self,
@@ -277,14 +296,14 @@ impl Search<'_> {
         candidate: &dyn Candidate,
         points: &[Point],
         bench: &Bench<'_>,
-    ) -> Option<Point> {
+    ) -> Option<(Point, Option<Bias>)> {
         let c = self.channels;
         let gain = |p: &Point| refine::gain(bench, candidate, c, &model.bias, p);
         let net = |p: &Point| gain(p) - price(candidate, c, p);
         let each = points.iter().map(|p| (net(p), p));
         let (_, start) = each.max_by(|a, b| a.0.total_cmp(&b.0))?;
         let steps = map(&candidate.spacing(c, start), |s| 0.5 * s);
-        Some(refine::climbed(start, steps, gain))
+        Some((refine::climbed(start, steps, gain), None))
     }
 
     /// The best of `points` whose coefficients physics admits, each with the declared bias that is there beside it: a
@@ -296,7 +315,7 @@ impl Search<'_> {
         candidate: &dyn Candidate,
         points: &[Point],
         bench: &Bench<'_>,
-    ) -> Option<(Point, Bias)> {
+    ) -> Option<(Point, Option<Bias>)> {
         let c = self.channels;
         let net = |point: &Point| {
             let (bias, beta) = self.bias_beside(model, candidate, point);
@@ -310,7 +329,7 @@ impl Search<'_> {
         let steps = map(&candidate.spacing(c, start), |s| 0.5 * s);
         let top = refine::climbed(start, steps, |p| net(p).unwrap_or(f64::NEG_INFINITY));
         let (bias, _) = self.bias_beside(model, candidate, &top);
-        Some((top, bias))
+        Some((top, Some(bias)))
     }
 
     /// The declared bias with a candidate in, and the candidate's coefficients. Ordinary least squares, for the shape

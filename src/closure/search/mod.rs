@@ -463,6 +463,16 @@ impl Model {
         out
     }
 
+    /// Whether physics admits the coefficients of a term.
+    fn admits(&self, c: &Channels, k: usize) -> bool {
+        let count = |t: &Term| t.candidate.columns(c, &self.acting, &t.point).len();
+        let before: usize = self.terms[..k].iter().map(count).sum();
+        let from = declared(c).len() + before;
+        let term = &self.terms[k];
+        let own = &self.beta[from..from + count(term)];
+        term.candidate.admits(&term.point, own)
+    }
+
     /// What each term adds, deg/s, every row.
     fn contributions(&self, c: &Channels) -> Vec<Vec<f64>> {
         let mut from = declared(c).len();

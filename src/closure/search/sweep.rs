@@ -25,7 +25,8 @@ fn best_of_forms(places: &[(Point, f64)], net: impl Fn(&Point, f64) -> f64) -> V
     let mut best: Vec<(&Point, f64)> = Vec::new();
     for (point, there) in places {
         let there = net(point, *there);
-        match best.iter_mut().find(|b| b.0.form == point.form) {
+        let kind = |p: &Point| (p.form, p.theta.len());
+        match best.iter_mut().find(|b| kind(b.0) == kind(point)) {
             Some(b) if there > b.1 => *b = (point, there),
             Some(_) => {}
             None => best.push((point, there)),
@@ -110,12 +111,9 @@ impl Search<'_> {
                     continue;
                 }
                 let mut terms = model.terms.clone();
-                let candidate = terms[k].candidate.clone();
-                let price = |point: &Point| price(candidate.as_ref(), self.channels, point);
-                let more = price(&point) - price(&terms[k].point);
                 terms[k].point = point;
                 let next = self.model_with(&terms, &self.near(&model))?;
-                if next.value - more > model.value {
+                if self.net(&next) > self.net(&model) && next.admits(self.channels, k) {
                     model = next;
                 }
             }
@@ -170,14 +168,21 @@ impl Search<'_> {
         if moves {
             // The bias follows closely: tops are narrow beside the distance of these places.
             fine.sort_by(|a, b| b.1.total_cmp(&a.1));
-            fine.truncate(CLIMBS);
+            let mut places = 0;
+            fine.retain(|(point, _)| {
+                places += usize::from(!point.theta.is_empty());
+                point.theta.is_empty() || places <= CLIMBS
+            });
             for (point, there) in &mut fine {
                 *point = climbed(point);
                 *there = gain(point);
             }
         }
         // A form that costs more has to be worth it.
-        let net = |p: &Point, there: f64| there - price(candidate, c, p);
+        let net = |p: &Point, there: f64| {
+            let columns = candidate.columns(c, &model.bias, p).len();
+            there - price(candidate, c, p) - PRICE * columns as f64
+        };
         let mut top = climbed(&term.point);
         let mut best = net(&top, gain(&top));
         for start in best_of_forms(&fine, net) {
