@@ -36,10 +36,25 @@ pub struct Channels {
     /// For a phase: the temperature as a resonator without phase lag elsewhere has it, tan(p - p_r),
     /// scaled to -1..1 and smooth; `None` for other thermometers, and for a phase far from resonance.
     pub tangent: Option<Vec<f64>>,
+    /// A thermometer on the die beside that of the bias model, if it moves.
+    pub die: Option<Other>,
     /// rms of the error that the circuit's own rounding leaves in the output, deg/s; 0 where it does not matter.
     pub rounding_dps: f64,
     /// All other columns but the output, by name.
     pub columns: BTreeMap<String, Vec<f64>>,
+}
+
+/// A further thermometer.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Other {
+    /// Its column.
+    pub name: &'static str,
+    /// Its reading scaled to -1..1.
+    pub u: Vec<f64>,
+    /// The same without its noise.
+    pub smooth_u: Vec<f64>,
+    /// Change of temperature over one unit of u, K.
+    pub kelvin_per_u: f64,
 }
 
 impl Channels {
@@ -102,10 +117,12 @@ impl Channels {
             middle_degc: 0.0,
             kelvin_per_u: 1.0,
             tangent: None,
+            die: None,
             rounding_dps: 0.0,
             columns: others,
         };
         out.tangent = out.tangent_of_phase();
+        out.die = out.other("die_degc");
         (out.middle_degc, out.kelvin_per_u) = out.temperature(thermometer, degc_of);
         Ok(out)
     }
@@ -154,49 +171,6 @@ impl Channels {
             degc_of(self.centre + self.half),
         );
         (0.5 * (low + high), 0.5 * (high - low))
-    }
-
-    fn tangent_of_phase(&self) -> Option<Vec<f64>> {
-        let resonance = self.resonance_rad();
-        let reach = (self.centre - resonance).abs() + self.half;
-        if self.thermometer != "phase_rad" || reach > 1.3 {
-            return None;
-        }
-        let of = |u: &f64| (self.centre + self.half * u - resonance).tan();
-        let raw: Vec<f64> = self.smooth_u.iter().map(of).collect();
-        Some(scaled(&raw).0)
-    }
-
-    /// [`Channels::tangent`] as a function of u; u itself where there is none.
-    pub fn tangent_at(&self, u: f64) -> f64 {
-        if self.tangent.is_none() {
-            return u;
-        }
-        let resonance = self.resonance_rad();
-        let of = |u: f64| (self.centre + self.half * u - resonance).tan();
-        let raw: Vec<f64> = self.smooth_u.iter().map(|u| of(*u)).collect();
-        let (low, high) = range(&raw);
-        (of(u) - 0.5 * (low + high)) / (0.5 * (high - low)).max(f64::MIN_POSITIVE)
-    }
-
-    /// The drive's phase at resonance (an odd multiple of a quarter turn) nearest to the middle of the
-    /// range, rad.
-    pub fn resonance_rad(&self) -> f64 {
-        use std::f64::consts::{FRAC_PI_2, PI};
-        FRAC_PI_2 + PI * ((self.centre - FRAC_PI_2) / PI).round()
-    }
-
-    /// How many readings of the temperature there are ([`Channels::heat`]).
-    pub fn heats(&self) -> usize {
-        1 + usize::from(self.tangent.is_some())
-    }
-
-    /// The temperature, smooth and scaled: by the reading itself (0), or by the phase's tangent (1).
-    pub fn heat(&self, which: usize) -> &[f64] {
-        match (&self.tangent, which) {
-            (Some(tangent), 1) => tangent,
-            _ => &self.smooth_u,
-        }
     }
 
     /// Number of rows.

@@ -19,6 +19,7 @@ pub mod close;
 pub mod effects;
 pub mod firmware;
 pub mod folds;
+mod heats;
 pub mod intake;
 pub mod likelihood;
 pub mod noise;

@@ -106,8 +106,13 @@ impl Candidate for Damping {
     }
 
     fn admits(&self, point: &Point, beta: &[f64]) -> bool {
-        // Less Q bends the phase one way.
-        point.form == 0 || beta.last().is_none_or(|share| *share >= 0.0)
+        // Less Q bends the phase one way; where the resonance is free as well, by what physics says.
+        let (least, most) = match point.theta.is_empty() {
+            true => (0.0, f64::INFINITY),
+            false => DAMPING.parameters[1].plausible,
+        };
+        let bends = |share: &f64| (least..=most).contains(share);
+        point.form == 0 || beta.last().is_none_or(bends)
     }
 
     fn surcharge(&self, _c: &Channels, point: &Point) -> f64 {

@@ -6,7 +6,7 @@ use super::{
     map, spaced,
 };
 use crate::closure::channels::{Channels, lag, slope};
-use crate::closure::firmware::{Words, knots};
+use crate::closure::firmware::{Trial, Words, knots};
 use crate::closure::likelihood::linear::add_scaled;
 use crate::correction::Term;
 
@@ -54,14 +54,14 @@ impl Candidate for ThermalLag {
         let fastest = (1.5 * c.period_s()).max(1e-3);
         let slowest = (c.span_s() / 2.5).max(2.0 * fastest);
         let taus = spaced(fastest, slowest, 18);
-        let forms = if c.span_s() > 0.0 { 2 * c.heats() } else { 0 };
+        let forms = if c.span_s() > 0.0 { 2 * c.histories() } else { 0 };
         (0..forms)
             .flat_map(|form| taus.iter().map(move |t| Point::at(form, &[t.ln()])))
             .collect()
     }
 
     fn columns(&self, c: &Channels, _bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
-        let now = c.heat(point.form % c.heats());
+        let (_, now, _) = c.history(point.form % c.histories());
         let late = lag(&c.time_s, now, tau_s(c, point));
         let behind = |power: i32| -> Vec<f64> {
             let pairs = now.iter().zip(&late);
@@ -79,8 +79,9 @@ impl Candidate for ThermalLag {
 
     fn correction(&self, c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
         let (gain_dps, tau_s) = (*e.beta.first()?, tau_s(c, &e.point));
-        let input = f.thermometer()?;
-        let tangent = !e.point.form.is_multiple_of(c.heats());
+        let which = e.point.form % c.histories();
+        let (input, trial) = read(c, f, which)?;
+        let tangent = which > 0 && which < c.heats();
         let lagging = Lagging::of(c, &e.point);
         let of_square = match (lagging, e.beta.get(1)) {
             (Lagging::Curved, Some(b)) if gain_dps != 0.0 => b / gain_dps,
@@ -122,12 +123,12 @@ impl Candidate for ThermalLag {
         for (column, b) in columns.iter().zip(&e.beta) {
             add_scaled(&mut wanted, *b, column);
         }
-        let term = past_lags(c, f, tau_s, &wanted, terms);
+        let term = past_lags(c, f, &trial, tau_s, &wanted, terms);
         Some(term.unwrap_or_else(|| terms.iter().take(1).map(|t| t(1.0, tau_s, false)).collect()))
     }
 
     fn report(&self, c: &Channels, e: &Estimate) -> Reported {
-        let per_k = 1.0 / c.kelvin_per_u;
+        let per_k = 1.0 / c.history(e.point.form % c.histories()).2;
         let mut out: Reported = [gain("gain_dps_per_k", e, 0, per_k), from_log("tau_s", e, 0)]
             .into_iter()
             .collect();
@@ -138,7 +139,17 @@ impl Candidate for ThermalLag {
     }
 }
 
-/// What lags, in the order of the forms (each for every reading of the temperature).
+/// The input of firmware that a course of temperature is read at, and trials on it; a tangent is read as its phase.
+fn read(c: &Channels, f: &mut Words, which: usize) -> Option<(usize, Trial)> {
+    let Some(die) = c.die.as_ref().filter(|_| which >= c.heats()) else {
+        return Some((f.thermometer()?, f.trial(c)?));
+    };
+    let (input, readings) = f.input(c, die.name)?;
+    let trial = f.trial_of(c, input, &readings)?;
+    Some((input, trial))
+}
+
+/// What lags, in the order of the forms (each for every course of temperature).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Lagging {
     /// A part of the bias that is linear in temperature.
@@ -149,7 +160,7 @@ enum Lagging {
 
 impl Lagging {
     fn of(c: &Channels, point: &Point) -> Self {
-        match point.form / c.heats() {
+        match point.form / c.histories() {
             0 => Lagging::Linear,
             _ => Lagging::Curved,
         }
@@ -192,31 +203,32 @@ impl Candidate for TemperatureRate {
     fn points(&self, c: &Channels) -> Vec<Point> {
         // Forms: how far the slope looks to both sides, for each reading of the temperature. Corners
         // want it short, noise long.
-        (0..c.heats() * SLOPES.len()).map(Point::form).collect()
+        (0..c.histories() * SLOPES.len()).map(Point::form).collect()
     }
 
     fn columns(&self, c: &Channels, _bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
         // Per record length, so that the column is of order one.
         let span = c.span_s().max(f64::MIN_POSITIVE);
         let rows = SLOPES[point.form % SLOPES.len()];
-        let heat = match point.form / SLOPES.len() {
-            0 => &c.u,
-            k => c.heat(k),
-        };
+        let (heat, _, _) = c.history(point.form / SLOPES.len());
         vec![map(&slope(&c.time_s, heat, rows), |v| v * span)]
     }
 
     fn correction(&self, c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
-        if e.point.form >= SLOPES.len() {
+        let which = e.point.form / SLOPES.len();
+        if which > 0 && which < c.heats() {
             return None;
         }
+        let (input, trial) = read(c, f, which)?;
         let gain_dps_s = e.beta.first()? * c.span_s();
-        let wanted = slope(&c.time_s, &c.u, SLOPES[e.point.form]);
-        past_slopes(c, f, gain_dps_s, &map(&wanted, |s| gain_dps_s * s))
+        let rows = SLOPES[e.point.form % SLOPES.len()];
+        let wanted = slope(&c.time_s, c.history(which).0, rows);
+        let wanted = map(&wanted, |s| gain_dps_s * s);
+        past_slopes(c, f, (input, &trial), gain_dps_s, &wanted)
     }
 
     fn report(&self, c: &Channels, e: &Estimate) -> Reported {
-        let factor = c.span_s() / c.kelvin_per_u;
+        let factor = c.span_s() / c.history(e.point.form / SLOPES.len()).2;
         [gain("gain_dps_s_per_k", e, 0, factor)]
             .into_iter()
             .collect()

@@ -1,7 +1,7 @@
 //! Effects of heat's history in firmware, which has no readings to come: lags and differences that come nearest.
 
 use crate::closure::channels::Channels;
-use crate::closure::firmware::Words;
+use crate::closure::firmware::{Trial, Words};
 use crate::closure::likelihood::linear::{Basis, add_scaled, dot};
 use crate::correction::Term;
 
@@ -18,11 +18,11 @@ pub(super) type LagTerm<'a> = dyn Fn(f64, f64, bool) -> Term + 'a;
 pub(super) fn past_lags(
     c: &Channels,
     f: &Words,
+    trial: &Trial,
     tau_s: f64,
     wanted: &[f64],
     kinds: &[&LagTerm<'_>],
 ) -> Option<Vec<Term>> {
-    let trial = f.trial(c)?;
     let most_dps = wanted.iter().fold(1e-3, |m: f64, v| m.max(4.0 * v.abs()));
     let restarts = c.on_s.windows(2).any(|w| w[1] < w[0]);
     let kept = [false, true].into_iter().take(1 + usize::from(restarts));
@@ -73,10 +73,10 @@ const WORTH_A_TERM: f64 = 0.05;
 pub(super) fn past_slopes(
     c: &Channels,
     f: &Words,
+    (input, trial): (usize, &Trial),
     gain_dps_s: f64,
     wanted: &[f64],
 ) -> Option<Vec<Term>> {
-    let (input, trial) = (f.thermometer()?, f.trial(c)?);
     let term = |share: f64, rows: u32| Term::Slope {
         gain_dps_s: share * gain_dps_s,
         input,

@@ -5,6 +5,8 @@ mod clock;
 pub mod emitted;
 mod trial;
 
+pub use trial::Trial;
+
 use super::channels::{Channels, scaled};
 use super::effects::{Bias, Estimate};
 use super::likelihood::linear::{Basis, dot};
@@ -84,7 +86,7 @@ impl Words {
     }
 
     /// An input for a column that firmware sees, and the column as it reads it.
-    fn input(&mut self, c: &Channels, name: &str) -> Option<(usize, Vec<f64>)> {
+    pub fn input(&mut self, c: &Channels, name: &str) -> Option<(usize, Vec<f64>)> {
         if !sees(name) && !self.allowed.iter().any(|a| a == name) {
             return None;
         }

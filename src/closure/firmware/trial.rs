@@ -1,28 +1,37 @@
-//! Terms tried on the thermometer before they go into a plan: what firmware would take off, by its own block.
+//! Terms tried on one input before they go into a plan: what firmware would take off, by its own block.
 
 use super::Words;
 use super::clock;
 use crate::closure::channels::Channels;
 use crate::correction::{Correction, Input, Plan, Reading, Term};
 
-/// The thermometer as the firmware reads it, period by period.
+/// An input as the firmware reads it, period by period.
 pub struct Trial {
     period_s: f64,
-    input: Input,
+    inputs: Vec<Input>,
     readings: Vec<Reading>,
     /// Where the record's rows are among them.
     places: Vec<usize>,
 }
 
 impl Words {
-    /// For terms of the thermometer alone, which is their input 0; `None` if firmware does not see it.
+    /// For terms of the thermometer alone; `None` if firmware does not see it.
     pub fn trial(&self, c: &Channels) -> Option<Trial> {
-        let input = self.inputs.get(self.thermometer?)?;
-        let rows = c.u.iter().enumerate().map(|(k, u)| Reading {
-            time_s: c.time_s[k],
-            time_since_power_on_s: c.on_known.then(|| c.on_s[k]),
-            inputs: vec![input.offset + input.scale * u],
-            rate_out_dps: 0.0,
+        self.trial_of(c, self.thermometer?, &c.u)
+    }
+
+    /// For terms of the input `at` alone, whose scaled readings are given; the inputs before it stand still.
+    pub fn trial_of(&self, c: &Channels, at: usize, readings: &[f64]) -> Option<Trial> {
+        let inputs = self.inputs.get(..=at)?;
+        let rows = readings.iter().enumerate().map(|(k, x)| {
+            let mut read: Vec<f64> = inputs.iter().map(|i| i.offset).collect();
+            read[at] += inputs[at].scale * x;
+            Reading {
+                time_s: c.time_s[k],
+                time_since_power_on_s: c.on_known.then(|| c.on_s[k]),
+                inputs: read,
+                rate_out_dps: 0.0,
+            }
         });
         // Only states that are kept see what lies between two power-ons.
         let rows: Vec<Reading> = rows.collect();
@@ -32,7 +41,7 @@ impl Words {
         }
         Some(Trial {
             period_s: self.period_s,
-            input: input.clone(),
+            inputs: inputs.to_vec(),
             readings,
             places,
         })
@@ -45,7 +54,7 @@ impl Trial {
     pub fn taken_off(&self, terms: &[Term], full_scale_dps: f64) -> Option<Vec<f64>> {
         let plan = Plan {
             period_s: self.period_s,
-            inputs: vec![self.input.clone()],
+            inputs: self.inputs.clone(),
             full_scale_dps,
             terms: terms.to_vec(),
         };

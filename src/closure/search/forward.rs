@@ -66,7 +66,7 @@ impl Search<'_> {
                 return Ok((found, model));
             }
             let before: Vec<String> = model.terms.iter().map(Term::id).collect();
-            model = self.united(self.swept(model)?)?;
+            model = self.united(self.spared(self.swept(model)?)?)?;
             model = self.without_undone(model)?;
             model = self.proven(model)?;
             if model.terms.iter().map(Term::id).eq(before) {

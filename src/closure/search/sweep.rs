@@ -1,6 +1,6 @@
 //! After the forward steps: every term again, with the others in.
 
-use super::judge::{Judged, PRICE, price};
+use super::judge::{EQUAL, Judged, PRICE, price};
 use super::refine::{self, Bench};
 use super::{LEVEL, MOST_RIVALS, Model, Search, Term, stairs};
 use crate::closure::effects::{Bias, Point, map};
@@ -240,6 +240,31 @@ impl Search<'_> {
                 break;
             }
             model = self.polished(model)?;
+        }
+        Ok(model)
+    }
+
+    /// Without names that the others, in the shapes that suit them best, do as well without: such a name mended
+    /// what another one's shape was off when it came.
+    ///
+    /// # Errors
+    /// Too few rows.
+    pub fn spared(&self, mut model: Model) -> Result<Model, Unusable> {
+        let mut k = 0;
+        while k < model.terms.len() && model.terms.len() > 1 {
+            let own = &model.terms[k];
+            let mut others = model.terms.clone();
+            others.remove(k);
+            let doubted = own.candidate.named() && !own.evident;
+            if doubted && others.iter().any(|t| t.candidate.named()) {
+                let without = self.polished(self.model(&others)?)?;
+                if self.net(&without) >= self.net(&model) - EQUAL {
+                    model = without;
+                    k = 0;
+                    continue;
+                }
+            }
+            k += 1;
         }
         Ok(model)
     }
