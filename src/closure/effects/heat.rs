@@ -54,7 +54,11 @@ impl Candidate for ThermalLag {
         let fastest = (1.5 * c.period_s()).max(1e-3);
         let slowest = (c.span_s() / 2.5).max(2.0 * fastest);
         let taus = spaced(fastest, slowest, 18);
-        let forms = if c.span_s() > 0.0 { 2 * c.histories() } else { 0 };
+        let forms = if c.span_s() > 0.0 {
+            2 * c.histories()
+        } else {
+            0
+        };
         (0..forms)
             .flat_map(|form| taus.iter().map(move |t| Point::at(form, &[t.ln()])))
             .collect()

@@ -2,8 +2,9 @@
 
 use super::judge::{Judged, PRICE};
 use super::{Model, Search, Term, declared};
+use crate::closure::effects::{Candidate, Point};
 use crate::closure::likelihood::Unusable;
-use crate::closure::likelihood::linear::{Basis, dot};
+use crate::closure::likelihood::linear::{Basis, add_scaled, dot};
 use crate::closure::likelihood::random::Stream;
 use crate::closure::likelihood::whiten::Whitener;
 use crate::closure::rails::{self, Rails};
@@ -27,10 +28,11 @@ impl Search<'_> {
         }
         let mut others = model.terms.clone();
         others.remove(term);
-        let round = self.round(&self.model(&others)?, 0);
+        let without = self.model(&others)?;
+        let round = self.round(&without, 0);
         let against = round.judged.iter();
         let against = against.filter(|j| !but.contains(&j.candidate.id()));
-        Ok(self.selection_frequency(model, term, against))
+        Ok(self.selection_frequency(model, term, &without, against))
     }
 
     /// Share of the halves of the training rows that show the same rails.
@@ -48,12 +50,13 @@ impl Search<'_> {
 
     /// Share of the halves of the record (whole segments, complementary pairs; Meinshausen & Buhlmann 2010,
     /// Shah & Samworth 2013) in which the term explains more than every one of its competitors, the
-    /// other terms being in, and more than its price. `competitors`: what was judged beside the other
-    /// terms, best first.
+    /// other terms being in, and more than its price. `competitors`: what was judged beside `without`, the model of
+    /// the other terms, best first: a clip acts on what that makes of the output.
     pub fn selection_frequency<'j>(
         &self,
         model: &Model,
         term: usize,
+        without: &Model,
         competitors: impl IntoIterator<Item = &'j Judged>,
     ) -> f64 {
         let c = self.channels;
@@ -69,20 +72,20 @@ impl Search<'_> {
             }
         }
         let own = &model.terms[term];
-        let mut contenders = vec![(of(own), own.point.theta.len())];
+        let kind = |t: &dyn Candidate, p: &Point| (p.theta.len(), t.is_sized(p));
+        let mut contenders = vec![(of(own), kind(own.candidate.as_ref(), &own.point))];
         let competitors = competitors.into_iter();
         for j in competitors.filter(|j| j.candidate.named()).take(6) {
             if j.candidate.id() != own.id() {
-                let columns = reduce(j.candidate.columns(c, &model.bias, &j.point));
-                contenders.push((columns, j.point.theta.len()));
+                let columns = reduce(j.candidate.columns(c, &without.bias, &j.point));
+                contenders.push((columns, kind(j.candidate.as_ref(), &j.point)));
             }
         }
         let whitener = Whitener::new(&fit.problem.line, fit.at.shape);
         let base = whitener.apply_all(&base);
-        let contenders: Vec<(Vec<Vec<f64>>, usize)> = contenders
-            .into_iter()
-            .map(|(columns, theta)| (whitener.apply_all(&columns), theta))
-            .collect();
+        for (columns, _) in &mut contenders {
+            *columns = whitener.apply_all(columns);
+        }
         let signal = whitener.apply(&fit.reduce(&c.error_dps));
         let rows = signal.len();
         let variance = fit.at.white_variance().max(f64::MIN_POSITIVE);
@@ -100,13 +103,18 @@ impl Search<'_> {
                 let declared = Basis::new(&base.iter().map(take).collect::<Vec<_>>());
                 let mut y = take(&signal);
                 declared.project_off(&mut y);
-                let gain = |(columns, theta): &(Vec<Vec<f64>>, usize)| {
+                let gain = |(columns, (theta, sized)): &(Vec<Vec<f64>>, (usize, bool))| {
                     let mut basis = Basis::default();
+                    let mut rest = y.clone();
                     for mut column in columns.iter().map(take) {
                         declared.project_off(&mut column);
+                        add_scaled(&mut rest, -f64::from(u8::from(*sized)), &column);
                         basis.push(&column);
                     }
-                    let explained: f64 = basis.q.iter().map(|q| dot(q, &y).powi(2)).sum();
+                    if !sized {
+                        basis.project_off(&mut rest);
+                    }
+                    let explained = dot(&y, &y) - dot(&rest, &rest);
                     0.5 * explained / variance - PRICE * (basis.rank() + theta) as f64
                 };
                 let gains: Vec<f64> = contenders.iter().map(gain).collect();

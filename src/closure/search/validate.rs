@@ -19,6 +19,11 @@ const SLOW: f64 = 2.0;
 const CERTAIN: f64 = 1e-8;
 const UNSEEN: f64 = 0.01;
 
+/// Sum of squares, in units of the noise's variance, from which on what a term says of the held-out rows can be told
+/// from its contrary (half of it by two deviations), and how much more mean square is none.
+const SAYS: f64 = 16.0;
+const WITHIN: f64 = 1.03;
+
 /// A sinusoid beside which another one of this share of its gain is needed is none: a drifting tone, or
 /// something else that repeats.
 const OVERTONE: f64 = 0.1;
@@ -33,8 +38,10 @@ const ONE_ROW: f64 = 0.8;
 pub(super) const UNSTEADY: f64 = 1e-3;
 const UNSTEADY_SHARE: f64 = 0.05;
 
-/// Least selection frequency of a local shape (Meinshausen & Buhlmann 2010 take 0.6 to 0.9), and of any other.
+/// Least selection frequency of a local shape (Meinshausen & Buhlmann 2010 take 0.6 to 0.9), of one that is certain and
+/// leaves nothing, and of any other shape.
 const STABLE: f64 = 0.7;
+const HALF: f64 = 0.5;
 const EVER: f64 = 0.1;
 
 /// Share of the net gain of a name that does not hold with which a law takes its place.
@@ -80,7 +87,9 @@ impl Search<'_> {
                 self.heldout_error(&model, &model),
                 self.heldout_error(&without, &model),
             );
-            let silent = term.p_value <= CERTAIN && self.unseen(&model, &without);
+            let silent = term.p_value <= CERTAIN
+                && (self.unseen(&model, &without)
+                    || a.square < WITHIN * b.square && self.said(&model, &without, &model) < SAYS);
             if !silent && a.innovations >= b.innovations && a.square >= b.square {
                 self.leaves(found, &term);
                 model = without;
@@ -256,15 +265,27 @@ impl Search<'_> {
         let local = candidate.is_local();
         let mut others = model.terms.clone();
         others.remove(own);
-        let round = self.round(&self.model(&others)?, 0);
+        let without = self.model(&others)?;
+        let round = self.round(&without, 0);
         let rivals = &model.terms[own].rivals;
         let counts = |j: &&Judged| {
             let listed = rivals.contains(&j.candidate.id());
             !(listed || local && j.candidate.is_local())
         };
         let against = round.judged.iter().filter(counts);
-        let least = if local { STABLE } else { EVER };
-        Ok(self.selection_frequency(model, own, against) >= least)
+        let often = self.selection_frequency(model, own, &without, against);
+        let certain = || model.terms[own].p_value <= CERTAIN && self.is_clean(model);
+        Ok(often >= if local { STABLE } else { EVER } || local && often >= HALF && certain())
+    }
+
+    /// Whether nothing is left of a record beside a model: no wander, no colour, nothing beyond chance.
+    fn is_clean(&self, model: &Model) -> bool {
+        let slow = structure::slowness(model.fit.at.shape, model.fit.problem.line.used());
+        if slow > SLOW || self.coloured(model) {
+            return false;
+        }
+        let round = self.round(model, self.effort.surrogates);
+        round.judged.iter().all(|j| j.p_value > LEVEL)
     }
 
     /// Whether one row of the fit holds a term's shape. Of a clip's or a dead band's rows, which are as far off as it
