@@ -54,7 +54,7 @@ pub struct Decimated {
 }
 
 /// Blocks of `rows` rows (fewer where used rows are), and spikes by their distance from their
-/// block's median.
+/// block's median, or, where a block has none, from those of their neighbours.
 ///
 /// # Errors
 /// Times that do not advance from block to block.
@@ -74,8 +74,15 @@ pub fn decimate(
         rows,
     };
     let residual = plain_residual(plain, &blocks.weights);
-    let deviations = from_block_medians(&residual, &blocks);
-    let marked = deviations.iter().zip(used).filter(|(_, u)| **u);
+    // What the scale is of, and what is far.
+    let (usual, deviations) = match rows {
+        0..FEWEST => from_neighbours(&residual, &blocks.weights),
+        _ => {
+            let deviations = from_block_medians(&residual, &blocks);
+            (deviations.clone(), deviations)
+        }
+    };
+    let marked = usual.iter().zip(used).filter(|(_, u)| **u);
     let unit = robust::scale(marked.map(|(d, _)| *d));
     if unit > 0.0 {
         for (w, d) in blocks.weights.iter_mut().zip(&deviations) {
@@ -121,6 +128,34 @@ fn plain_residual(plain: &Problem, weights: &[f64]) -> Vec<f64> {
         add_scaled(&mut residual, -b, column);
     }
     residual
+}
+
+/// Fewest rows that have a median of which one may be far.
+const FEWEST: usize = 3;
+
+/// How far each row is from the median of the rows before it, and from that and the median of the rows after it: the
+/// lesser of the two, or nothing where they are to both sides. The rows at a step are like those on one of its sides.
+fn from_neighbours(residual: &[f64], weights: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let used: Vec<usize> = (0..residual.len()).filter(|i| weights[*i] > 0.0).collect();
+    let median = |rows: &[usize]| {
+        let mut near: Vec<f64> = rows.iter().map(|i| residual[*i]).collect();
+        near.sort_by(f64::total_cmp);
+        near.get(near.len() / 2).copied()
+    };
+    let (mut one_sided, mut apart) = (vec![0.0; residual.len()], vec![0.0; residual.len()]);
+    for (k, row) in used.iter().enumerate() {
+        let before = median(&used[k.saturating_sub(FEWEST)..k]);
+        let after = median(&used[k + 1..(k + 1 + FEWEST).min(used.len())]);
+        let (Some(before), Some(after)) = (before.or(after), after.or(before)) else {
+            continue;
+        };
+        let (from, to) = (residual[*row] - before, residual[*row] - after);
+        one_sided[*row] = from;
+        if from * to > 0.0 {
+            apart[*row] = if from.abs() < to.abs() { from } else { to };
+        }
+    }
+    (one_sided, apart)
 }
 
 fn from_block_medians(residual: &[f64], blocks: &Blocks) -> Vec<f64> {
@@ -192,4 +227,38 @@ fn mean_correlation(m: usize, tau: f64) -> f64 {
     // 2 sum_{k=1}^{m-1} (m - k) a^k / (m (m - 1)).
     let sum = a * (m * (1.0 - a) - (1.0 - a.powf(m))) / (1.0 - a).powi(2);
     2.0 * sum / (m * (m - 1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::closure::synthetic::Random;
+
+    /// White noise of one unit in pairs of rows, with spikes of 30 in one row of forty and a step of 40 in the middle: the
+    /// rows that lose their weight, and the noise of a row.
+    #[test]
+    fn spikes_in_pairs_of_rows_are_seen_and_a_step_is_not() {
+        let mut random = Random::new(3);
+        let n = 1200;
+        let spike = |k: &usize| k % 40 == 17;
+        let y: Vec<f64> = (0..n)
+            .map(|k| {
+                let step = if k < n / 2 { 0.0 } else { 40.0 };
+                random.normal() + step + if spike(&k) { 30.0 } else { 0.0 }
+            })
+            .collect();
+        let times_s: Vec<f64> = (0..n).map(|k| k as f64).collect();
+        let plain = Problem {
+            line: Timeline::new(&times_s, vec![1.0; n]).unwrap(),
+            y,
+            columns: vec![vec![1.0; n]],
+        };
+        let decimated = decimate(&times_s, &plain, &vec![true; n], 2).unwrap();
+        let lost = |k: &usize| decimated.blocks.weights[*k] < 0.5;
+        assert_eq!(
+            (0..n).filter(lost).collect::<Vec<_>>(),
+            (0..n).filter(spike).collect::<Vec<_>>()
+        );
+        assert!((decimated.within.sqrt() - 1.0).abs() < 0.1);
+    }
 }
