@@ -198,8 +198,7 @@ impl Told<'_> {
                 effect: term.id(),
                 channels: term
                     .candidate
-                    .channels(self.search.channels)
-                    .unwrap_or_default(),
+                    .channels_at(self.search.channels, &term.point),
                 parameters: reported.iter().map(|(n, v)| (n.clone(), v.0)).collect(),
                 parameter_std: reported.iter().map(|(n, v)| (n.clone(), v.1)).collect(),
                 heldout_rms: model.heldout_rms,

@@ -63,6 +63,14 @@ impl Channels {
         self.heats() + usize::from(self.die.is_some())
     }
 
+    /// The column that [`Channels::history`] is of.
+    pub fn history_of(&self, which: usize) -> &str {
+        match &self.die {
+            Some(die) if which >= self.heats() => die.name,
+            _ => &self.thermometer,
+        }
+    }
+
     /// A course of temperature as read, the same smooth, and its kelvins per unit.
     pub fn history(&self, which: usize) -> (&[f64], &[f64], f64) {
         match (&self.die, which) {

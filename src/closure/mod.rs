@@ -42,6 +42,8 @@ mod check_tests;
 #[cfg(test)]
 mod clip_tests;
 #[cfg(test)]
+mod heats_tests;
+#[cfg(test)]
 mod intake_tests;
 #[cfg(test)]
 mod lag_tests;

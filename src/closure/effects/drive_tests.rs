@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::closure::search::{Effort, Search, Term as Step};
-use crate::closure::synthetic::Pull;
+use crate::closure::synthetic::{Pull, Random, triangle};
+use std::collections::BTreeMap;
 
 #[test]
 fn less_q_does_not_bend_the_phase_back() {
@@ -10,6 +11,7 @@ fn less_q_does_not_bend_the_phase_back() {
         (0, vec![-3.0], true),
         (1, vec![0.9], true),
         (1, vec![-0.9], false),
+        (1, vec![1.8], true),
         (2, vec![-3.0, 0.9], true),
         (2, vec![3.0, -0.9], false),
     ] {
@@ -19,6 +21,55 @@ fn less_q_does_not_bend_the_phase_back() {
             "{form}"
         );
     }
+    // Beside a resonance of its own, a share of nearly two is another effect.
+    for (form, beta, admitted) in [(1, vec![0.9], true), (2, vec![3.0, 1.8], false)] {
+        let free = Point::at(form, &[0.2]);
+        assert_eq!(Damping.admits(&free, &beta), admitted, "{form}");
+    }
+}
+
+/// A phase that bends as the damping does, read behind a delay of 0.25 rad: the only name, with its share and the delay.
+#[test]
+fn damping_behind_a_demodulators_delay_is_the_only_name() {
+    const ROWS: usize = 600;
+    const DELAY_RAD: f64 = 0.25;
+    let resonance = -std::f64::consts::FRAC_PI_2 + DELAY_RAD;
+    let mut random = Random::new(12);
+    let degc = [triangle(200), triangle(400)].concat();
+    // Gas damping follows the temperature, and the pressure of the package besides.
+    let gain: Vec<f64> = (0..ROWS)
+        .map(|k| 1.0 + 0.12 * (0.05 * k as f64).sin())
+        .collect();
+    let nominal = |degc: f64| resonance - 0.1 - 0.35 * (degc / 35.0 - 1.0);
+    let phase: Vec<f64> = (0..ROWS)
+        .map(|k| resonance + ((nominal(degc[k]) - resonance).tan() / gain[k]).atan())
+        .collect();
+    let output = degc.iter().map(|t| {
+        let u = t / 35.0 - 1.0;
+        8.0 - 3.0 * u + u * u + 0.01 * random.normal()
+    });
+    let columns = BTreeMap::from([
+        ("rate_out_dps".to_owned(), output.collect()),
+        ("phase_rad".to_owned(), phase),
+        ("agc".to_owned(), gain),
+    ]);
+    let time_s: Vec<f64> = (0..ROWS).map(|k| 10.0 * k as f64).collect();
+    let degc_of = |rad: f64| 35.0 - (rad - resonance + 0.1) * 100.0;
+    let channels = Channels::new(&time_s, &columns, "phase_rad", degc_of).unwrap();
+    let split = channels.split().unwrap();
+    let search = Search::new(&channels, &split, Effort::default(), Vec::new());
+    let found = search.run().unwrap();
+    let names: Vec<String> = found.terms.iter().map(Step::id).collect();
+    assert_eq!(names, ["damping_bias"]);
+    let model = search.model(&found.terms).unwrap();
+    let estimate = search.estimates(&model).remove(0);
+    let reported = found.terms[0].candidate.report(&channels, &estimate);
+    let is = |name: &str, due: f64| {
+        let (value, _) = reported[name];
+        assert!((value - due).abs() < 0.05, "{name}: {value} for {due}");
+    };
+    is("share_of_phase_bend", 1.0);
+    is("resonance_off_rad", DELAY_RAD);
 }
 
 /// The only name that a pull gets, its pull over the true one, and the held-out error over the noise of the same rows.

@@ -50,6 +50,10 @@ impl Candidate for ThermalLag {
         Ok(vec![heated(c)?, "time_s".to_owned()])
     }
 
+    fn channels_at(&self, c: &Channels, point: &Point) -> Vec<String> {
+        heated_at(c, point.form % c.histories())
+    }
+
     fn points(&self, c: &Channels) -> Vec<Point> {
         let fastest = (1.5 * c.period_s()).max(1e-3);
         let slowest = (c.span_s() / 2.5).max(2.0 * fastest);
@@ -143,6 +147,11 @@ impl Candidate for ThermalLag {
     }
 }
 
+/// The columns of a term that follows a course of temperature in time.
+fn heated_at(c: &Channels, which: usize) -> Vec<String> {
+    vec![c.history_of(which).to_owned(), "time_s".to_owned()]
+}
+
 /// The input of firmware that a course of temperature is read at, and trials on it; a tangent is read as its phase.
 fn read(c: &Channels, f: &mut Words, which: usize) -> Option<(usize, Trial)> {
     let Some(die) = c.die.as_ref().filter(|_| which >= c.heats()) else {
@@ -202,6 +211,10 @@ impl Candidate for TemperatureRate {
 
     fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing> {
         Ok(vec![heated(c)?, "time_s".to_owned()])
+    }
+
+    fn channels_at(&self, c: &Channels, point: &Point) -> Vec<String> {
+        heated_at(c, point.form / SLOPES.len())
     }
 
     fn points(&self, c: &Channels) -> Vec<Point> {

@@ -162,6 +162,11 @@ pub trait Candidate: Send + Sync {
     /// A channel that the record lacks, or that does not move: the remark.
     fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing>;
 
+    /// The columns of the record that it uses at this point, if it does not use the same at every one.
+    fn channels_at(&self, c: &Channels, _point: &Point) -> Vec<String> {
+        self.channels(c).unwrap_or_default()
+    }
+
     /// Where the search starts.
     fn points(&self, c: &Channels) -> Vec<Point>;
 

@@ -448,7 +448,7 @@ impl<'a> Search<'a> {
 
     /// The channel that stands for a term.
     pub fn channel(&self, term: &Term) -> Option<String> {
-        let channels = term.candidate.channels(self.channels).ok()?;
+        let channels = term.candidate.channels_at(self.channels, &term.point);
         channels.into_iter().next()
     }
 }

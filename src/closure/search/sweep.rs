@@ -415,3 +415,7 @@ impl Search<'_> {
         Ok(self.model(&terms)?.value)
     }
 }
+
+#[cfg(test)]
+#[path = "sweep_tests.rs"]
+mod tests;
