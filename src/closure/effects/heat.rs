@@ -18,6 +18,11 @@ pub fn all() -> Vec<Box<dyn Candidate>> {
 /// Part of the bias follows a temperature that lags the thermometer's.
 struct ThermalLag;
 
+/// Time constants of packages and boards, s, begin here, and with the square of a shorter one the odds fall: what lags by
+/// seconds follows the rate of the temperature, and looks like it.
+const SLOW_S: f64 = 30.0;
+const HASTE: f64 = 2.0;
+
 const THERMAL_LAG: Sheet = Sheet {
     id: "thermal_lag",
     physics: "part of the bias (electronics, package) follows a temperature that lags the \
@@ -52,6 +57,10 @@ impl Candidate for ThermalLag {
 
     fn channels_at(&self, c: &Channels, point: &Point) -> Vec<String> {
         heated_at(c, point.form % c.histories())
+    }
+
+    fn surcharge(&self, c: &Channels, point: &Point) -> f64 {
+        HASTE * (SLOW_S / tau_s(c, point)).ln().max(0.0)
     }
 
     fn points(&self, c: &Channels) -> Vec<Point> {

@@ -16,6 +16,7 @@ pub mod candidates;
 pub mod decimate;
 pub mod lattice;
 pub mod linear;
+pub mod memory;
 pub mod noise;
 pub mod null;
 pub mod random;

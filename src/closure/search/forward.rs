@@ -6,7 +6,7 @@ use super::{Found, LEVEL, MOST_RIVALS, Model, Search, Term};
 use crate::closure::likelihood::{Unusable, reml};
 
 /// By how much net gain a shape without a name has to be better than the best name.
-const STRANGER: f64 = 6.0;
+pub(super) const STRANGER: f64 = 6.0;
 
 /// Most shapes without a name.
 const STRANGERS: usize = 3;

@@ -1,7 +1,7 @@
 //! One round: all candidates beside those that are taken, each at its best shape.
 
 use super::refine::{self, Bench, Profiled};
-use super::{LEVEL, MOST_RIVALS, Model, Search, acting, tones};
+use super::{LEVEL, MOST_RIVALS, Model, Search, acting, fast, tones};
 use crate::closure::channels::Channels;
 use crate::closure::effects::tone::{Pickup, returns};
 use crate::closure::effects::{Bias, Candidate, Missing, Point, map};
@@ -143,7 +143,14 @@ impl Search<'_> {
             _ => scores.grid.clone(),
         };
         let tone = tones::strongest(c, fit, &grid);
-        let tone = tone.map(|tone| tones::unaliased(c, fit, &model.residual(c), tone));
+        let rest = model.residual(c);
+        let fast = fit.decimated.as_ref();
+        let fast = fast.and_then(|b| fast::within_blocks(c, &rest, &b.weights, b.rows));
+        // What blocks leave of a tone that is in is that tone.
+        let fast = fast.filter(|tone| !has_tone(model, tone.frequency_hz, 2.0 / c.span_s()));
+        let both = [tone, fast].into_iter().flatten();
+        let both = both.map(|tone| tones::unaliased(c, fit, &rest, tone));
+        let tone = both.min_by(|a, b| a.p_value.total_cmp(&b.p_value));
         if let Some(tone) = tone {
             let taken = taken.iter().any(|id| id == "periodic_pickup");
             let pickup: Arc<dyn Candidate> = Arc::new(Pickup {
@@ -393,6 +400,15 @@ fn reduced(
 ) -> Vec<Vec<f64>> {
     let columns = candidate.columns(search.channels, bias, point);
     columns.iter().map(|c| fit.reduce(c)).collect()
+}
+
+/// Whether a model has a tone of a frequency, to `within_hz`.
+fn has_tone(model: &Model, frequency_hz: f64, within_hz: f64) -> bool {
+    let mut tones = model.terms.iter().filter(|t| {
+        let id = t.id();
+        id == "periodic_pickup" || id == "outside:tone"
+    });
+    tones.any(|t| (t.point.theta[0] - frequency_hz).abs() < within_hz)
 }
 
 #[cfg(test)]

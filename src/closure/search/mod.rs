@@ -12,6 +12,7 @@ mod clip;
 pub mod constancy;
 pub mod estimate;
 mod evident;
+mod fast;
 pub mod forward;
 pub mod halves;
 pub mod heldout;
@@ -231,7 +232,7 @@ impl<'a> Search<'a> {
         let train: Vec<bool> = both(&split.train);
         let rails = rails::of(channels, &train);
         let free = |(i, row): (usize, &bool)| *row && !rails.as_ref().is_some_and(|r| r.rows[i]);
-        Search {
+        let mut search = Search {
             channels,
             used: train.iter().enumerate().map(free).collect(),
             train,
@@ -242,6 +243,24 @@ impl<'a> Search<'a> {
             models: Memo::default(),
             rounds: Memo::default(),
             beginning: RefCell::default(),
+        };
+        search.effort.rows = search.fitted_rows();
+        search
+    }
+
+    /// Most rows of a fit that keep a fast tone in the means of blocks.
+    fn fitted_rows(&self) -> usize {
+        let used = self.used.iter().filter(|u| **u).count();
+        let most = self.effort.rows.max(16);
+        let mut rest = self.channels.error_dps.clone();
+        let columns = declared(self.channels);
+        for (b, column) in self.plain_bias().coefficients_dps.iter().zip(&columns) {
+            add_scaled(&mut rest, -b, column);
+        }
+        let size = used.div_ceil(most);
+        match fast::block_rows(self.channels, &rest, &self.used, size) {
+            longer if longer > size => used.div_ceil(longer),
+            _ => self.effort.rows,
         }
     }
 

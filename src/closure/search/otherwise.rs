@@ -6,9 +6,9 @@
 //! explain more: then it was not called for. And of two causes the one that comes first is fitted to both, so that the
 //! other finds its place taken: what comes second may have to come first.
 
+use super::forward::STRANGER;
 use super::judge::{Judged, PRICE, price};
 use super::reported::WANDER;
-use super::structure::slowness;
 use super::{Found, LEVEL, Model, Search, Term};
 use crate::closure::channels::range;
 use crate::closure::likelihood::Unusable;
@@ -50,7 +50,7 @@ impl Search<'_> {
     pub fn run(&self) -> Result<Found, Unusable> {
         let mut found = self.run_any()?;
         let model = self.model(&found.terms)?;
-        if found.left.is_none() && (self.missed(&model) || wander(&model) > MUCH) {
+        if found.left.is_none() && (self.missed(&model) || self.wander(&model) > MUCH) {
             found.left = Some("time_s".to_owned());
         }
         Ok(found)
@@ -62,12 +62,14 @@ impl Search<'_> {
         let model = self.model(&first.terms)?;
         let clustered = self.clustered(&model);
         // Names that leave a wander may be the wrong ones, or not all.
-        let wanders = !first.terms.is_empty() && wander(&model) > WANDER;
+        let wanders = !first.terms.is_empty() && self.wander(&model) > WANDER;
         let clean = first.left.is_none() && !clustered && !wanders;
         if clean || !first.undecided.is_empty() {
             return Ok(first);
         }
-        let due = self.net(&reached);
+        // A shape without a name has to be better than names by as much here as where it is taken.
+        let strange = reached.terms.iter().any(|t| !t.candidate.named());
+        let due = self.net(&reached) - if strange { STRANGER } else { 0.0 };
         let barred = self.begin(Beginning::default());
         for beginning in beginnings(&reached.terms, &first) {
             self.begin(beginning);
@@ -156,11 +158,6 @@ impl Search<'_> {
         let paid = terms.map(|t| price(t.candidate.as_ref(), c, &t.point));
         model.value - paid.sum::<f64>() - PRICE * model.beta.len() as f64
     }
-}
-
-/// Slow noise of a model, rms over the record, in units of the white.
-fn wander(model: &Model) -> f64 {
-    slowness(model.fit.at.shape, model.fit.problem.line.used())
 }
 
 /// Whether marked rows have more marked neighbours than chance gives them.

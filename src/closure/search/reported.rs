@@ -1,6 +1,5 @@
 //! What is reported has to stand by itself: shapes without a name, beside which names were found, are not in it.
 
-use super::structure::slowness;
 use super::validate::UNSTEADY;
 use super::{Found, LEVEL, MOST_RIVALS, Model, Search, Term};
 use crate::closure::likelihood::Unusable;
@@ -62,7 +61,7 @@ impl Search<'_> {
     /// Drops names that slow noise as strong as what all of them leave may have made.
     fn kept_from_noise(&self, found: &mut Found) -> Result<(), Unusable> {
         let model = self.model(&found.terms)?;
-        let slow = slowness(model.fit.at.shape, model.fit.problem.line.used());
+        let slow = self.wander(&model);
         let asked = LEVEL * 10f64.powf(-DECADES * (slow - WANDER).max(0.0));
         let square = |m: &Model| self.heldout_error(m, &model).square;
         for k in (0..found.terms.len()).rev() {

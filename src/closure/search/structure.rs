@@ -1,7 +1,9 @@
 //! Is what is left noise? Tests of the whitened residual that need no candidate.
 
 use super::{Model, Search};
+use crate::closure::likelihood::memory;
 use crate::closure::likelihood::noise::Shape;
+use crate::closure::likelihood::whiten::Whitener;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
@@ -44,21 +46,48 @@ pub fn band_p_value(whitened: &[f64]) -> f64 {
     least.min(1.0)
 }
 
+/// Slow noise that is not looked into.
+const LITTLE: f64 = 1.0;
+
+/// Log-likelihood by which a short memory has to be better than 1/f noise and a walk.
+const BETTER: f64 = 3.0;
+
 /// The rms of slow noise over a record, in units of the white one.
-pub fn slowness(shape: Shape, rows: usize) -> f64 {
+fn slowness(shape: Shape, rows: usize) -> f64 {
     let n = rows.max(2) as f64;
     (shape.flicker * n.ln() + shape.walk * n / 6.0).sqrt()
 }
 
+fn is_coloured(whitened: &[f64]) -> bool {
+    let white: Vec<f64> = whitened.iter().map(|v| v.clamp(-4.0, 4.0)).collect();
+    band_p_value(&white) < COLOURED
+}
+
 impl Search<'_> {
-    /// The channel in which a model leaves structure that no candidate has: always time.
+    /// Slow noise of a model, rms over the record, in units of the white; none where what the model leaves has but a short
+    /// memory.
+    pub fn wander(&self, model: &Model) -> f64 {
+        let slow = slowness(model.fit.at.shape, model.fit.problem.line.used());
+        match slow > LITTLE && self.forgets(model) {
+            true => 0.0,
+            false => slow,
+        }
+    }
+
+    /// Whether a model leaves structure in time that no candidate has.
     pub fn coloured(&self, model: &Model) -> bool {
-        let white: Vec<f64> = model
-            .fit
-            .residual_whitened
-            .iter()
-            .map(|v| v.clamp(-4.0, 4.0))
-            .collect();
-        band_p_value(&white) < COLOURED
+        is_coloured(&model.fit.residual_whitened) && !self.forgets(model)
+    }
+
+    /// Whether what a model leaves is noise with a short memory: that explains it better than 1/f noise and a walk do, and
+    /// all of it.
+    fn forgets(&self, model: &Model) -> bool {
+        let fit = &model.fit;
+        let rest = fit.reduce(&model.residual(self.channels));
+        let line = &fit.problem.line;
+        let whitener = Whitener::new(line, fit.at.shape);
+        let slow = memory::loglik(&whitener.apply(&rest), whitener.used, whitener.log_det);
+        let memory = memory::short_memory(line, &rest);
+        memory.is_some_and(|m| m.loglik > slow + BETTER && !is_coloured(&m.whitened))
     }
 }

@@ -185,7 +185,7 @@ pub fn unaliased(c: &Channels, fit: &Fit, rest: &[f64], tone: Tone) -> Tone {
 }
 
 /// Square of a signal's product with a unit phasor, over the rows of a weight (Schuster's periodogram).
-fn power(time_s: &[f64], y: &[f64], weights: &[f64], hz: f64) -> f64 {
+pub(super) fn power(time_s: &[f64], y: &[f64], weights: &[f64], hz: f64) -> f64 {
     let rows = time_s.iter().zip(y).zip(weights);
     let used = rows.filter(|((_, y), w)| **w > 0.0 && y.is_finite());
     let (s, c) = used.fold((0.0, 0.0), |(s, c), ((t, y), _)| {

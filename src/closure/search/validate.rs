@@ -2,7 +2,7 @@
 
 use super::judge::Judged;
 use super::reported::BEYOND;
-use super::{Found, LEVEL, Model, Search, Term, structure};
+use super::{Found, LEVEL, Model, Search, Term};
 use crate::closure::channels::Channels;
 use crate::closure::effects::map;
 use crate::closure::effects::tone::{self, Pickup};
@@ -28,7 +28,8 @@ const WITHIN: f64 = 1.03;
 /// something else that repeats.
 const OVERTONE: f64 = 0.1;
 
-/// Share of a channel's square about its mean from which on a tone of that frequency is the channel's.
+/// Share of the square about its mean of a channel, or of its square, from which on a tone of that frequency is the
+/// channel's.
 const WAVING: f64 = 0.5;
 
 /// Share of a shape's square that a single row may hold: what shows in one row, anything may have made.
@@ -159,8 +160,7 @@ impl Search<'_> {
     /// Without shapes of a single row. Without steps that happen once: they are no law of temperature unless
     /// everything else is clean, for anything may happen once.
     fn without_accidents(&self, model: Model, found: &mut Found) -> Result<Model, Unusable> {
-        let rows = model.fit.problem.line.used();
-        let slow = structure::slowness(model.fit.at.shape, rows);
+        let slow = self.wander(&model);
         let more = model.terms.iter().any(|t| !t.candidate.named()) || self.coloured(&model);
         let mut terms = model.terms.clone();
         terms.retain(|t| {
@@ -280,8 +280,7 @@ impl Search<'_> {
 
     /// Whether nothing is left of a record beside a model: no wander, no colour, nothing beyond chance.
     fn is_clean(&self, model: &Model) -> bool {
-        let slow = structure::slowness(model.fit.at.shape, model.fit.problem.line.used());
-        if slow > SLOW || self.coloured(model) {
+        if self.wander(model) > SLOW || self.coloured(model) {
             return false;
         }
         let round = self.round(model, self.effort.surrogates);
@@ -326,7 +325,7 @@ impl Search<'_> {
     }
 }
 
-/// A channel most of whose square is a sinusoid of a frequency.
+/// A channel that is a sinusoid of a frequency for the most part, or whose square is.
 fn waving(c: &Channels, frequency_hz: f64) -> Option<String> {
     let wave = |f: fn(f64) -> f64| map(&c.time_s, |t| f(TAU * frequency_hz * t));
     let pair = [wave(f64::sin), wave(f64::cos)];
@@ -337,7 +336,13 @@ fn waving(c: &Channels, frequency_hz: f64) -> Option<String> {
         basis.project_off(&mut rest);
         dot(&rest, &rest)
     };
-    let is_waving = |column: &[f64]| left(&both, column) < (1.0 - WAVING) * left(&constant, column);
+    let waves = |column: &[f64]| left(&both, column) < (1.0 - WAVING) * left(&constant, column);
+    // What answers to both signs alike swings twice as often.
+    let square = |column: &[f64]| {
+        let mean = column.iter().sum::<f64>() / column.len().max(1) as f64;
+        map(column, |v| (v - mean).powi(2))
+    };
+    let is_waving = |column: &[f64]| waves(column) || waves(&square(column));
     if is_waving(&c.u) {
         return Some(c.thermometer.clone());
     }

@@ -108,6 +108,14 @@ fn a_tone_of_a_channels_own_frequency_is_that_channels() {
             (vec![], Some("heater_w")),
             "{seed}"
         );
+        // Twice as often: what answers to both signs alike.
+        let twice = |k: usize, _: f64| 8.0 * (TAU * 22.0 * k as f64 / ROWS as f64 + 2.3).sin();
+        let (names, left) = closed(seed, &more, twice);
+        assert_eq!(
+            (names, left.as_deref()),
+            (vec![], Some("heater_w")),
+            "{seed}"
+        );
         let (names, _) = closed(seed, &more, |k, _| 8.0 * wave(k, 17.0));
         assert_eq!(names, ["periodic_pickup"], "{seed}");
     }
