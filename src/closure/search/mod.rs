@@ -3,13 +3,15 @@
 //! Forward steps over the whole catalogue and over shapes without a name ([`super::effects`]), each
 //! against the noise that the record itself shows ([`super::likelihood`]): a step must be beyond what
 //! chance makes of the best of all candidates ([`judge`]) and may have at most four rivals that do as
-//! well. Rows that stand out are spikes, unless a candidate explains them ([`forward`]). At the end every
+//! well; sinusoids have a search of their own ([`tones`], and `fast` within blocks of rows). Rows that stand
+//! out are spikes, unless a candidate explains them ([`forward`]). At the end every
 //! step is tried again with the others in, against all other names ([`sweep`]), must hold ([`validate`]) and lower the error of
 //! held-out rows ([`heldout`]). Where a shape without a name wins, it is kept as what is left.
 
 mod acting;
 mod clip;
 pub mod constancy;
+mod declared;
 pub mod estimate;
 mod evident;
 mod fast;
@@ -29,14 +31,15 @@ pub mod tones;
 pub mod undone;
 pub mod validate;
 
-use super::channels::{Channels, range};
+use super::channels::Channels;
 use super::effects::{self, Bias, Candidate, Missing, Point};
 use super::likelihood::Unusable;
 use super::likelihood::blocks::Split;
-use super::likelihood::linear::{Basis, add_scaled, dot};
+use super::likelihood::linear::add_scaled;
 use super::likelihood::reml::{self, Fit};
 use super::rails::{self, Rails};
 use clip::{Kind, clip};
+pub use declared::{declared, declared_by, powers, weighted};
 use judge::{Judged, Round};
 use memo::Memo;
 use otherwise::Beginning;
@@ -181,38 +184,6 @@ pub struct Search<'a> {
     models: Memo<Arc<Model>>,
     rounds: Memo<Arc<Round>>,
     beginning: RefCell<Beginning>,
-}
-
-/// The regressors of the declared model: 1, u, u^2.
-pub fn declared(c: &Channels) -> Vec<Vec<f64>> {
-    powers(&c.u)
-}
-
-/// The same of any scaled reading; 1 alone if it does not move.
-pub fn powers(u: &[f64]) -> Vec<Vec<f64>> {
-    let (low, high) = range(u);
-    let order = if high > low { 3 } else { 1 };
-    (0..order)
-        .map(|k| u.iter().map(|u| u.powi(k)).collect())
-        .collect()
-}
-
-/// The declared bias in a scaled reading by ordinary least squares, and what it leaves of the rows that are measured.
-pub fn declared_by(u: &[f64], error_dps: &[f64]) -> (Bias, Vec<f64>) {
-    let measured = |e: &f64| f64::from(u8::from(e.is_finite()));
-    let weights: Vec<f64> = error_dps.iter().map(measured).collect();
-    let columns = powers(u);
-    let coefficients_dps = weighted(&columns, error_dps, &weights);
-    let mut rest = error_dps.to_vec();
-    for (b, column) in coefficients_dps.iter().zip(&columns) {
-        add_scaled(&mut rest, -b, column);
-    }
-    rest.retain(|r| r.is_finite());
-    let bias = Bias {
-        coefficients_dps,
-        others_dps: Vec::new(),
-    };
-    (bias, rest)
 }
 
 impl<'a> Search<'a> {
@@ -506,19 +477,4 @@ impl Model {
         };
         self.terms.iter().map(own).collect()
     }
-}
-
-/// Weighted least squares; rows of weight 0 may hold anything.
-pub fn weighted(columns: &[Vec<f64>], y: &[f64], weights: &[f64]) -> Vec<f64> {
-    let scaled = |c: &[f64]| -> Vec<f64> {
-        let pairs = c.iter().zip(weights);
-        pairs
-            .map(|(v, w)| if *w > 0.0 { v * w.sqrt() } else { 0.0 })
-            .collect()
-    };
-    let columns: Vec<Vec<f64>> = columns.iter().map(|c| scaled(c)).collect();
-    let basis = Basis::new(&columns);
-    let y = scaled(y);
-    let z: Vec<f64> = basis.q.iter().map(|q| dot(q, &y)).collect();
-    basis.solve(&z)
 }
