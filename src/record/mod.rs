@@ -9,6 +9,7 @@
 //! decimated sample.
 
 mod any;
+mod applied;
 mod averager;
 pub mod capture;
 mod capture_csv;

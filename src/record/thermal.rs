@@ -4,7 +4,7 @@ use super::cells::{self, BadNumber};
 use super::columns::{self, Line, Roles};
 use super::lines::Lines;
 use super::warning::Warning;
-use super::{clock, frozen, plausibility, shorten};
+use super::{applied, clock, frozen, plausibility, shorten};
 use crate::design::RecordMapping;
 use crate::error::{InputError, Result, io_error};
 use std::collections::BTreeMap;
@@ -147,6 +147,7 @@ pub fn parse(
     }
     let last = record.lines.last().map_or(header, |n| source.at(*n));
     clock::take(&mut record, &source, &roles, mapping, &mut warnings)?;
+    applied::take(&mut record, &mut warnings);
     clock::merge_repeated(&mut record, &mut warnings);
     shorten::rows(&mut record, mapping.average_s, &mut warnings);
     enough(&record, last, &mut warnings)?;

@@ -2,8 +2,8 @@
 
 use super::past::{LagTerm, past_lags, past_slopes};
 use super::{
-    Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, from_log, gain, heated,
-    map, spaced,
+    Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, UNUSUAL, from_log, gain,
+    heated, map, spaced,
 };
 use crate::closure::channels::{Channels, lag, slope};
 use crate::closure::firmware::{Trial, Words, knots};
@@ -18,10 +18,9 @@ pub fn all() -> Vec<Box<dyn Candidate>> {
 /// Part of the bias follows a temperature that lags the thermometer's.
 struct ThermalLag;
 
-/// Time constants of packages and boards, s, begin here, and with the square of a shorter one the odds fall: what lags by
-/// seconds follows the rate of the temperature, and looks like it.
-const SLOW_S: f64 = 30.0;
-const HASTE: f64 = 2.0;
+/// Time constants of packages and boards, s, begin here: what lags by seconds follows the rate of the temperature, and
+/// looks like it.
+const FASTEST_S: f64 = 30.0;
 
 const THERMAL_LAG: Sheet = Sheet {
     id: "thermal_lag",
@@ -59,8 +58,8 @@ impl Candidate for ThermalLag {
         heated_at(c, point.form % c.histories())
     }
 
-    fn surcharge(&self, c: &Channels, point: &Point) -> f64 {
-        HASTE * (SLOW_S / tau_s(c, point)).ln().max(0.0)
+    fn odds_against(&self, c: &Channels, point: &Point) -> f64 {
+        UNUSUAL * (FASTEST_S / tau_s(c, point)).ln().max(0.0)
     }
 
     fn points(&self, c: &Channels) -> Vec<Point> {

@@ -25,6 +25,9 @@ use super::firmware::Words;
 use crate::correction::Term;
 use std::collections::BTreeMap;
 
+/// How the odds of a time constant beyond the usual ones fall: with this power of it.
+const UNUSUAL: f64 = 2.0;
+
 /// A parameter of an effect.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parameter {
@@ -206,6 +209,12 @@ pub trait Candidate: Send + Sync {
     /// What a shape costs in log-likelihood beyond the usual price: for a choice among many, or for
     /// a part that the effect does not need.
     fn surcharge(&self, _c: &Channels, _point: &Point) -> f64 {
+        0.0
+    }
+
+    /// Logarithm of the odds against a shape before any record is seen: a time constant that devices of its kind do not
+    /// have. It decides between names, and not whether one is listed beside another.
+    fn odds_against(&self, _c: &Channels, _point: &Point) -> f64 {
         0.0
     }
 

@@ -1,8 +1,8 @@
 //! Effects of time: since power-on, and since the beginning.
 
 use super::{
-    Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, entry, from_log, gain,
-    map, spaced,
+    Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, UNUSUAL, entry,
+    from_log, gain, map, spaced,
 };
 use crate::closure::channels::{Channels, range};
 use crate::closure::firmware::Words;
@@ -15,6 +15,9 @@ pub fn all() -> Vec<Box<dyn Candidate>> {
 
 /// Exponential in time since power-on.
 struct Warmup;
+
+/// References and packages have settled after so long, s: what takes longer is nearly always another drift.
+const SLOWEST_S: f64 = 2000.0;
 
 const WARMUP: Sheet = Sheet {
     id: "warmup_transient",
@@ -77,6 +80,10 @@ impl Candidate for Warmup {
             RESTED => rested(c, tau_s, cooling_s(tau_s, point)),
             _ => map(&c.on_s, |t| (-t / tau_s).exp()),
         }]
+    }
+
+    fn odds_against(&self, c: &Channels, point: &Point) -> f64 {
+        UNUSUAL * (warm_s(c, point) / SLOWEST_S).ln().max(0.0)
     }
 
     fn spacing(&self, c: &Channels, point: &Point) -> Vec<f64> {

@@ -17,7 +17,8 @@ pub const PRICE: f64 = 2.0;
 
 /// What a shape costs beside its columns.
 pub fn price(candidate: &dyn Candidate, c: &Channels, point: &Point) -> f64 {
-    PRICE * point.theta.len() as f64 + candidate.surcharge(c, point)
+    let odds = candidate.odds_against(c, point);
+    PRICE * point.theta.len() as f64 + candidate.surcharge(c, point) + odds
 }
 
 /// Net gain within which two explanations are equally good.
@@ -53,6 +54,8 @@ pub struct Judged {
     pub gain: f64,
     /// The same less the price of its coefficients and parameters.
     pub net: f64,
+    /// What odds before the record have in [`Judged::net`].
+    pub odds_against: f64,
     /// Probability that the best of all does as well by chance; 1 where that was not asked.
     pub p_value: f64,
 }
@@ -100,7 +103,8 @@ impl Round {
             let named = self.judged.iter().filter(|j| j.candidate.named());
             named.filter(|j| j.candidate.id() != id)
         };
-        let within = |margin: f64| others().filter(move |j| j.net > chosen.net - margin);
+        let within =
+            |margin: f64| others().filter(move |j| j.net + j.odds_against > chosen.net - margin);
         let strict = within(EQUAL).count();
         within(self.equal.max(EQUAL))
             .take(strict.max(MOST_RIVALS))
@@ -222,6 +226,7 @@ impl Search<'_> {
                     let paid = PRICE * columns as f64 + price(candidate.as_ref(), c, &point);
                     Judged {
                         net: gain - paid,
+                        odds_against: candidate.odds_against(c, &point),
                         candidate,
                         point,
                         gain,

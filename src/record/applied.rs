@@ -1,0 +1,144 @@
+//! Rows whose applied rate was not measured.
+//!
+//! A table that stands may leave `rate_dps` empty, and a log may lose a cell while it turns. The output tells: it is near
+//! to what it is at rest, or it is not. Of a row whose rate is not known the error is not known either.
+
+use super::thermal::ThermalRecord;
+use super::warning::Warning;
+
+/// Share of the larger neighbouring rate by which the output may differ from the output at rest.
+const NEAR: f64 = 0.5;
+
+/// A measured row beside a hole: its applied rate and its error, deg/s.
+#[derive(Clone, Copy)]
+struct Beside {
+    rate_dps: f64,
+    error_dps: f64,
+}
+
+/// Empty cells of an applied rate become 0 where the output is that of a gyro at rest; the other rows lose their output.
+pub(super) fn take(record: &mut ThermalRecord, warnings: &mut Vec<Warning>) {
+    let (Some(rate), Some(output)) = (record.column("rate_dps"), record.column("rate_out_dps"))
+    else {
+        return;
+    };
+    let (mut rate, mut output) = (rate.to_vec(), output.to_vec());
+    if rate.iter().all(|r| r.is_nan()) || rate.iter().all(|r| !r.is_nan()) {
+        return;
+    }
+    let mut unknown = 0;
+    let before = besides(&rate, &output, 0..rate.len());
+    let after = besides(&rate, &output, (0..rate.len()).rev());
+    for row in 0..rate.len() {
+        if !rate[row].is_nan() || output[row].is_nan() {
+            continue;
+        }
+        if rests(output[row], before[row], after[row]) {
+            rate[row] = 0.0;
+        } else {
+            output[row] = f64::NAN;
+            unknown += 1;
+        }
+    }
+    let rows = rate.len();
+    record.columns.insert("rate_dps".to_owned(), rate);
+    record.columns.insert("rate_out_dps".to_owned(), output);
+    if unknown > 0 {
+        warnings.push(Warning::on(
+            "rows_without_applied_rate",
+            "rate_dps",
+            format!(
+                "{unknown} of {rows} rows have no rate_dps, and their output is not that of a gyro at rest; they take no \
+                 part in any fit"
+            ),
+        ));
+    }
+}
+
+/// The last row with both readings before each row, in the order of `rows`.
+fn besides(rate: &[f64], output: &[f64], rows: impl Iterator<Item = usize>) -> Vec<Option<Beside>> {
+    let mut out = vec![None; rate.len()];
+    let mut last = None;
+    for row in rows {
+        out[row] = last;
+        if !rate[row].is_nan() && !output[row].is_nan() {
+            last = Some(Beside {
+                rate_dps: rate[row],
+                error_dps: output[row] - rate[row],
+            });
+        }
+    }
+    out
+}
+
+/// Whether an output is that of a gyro at rest, by the measured rows before and after it.
+fn rests(output_dps: f64, before: Option<Beside>, after: Option<Beside>) -> bool {
+    let sides = || before.iter().chain(&after);
+    let count = sides().count().max(1) as f64;
+    let most_dps = sides().map(|s| s.rate_dps.abs()).fold(0.0, f64::max);
+    let error_dps = sides().map(|s| s.error_dps).sum::<f64>() / count;
+    most_dps == 0.0 || (output_dps - error_dps).abs() <= NEAR * most_dps
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::design::RecordMapping;
+    use crate::record::thermal::parse;
+    use std::f64::consts::TAU;
+    use std::path::Path;
+
+    /// The errors of a record whose rate is `rate` and is not logged in the rows of `lost`, and its warnings. The bias is
+    /// 0.1 deg/s a row, from 5 on.
+    fn errors(rate: impl Fn(usize) -> f64, lost: impl Fn(usize) -> bool) -> (Vec<f64>, usize) {
+        let mut text = String::from("time_s,rate_out_dps,rate_dps,die_degc\n");
+        for k in 0..120 {
+            let output = rate(k) + 5.0 + 0.1 * k as f64;
+            let logged = if lost(k) {
+                String::new()
+            } else {
+                format!("{:.6}", rate(k))
+            };
+            text.push_str(&format!(
+                "{k},{output:.6},{logged},{}\n",
+                20.0 + 0.3 * k as f64
+            ));
+        }
+        let mapping = RecordMapping::default();
+        let (record, warnings) = parse(text.as_bytes(), Path::new("made.csv"), &mapping).unwrap();
+        let told = warnings
+            .iter()
+            .filter(|w| w.code == "rows_without_applied_rate");
+        (record.error_dps(), told.count())
+    }
+
+    /// Every error is the bias or, in these rows, not known.
+    fn are_the_bias_but_in(errors: &[f64], unknown: &[usize]) {
+        for (k, error) in errors.iter().enumerate() {
+            assert_eq!(error.is_nan(), unknown.contains(&k), "{k}");
+            assert!(
+                error.is_nan() || (error - 5.0 - 0.1 * k as f64).abs() < 1e-4,
+                "{k}: {error}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_lost_cell_of_a_turning_table_is_not_rest() {
+        let sine = |k: usize| 60.0 * (TAU * k as f64 / 40.0).sin();
+        let (errors, told) = errors(sine, |k| [7, 48, 49, 73].contains(&k));
+        are_the_bias_but_in(&errors, &[7, 48, 49, 73]);
+        assert_eq!(told, 1);
+    }
+
+    #[test]
+    fn empty_cells_of_a_table_that_stands_are_rest() {
+        let steps = |k: usize| match k {
+            20..40 => 50.0,
+            70..90 => -50.0,
+            _ => 0.0,
+        };
+        let (errors, told) = errors(steps, |k| steps(k) == 0.0);
+        are_the_bias_but_in(&errors, &[]);
+        assert_eq!(told, 0);
+    }
+}
