@@ -47,6 +47,10 @@ const DAMPING: Sheet = Sheet {
 const OFF_RAD: [f64; 4] = [-0.35, -0.15, 0.15, 0.35];
 const MOST_OFF_RAD: f64 = 0.6;
 
+/// Most bias per unit of the gain, deg/s, twenty times what is plausible: beyond it the gain does not act, but stands in
+/// for the thermometer, next to whose square it differs by a little.
+const MOST_DPS: f64 = 400.0;
+
 impl Candidate for Damping {
     fn sheet(&self) -> &Sheet {
         &DAMPING
@@ -112,7 +116,12 @@ impl Candidate for Damping {
             false => DAMPING.parameters[1].plausible,
         };
         let bends = |share: &f64| (least..=most).contains(share);
-        point.form == 0 || beta.last().is_none_or(bends)
+        let (by_gain, by_bend) = match point.form {
+            0 => (beta.first(), None),
+            1 => (None, beta.last()),
+            _ => (beta.first(), beta.last()),
+        };
+        by_gain.is_none_or(|b| b.abs() <= MOST_DPS) && by_bend.is_none_or(bends)
     }
 
     fn surcharge(&self, _c: &Channels, point: &Point) -> f64 {

@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 fn less_q_does_not_bend_the_phase_back() {
     for (form, beta, admitted) in [
         (0, vec![-3.0], true),
+        (0, vec![1500.0], false),
         (1, vec![0.9], true),
         (1, vec![-0.9], false),
         (1, vec![1.8], true),
