@@ -297,6 +297,12 @@ impl Told<'_> {
                     }
                 };
                 (Fate::Rejected, remark.to_owned())
+            } else if self.search.is_declared(j) {
+                let remark = format!(
+                    "goes with the temperature in this record: the declared bias has whatever it does; {}",
+                    j.candidate.sheet().experiment
+                );
+                (Fate::Confounded, remark)
             } else {
                 let remark = "chance does as well among so many candidates";
                 (Fate::Rejected, remark.to_owned())
@@ -380,6 +386,32 @@ impl Told<'_> {
                 ),
             ));
         }
+        let hidden: Vec<String> = self.goes_with_temperature();
+        if !hidden.is_empty() {
+            warnings.push(Warning::general(
+                "goes_with_temperature",
+                format!(
+                    "the declared bias in temperature may be that of {}: in this record these go with the thermometer; \
+                     `evidence` says which experiment separates them",
+                    hidden.join(", ")
+                ),
+            ));
+        }
+    }
+
+    /// Names of other channels' effects that the declared bias has in it.
+    fn goes_with_temperature(&self) -> Vec<String> {
+        let search = self.search;
+        let named = self.found.first.iter().filter(|j| j.candidate.named());
+        let others = named.filter(|j| {
+            let channels = j.candidate.channels_at(search.channels, &j.point);
+            let first = channels.first();
+            first.is_some_and(|c| *c != search.channels.thermometer && c != "time_s")
+        });
+        let hidden = others.filter(|j| search.is_declared(j));
+        let taken = |id: &String| self.found.terms.iter().any(|t| t.id() == *id);
+        let ids = hidden.map(|j| j.candidate.id());
+        ids.filter(|id| !taken(id)).collect()
     }
 }
 

@@ -4,7 +4,7 @@ use super::channels::lag;
 use super::close::close;
 use super::search::Effort;
 use super::synthetic::{self, Random};
-use super::verdict::Step;
+use super::verdict::{Closure, Fate, Step};
 use crate::design::reader;
 
 const ROWS: usize = 900;
@@ -80,4 +80,37 @@ fn what_lags_behind_the_dies_temperature_is_the_only_name() {
     assert_eq!(step.effect, "thermal_lag");
     close_to(step, "gain_dps_per_k", 0.02, 0.1);
     close_to(step, "tau_s", 40.0, 0.1);
+}
+
+/// The closure of a record at rest whose acceleration goes with the temperature but for `apart` of it.
+fn tilted(apart: f64) -> Closure {
+    let mut random = Random::new(22);
+    let degc = chamber_degc();
+    let rate: Vec<f64> = degc
+        .iter()
+        .map(|t| 0.02 * t + NOISE_DPS * random.normal())
+        .collect();
+    let mut record = synthetic::record("die_degc", &degc, &rate);
+    let tilt = |(k, t): (usize, &f64)| t / 70.0 + apart * (0.3 * k as f64).sin();
+    let accel = degc.iter().enumerate().map(tilt).collect();
+    record.columns.insert("accel_g".to_owned(), accel);
+    let design = reader::read(None).expect("the default design");
+    let closed = close(&record, Vec::new(), &design, "test", Effort::default());
+    closed.expect("a sound record").closure
+}
+
+#[test]
+fn what_goes_with_the_temperature_is_told_from_what_does_nothing() {
+    for (apart, due) in [(0.001, Fate::Confounded), (0.3, Fate::Rejected)] {
+        let closure = tilted(apart);
+        assert!(closure.steps.is_empty());
+        let mut evidence = closure.evidence.iter();
+        let own = evidence.find(|e| e.effect == "g_sensitivity");
+        assert_eq!(own.map(|e| e.fate), Some(due), "{apart}");
+        let told = closure
+            .warnings
+            .iter()
+            .any(|w| w.code == "goes_with_temperature");
+        assert_eq!(told, due == Fate::Confounded, "{apart}");
+    }
 }

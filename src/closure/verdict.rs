@@ -96,7 +96,7 @@ pub enum Fate {
     Taken,
     /// The record does not call for it.
     Rejected,
-    /// It explains the record as well as a step that was taken.
+    /// It explains the record as well as a step that was taken, or as the temperature does in the declared model.
     Confounded,
     /// The record does not show what it does, or it lies within the declared model.
     NotExcited,

@@ -1,5 +1,7 @@
 //! The declared bias by least squares, before any noise is known.
 
+use super::Search;
+use super::judge::Judged;
 use crate::closure::channels::{Channels, range};
 use crate::closure::effects::Bias;
 use crate::closure::likelihood::linear::{Basis, add_scaled, dot};
@@ -34,6 +36,35 @@ pub fn declared_by(u: &[f64], error_dps: &[f64]) -> (Bias, Vec<f64>) {
         others_dps: Vec::new(),
     };
     (bias, rest)
+}
+
+/// Share of a shape's square about its mean from which on the declared model does not have it all.
+const INSIDE: f64 = 0.01;
+
+impl Search<'_> {
+    /// Whether next to all of a shape is in the declared model: what makes it goes with the temperature in this record, and
+    /// what it does was taken for the temperature's doing.
+    pub fn is_declared(&self, judged: &Judged) -> bool {
+        let c = self.channels;
+        let of_used = |column: &Vec<f64>| -> Vec<f64> {
+            let rows = column.iter().zip(&self.used).filter(|(_, u)| **u);
+            rows.map(|(v, _)| *v).collect()
+        };
+        let declared: Vec<Vec<f64>> = declared(c).iter().map(of_used).collect();
+        let (constant, all) = (Basis::new(&declared[..1]), Basis::new(&declared));
+        let left = |basis: &Basis, column: &[f64]| {
+            let mut rest = column.to_vec();
+            basis.project_off(&mut rest);
+            dot(&rest, &rest)
+        };
+        let bias = self.plain_bias();
+        let columns = judged.candidate.columns(c, &bias, &judged.point);
+        let is_inside = |column: &Vec<f64>| {
+            let column = of_used(column);
+            left(&all, &column) < INSIDE * left(&constant, &column)
+        };
+        declared.len() > 1 && !columns.is_empty() && columns.iter().all(is_inside)
+    }
 }
 
 /// Weighted least squares; rows of weight 0 may hold anything.
