@@ -26,6 +26,9 @@ pub(super) const BEYOND: f64 = 1e-5;
 const STABLE: f64 = 0.6;
 const SHARE: f64 = 0.2;
 
+/// Most that a sinusoid may leave of the held-out error without it where more is left.
+const RULES: f64 = 0.6;
+
 impl Search<'_> {
     /// Drops names that do not stand without the shapes that are not reported.
     ///
@@ -124,11 +127,24 @@ impl Search<'_> {
             let steady = self.constancy(&model, term);
             let steady = steady.is_none_or(|c| c.p_value > UNSTEADY || c.share < SHARE);
             let often = || self.selected_beside(&model, k, &term.rivals);
-            stable.push(term.evident || term.p_value <= BEYOND && steady && often()? >= STABLE);
+            let stands = term.p_value <= BEYOND && steady && self.rules(&model, k)?;
+            stable.push(term.evident || stands && often()? >= STABLE);
         }
         let mut stable = stable.into_iter();
         found.terms.retain(|_| stable.next() == Some(true));
         Ok(())
+    }
+
+    /// Whether a sinusoid is most of what there is without it: beside something that is not known it is a part of that,
+    /// for whatever comes and goes has one that fits it best. Any other name needs not be.
+    fn rules(&self, model: &Model, own: usize) -> Result<bool, Unusable> {
+        if model.terms[own].id() != "periodic_pickup" {
+            return Ok(true);
+        }
+        let mut others = model.terms.clone();
+        others.remove(own);
+        let square = |m: &Model| self.heldout_error(m, model).square;
+        Ok(square(model) <= RULES.powi(2) * square(&self.model(&others)?))
     }
 
     /// Takes a name back.
