@@ -292,18 +292,21 @@ fn a_dropped_name_leaves_something_if_it_was_beyond_what_chance_makes() {
     }
 }
 
-/// A tone beside a chirp of its size, which no name has, and beside one of a fifth of it.
+/// A tone beside a slow wave that quickens, which no name has: a larger one, and one of its size.
 #[test]
-fn a_tone_beside_as_much_that_is_not_known_is_a_part_of_that() {
-    let both = |chirp: f64| {
+fn a_tone_beside_more_that_is_not_known_is_a_part_of_that() {
+    let both = |slow: f64| {
         move |k: usize, _: f64| {
             let x = k as f64 / ROWS as f64;
             let tone = (TAU * 13.3 * x + 0.4).sin();
-            6.0 * (tone + chirp * (TAU * (19.0 * x + 6.0 * x * x)).sin())
+            6.0 * tone + slow * (TAU * (1.3 * x + 0.6 * x * x)).sin()
         }
     };
-    let (names, left) = closed(1, &[], both(1.2));
+    let (names, left) = closed(2, &[], both(9.6));
     assert!(names.is_empty() && left.is_some(), "{names:?}, {left:?}");
-    let (names, _) = closed(1, &[], both(0.2));
-    assert_eq!(names, ["periodic_pickup"]);
+    let (names, left) = closed(1, &[], both(7.2));
+    assert!(
+        names == ["periodic_pickup"] && left.is_some(),
+        "{names:?}, {left:?}"
+    );
 }
