@@ -408,7 +408,8 @@ impl Told<'_> {
             let first = channels.first();
             first.is_some_and(|c| *c != search.channels.thermometer && c != "time_s")
         });
-        let hidden = others.filter(|j| search.is_declared(j));
+        // As in `evidence`: what is beyond chance beside the declared model is not in it.
+        let hidden = others.filter(|j| j.p_value > LEVEL && search.is_declared(j));
         let taken = |id: &String| self.found.terms.iter().any(|t| t.id() == *id);
         let ids = hidden.map(|j| j.candidate.id());
         ids.filter(|id| !taken(id)).collect()

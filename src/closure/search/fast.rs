@@ -12,7 +12,7 @@ use std::f64::consts::{LN_2, TAU};
 const UNEVEN: f64 = 4.0;
 const EVEN: f64 = 0.02;
 
-/// Longest transform.
+/// Longest transform, places: 256 MiB.
 const LONGEST: usize = 1 << 24;
 
 /// Bins of the periodogram that share a level.
