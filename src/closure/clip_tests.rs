@@ -55,16 +55,19 @@ fn polished(c: &Channels, point: &Point) -> Model {
 fn levels_lie_where_the_clipped_rows_do_wherever_the_search_left_them() {
     for seed in 0..3 {
         let c = channels(seed);
-        for off_dps in [-1.0, -0.3, 0.0, 0.2, 0.9] {
-            // Upper and lower level, and one of them alone.
-            let both = Point::at(3, &LEVELS_DPS.map(|l| l + off_dps));
-            let model = polished(&c, &both);
+        // Upper and lower level: moved together, apart, and of one magnitude.
+        let off_dps = [[-1.0; 2], [0.2; 2], [0.9; 2], [-0.6, 0.8], [0.7, -0.4]];
+        let two = off_dps
+            .map(|[upper, lower]| Point::at(3, &[LEVELS_DPS[0] + upper, LEVELS_DPS[1] + lower]));
+        for start in two.into_iter().chain([Point::at(0, &[120.6])]) {
+            let model = polished(&c, &start);
             // Eighteen rows of each, two thirds of them fitted.
             let std_dps = NOISE_DPS / 11f64.sqrt();
+            assert_eq!(model.terms[0].point.form, 3, "{seed}, {start:?}");
             for (found, truth) in model.terms[0].point.theta.iter().zip(LEVELS_DPS) {
                 assert!(
                     (found - truth).abs() < 5.0 * std_dps,
-                    "{seed}, {off_dps}: {found}"
+                    "{seed}, {start:?}: {found}"
                 );
             }
             assert!(model.off_dps.abs() < 3.0 * std_dps, "{}", model.off_dps);

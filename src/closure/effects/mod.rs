@@ -229,8 +229,8 @@ pub trait Candidate: Send + Sync {
         false
     }
 
-    /// The shape with its levels moved, deg/s, for a clip; `None` if that is not of the same form.
-    fn moved(&self, _point: &Point, _by_dps: f64) -> Option<Point> {
+    /// The shape with its upper and its lower level moved, deg/s, for a clip; `None` if that is not of the same form.
+    fn moved(&self, _point: &Point, _by_dps: [f64; 2]) -> Option<Point> {
         None
     }
 

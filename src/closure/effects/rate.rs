@@ -432,7 +432,12 @@ impl Candidate for Saturation {
         // A level that no reading reaches is none: it would clip rows that were not looked at.
         let (low, high) = limits(point);
         match point.form {
-            0 | 3 => vec![Point::at(1, &[high]), Point::at(2, &[low])],
+            0 => vec![
+                Point::at(1, &[high]),
+                Point::at(2, &[low]),
+                Point::at(3, &[high, low]),
+            ],
+            3 => vec![Point::at(1, &[high]), Point::at(2, &[low])],
             _ => Vec::new(),
         }
     }
@@ -454,9 +459,13 @@ impl Candidate for Saturation {
         true
     }
 
-    fn moved(&self, point: &Point, by_dps: f64) -> Option<Point> {
-        let levels: Vec<f64> = point.theta.iter().map(|l| l + by_dps).collect();
-        (point.form > 0).then(|| Point::at(point.form, &levels))
+    fn moved(&self, point: &Point, by_dps: [f64; 2]) -> Option<Point> {
+        match (point.form, point.theta.as_slice()) {
+            (1, [upper]) => Some(Point::at(1, &[upper + by_dps[0]])),
+            (2, [lower]) => Some(Point::at(2, &[lower + by_dps[1]])),
+            (3, [upper, lower]) => Some(Point::at(3, &[upper + by_dps[0], lower + by_dps[1]])),
+            _ => None,
+        }
     }
 
     fn at_levels(&self, lower_dps: Option<f64>, upper_dps: Option<f64>) -> Option<Point> {

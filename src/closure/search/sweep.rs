@@ -35,6 +35,11 @@ fn best_of_forms(places: &[(Point, f64)], net: impl Fn(&Point, f64) -> f64) -> V
     best.into_iter().map(|b| b.0).collect()
 }
 
+/// Whether a term is a clip whose levels are sought.
+fn is_loose(term: &Term) -> bool {
+    term.candidate.is_last() && !term.evident
+}
+
 impl Search<'_> {
     /// The non-linear parameters of every term again, with the other terms' columns in: with spikes at
     /// their weights, and with every row at full weight (a threshold that is off makes spikes of
@@ -56,26 +61,45 @@ impl Search<'_> {
         self.levelled(self.model(&model.terms)?)
     }
 
-    /// A clip's levels where its rows lie: what these have in common is a constant beside the model, which
-    /// no likelihood tells from other levels.
+    /// A clip's levels where its rows lie: what all clipped rows have in common is a constant beside the model,
+    /// which no likelihood tells from other levels, and what tells the two sides apart is a few rows.
     fn levelled(&self, model: Model) -> Result<Model, Unusable> {
         let mut terms = model.terms.clone();
-        let loose = |t: &&mut Term| t.candidate.is_last() && !t.evident;
-        for term in terms.iter_mut().filter(loose) {
-            if let Some(point) = term.candidate.moved(&term.point, model.off_dps) {
+        let mut away_dps = 0.0;
+        for term in terms.iter_mut().filter(|t| is_loose(t)) {
+            let off_dps = self.off_levels(&model, term);
+            if let Some(point) = term.candidate.moved(&term.point, off_dps) {
                 term.point = point;
+                away_dps = off_dps[0].abs().max(off_dps[1].abs());
             }
         }
-        if terms
-            .iter()
-            .zip(&model.terms)
-            .all(|(a, b)| a.point == b.point)
-        {
+        if away_dps == 0.0 {
             return Ok(model);
         }
         let levelled = self.model(&terms)?;
-        let nearer = levelled.off_dps.abs() < 0.5 * model.off_dps.abs();
+        let mut clips = levelled.terms.iter().filter(|t| is_loose(t));
+        let nearer = clips.all(|t| {
+            let off_dps = self.off_levels(&levelled, t);
+            off_dps[0].abs().max(off_dps[1].abs()) < 0.5 * away_dps
+        });
         Ok(if nearer { levelled } else { model })
+    }
+
+    /// How far the fitted rows that a clip holds at its upper and at its lower level lie from there on average, deg/s;
+    /// 0 where none does.
+    fn off_levels(&self, model: &Model, term: &Term) -> [f64; 2] {
+        let c = self.channels;
+        let columns = term.candidate.columns(c, &model.acting, &term.point);
+        let residual = model.residual(c);
+        let mean = |at_side: &dyn Fn(f64) -> bool| {
+            let (mut sum, mut weight) = (0.0, 0.0);
+            for i in (0..c.len()).filter(|i| self.used[*i] && at_side(columns[0][*i])) {
+                sum += model.fit.row_weights[i] * residual[i];
+                weight += model.fit.row_weights[i];
+            }
+            if weight > 0.0 { sum / weight } else { 0.0 }
+        };
+        [mean(&|by| by < 0.0), mean(&|by| by > 0.0)]
     }
 
     /// A quick polish of the terms from the given one on: what they are worth beside the others.
