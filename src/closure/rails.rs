@@ -21,6 +21,11 @@ const NEIGHBOURS: usize = 20;
 /// Two readings that differ by less than this share of the range are one.
 const SAME: f64 = 1e-9;
 
+/// Noise that comes between two clips keeps half of the clipped readings off the rail: those within so many deviations of
+/// it are clipped too if they are so many times as many as those in a band as wide next to them.
+const NEAR: f64 = 3.5;
+const PILED: usize = 4;
+
 /// Probability of as many equal readings by chance up to which they are a rail.
 const LEVEL: f64 = 1e-4;
 
@@ -31,7 +36,7 @@ pub struct Rails {
     pub upper_dps: Option<f64>,
     /// deg/s.
     pub lower_dps: Option<f64>,
-    /// Rows that stand at one.
+    /// Rows that stand at one, or are held at one but for noise that came after the clip.
     pub rows: Vec<bool>,
     /// Probability that chance makes so many readings agree at the less certain of them.
     pub p_value: f64,
@@ -81,13 +86,37 @@ pub fn of(c: &Channels, rows: &[bool]) -> Option<Rails> {
     let pairs = c.error_dps.iter().zip(rows).zip(&stand);
     let free = pairs.filter(|((_, row), stands)| **row && !**stands);
     let free: Vec<f64> = free.map(|((e, _), _)| *e).collect();
-    let coarse = in_steps(&gaps, resolution) && stats::difference_noise(&free) < resolution;
+    let noise_dps = stats::difference_noise(&free);
+    let coarse = in_steps(&gaps, resolution) && noise_dps < resolution;
+    let pairs = output.iter().zip(rows).zip(&stand);
+    let short: Vec<f64> = pairs
+        .filter(|((_, row), stands)| **row && !**stands)
+        .map(|((v, _), _)| *v)
+        .collect();
+    let width = NEAR * noise_dps;
+    let upper_pile = upper_dps.filter(|l| is_piled(short.iter().map(|v| l - v), width));
+    let lower_pile = lower_dps.filter(|l| is_piled(short.iter().map(|v| v - l), width));
+    let held = |v: f64| {
+        upper_pile.is_some_and(|l| v > l - width) || lower_pile.is_some_and(|l| v < l + width)
+    };
+    let pairs = output.iter().zip(&stand);
+    let held = pairs.map(|(v, stands)| *stands || held(*v)).collect();
     (!coarse).then_some(Rails {
         upper_dps,
         lower_dps,
-        rows: stand,
+        rows: held,
         p_value,
     })
+}
+
+/// Whether readings pile up so near to a rail, given how far each is short of it.
+fn is_piled(short_by: impl Iterator<Item = f64>, width: f64) -> bool {
+    let (mut near, mut next) = (0, 0);
+    for by in short_by {
+        near += usize::from((0.0..width).contains(&by));
+        next += usize::from((width..2.0 * width).contains(&by));
+    }
+    near >= PILED * (1 + next)
 }
 
 /// Whether most readings lie whole steps apart; of continuous ones a fifth does.

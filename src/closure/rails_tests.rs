@@ -334,3 +334,28 @@ fn a_level_before_the_noise_is_found_opposite_to_a_rail() {
     let worst = residual.iter().fold(0.0, |m: f64, r| m.max(r.abs()));
     assert!(worst < 0.1, "{worst}");
 }
+
+#[test]
+fn noise_between_two_clips_leaves_half_of_the_clipped_readings_short_of_the_rail() {
+    let mut random = Random::new(3);
+    let rate = |k: usize| [0.0, 60.0, -60.0, 100.0, -100.0, 140.0, -160.0][k / 3 % 7];
+    let held = |total: f64| total.clamp(-120.0, 121.0);
+    let output: Vec<f64> = (0..420)
+        .map(|k| held(held(rate(k) + 1.0) + 0.02 * random.normal()))
+        .collect();
+    let rates: Vec<f64> = (0..420).map(rate).collect();
+    let c = channels(&output, Some(&rates));
+    let rails = of_all(&c).unwrap();
+    let beyond: Vec<bool> = rates.iter().map(|r| r.abs() > 130.0).collect();
+    assert_eq!(rails.rows, beyond);
+    let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+    let found = search.run().unwrap();
+    let names: Vec<String> = found.terms.iter().map(|t| t.id()).collect();
+    assert_eq!(
+        (names, found.left),
+        (vec!["output_saturation".to_owned()], None)
+    );
+    let residual = search.model(&found.terms).unwrap().residual(&c);
+    let worst = residual.iter().fold(0.0, |m: f64, r| m.max(r.abs()));
+    assert!(worst < 0.1, "{worst}");
+}

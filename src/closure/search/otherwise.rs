@@ -12,6 +12,7 @@ use super::reported::WANDER;
 use super::{Found, LEVEL, Model, Search, Term};
 use crate::closure::channels::range;
 use crate::closure::likelihood::Unusable;
+use crate::record::stats;
 
 /// Most other beginnings without a shape, and most with another name first.
 const BEGINNINGS: usize = 3;
@@ -29,8 +30,8 @@ const FAR: f64 = 4.0;
 /// Share of the error's range that is nothing.
 const NOTHING: f64 = 1e-4;
 
-/// Slow noise, in units of the white, from which on it is said that something is left: a walk of the rate, or a cause
-/// that wanders as one.
+/// Slow noise, in units of the white (or all that is left, in units of what it differs by from row to row), from which on
+/// it is said that something is left: a walk of the rate, or a cause that wanders as one.
 const MUCH: f64 = 3.0;
 
 /// How a search begins.
@@ -50,7 +51,8 @@ impl Search<'_> {
     pub fn run(&self) -> Result<Found, Unusable> {
         let mut found = self.run_any()?;
         let model = self.model(&found.terms)?;
-        if found.left.is_none() && (self.missed(&model) || self.wander(&model) > MUCH) {
+        let wanders = || self.wander(&model).max(self.roughly(&model)) > MUCH;
+        if found.left.is_none() && (self.missed(&model) || wanders()) {
             found.left = Some("time_s".to_owned());
         }
         Ok(found)
@@ -118,6 +120,17 @@ impl Search<'_> {
         let far_dps = (FAR * usual.copied().unwrap_or(f64::INFINITY)).max(least_dps);
         let out: Vec<bool> = of(&self.heldout).iter().map(|r| *r > far_dps).collect();
         stand_together(&out)
+    }
+
+    /// What a model leaves of the fitted rows, in units of what it differs by from row to row, accidents apart: noise with a
+    /// memory as well, of which nobody knows whether it is noise.
+    fn roughly(&self, model: &Model) -> f64 {
+        let rest = model.residual(self.channels);
+        let rows = rest.iter().zip(&model.fit.row_weights).zip(&self.used);
+        let usual = rows.filter(|((r, w), used)| **used && **w >= 0.5 && r.is_finite());
+        let usual: Vec<f64> = usual.map(|((r, _), _)| *r).collect();
+        let (low, high) = range(&self.channels.error_dps);
+        stats::rms(&usual) / stats::difference_noise(&usual).max(NOTHING * (high - low))
     }
 
     /// Never again a candidate: it was taken and did not hold. Rounds with it are forgotten.
