@@ -14,6 +14,7 @@ pub mod heat;
 pub mod outside;
 mod past;
 pub mod rate;
+mod saturation;
 pub mod step;
 pub mod structure;
 pub mod time;

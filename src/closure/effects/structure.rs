@@ -72,8 +72,8 @@ const MODE_CROSSING: Sheet = Sheet {
     id: "mode_crossing",
     physics: "at one temperature a parasitic mode has the drive's frequency and takes energy from \
               it: a bump, or a swing to both sides, in temperature",
-    equation: "(a + d 2 x) / (1 + x^2), or a exp(-x^2 / 2) where the crossing is blurred (several modes, a \
-               gradient over the die), x = (T - T_c) / width",
+    equation: "(a + d 2 x) / (1 + x^2), or a / sqrt(1 + x^2) where the other mode's amplitude acts, or a exp(-x^2 / 2) \
+               where the crossing is blurred (several modes, a gradient over the die), x = (T - T_c) / width",
     parameters: &[
         Parameter {
             name: "centre_degc",
@@ -105,14 +105,15 @@ const WIDTHS: [f64; 5] = [0.03, 0.06, 0.12, 0.22, 0.4];
 /// The widest crossing, in u: of a wider one the record (-1..1) does not show both flanks, and what fits is any bend.
 const WIDEST: f64 = 0.6;
 
-/// A resonance, and one that is blurred.
-const FORMS: usize = 2;
+/// A resonance by its parts, one that is blurred, and the magnitude of one.
+const FORMS: usize = 3;
 
 /// The shapes of a form, x in half widths from the centre.
 fn shapes(form: usize) -> &'static [fn(f64) -> f64] {
     match form {
         0 => &[|x| 1.0 / (1.0 + x * x), |x| 2.0 * x / (1.0 + x * x)],
-        _ => &[|x| (-0.5 * x * x).exp()],
+        1 => &[|x| (-0.5 * x * x).exp()],
+        _ => &[|x| 1.0 / (1.0 + x * x).sqrt()],
     }
 }
 
@@ -227,10 +228,11 @@ mod tests {
 
     #[test]
     fn a_bump_of_either_shape_is_a_crossing_with_its_own_width() {
-        let shapes: [fn(f64) -> f64; 3] = [
+        let shapes: [fn(f64) -> f64; 4] = [
             |x| 1.0 / (1.0 + x * x),
             |x| 2.0 * x / (1.0 + x * x),
             |x| (-0.5 * x * x).exp(),
+            |x| 1.0 / (1.0 + x * x).sqrt(),
         ];
         for (k, shape) in shapes.iter().enumerate() {
             let (rows, mut random) = (400, Random::new(k as u64));
@@ -254,7 +256,7 @@ mod tests {
             );
             let model = search.model(&found.terms).unwrap();
             let estimate = &search.estimates(&model)[0];
-            assert_eq!(estimate.point.form, usize::from(k == 2));
+            assert_eq!(estimate.point.form, k.saturating_sub(1));
             let reported = found.terms[0].candidate.report(&c, estimate);
             for (name, value) in [("centre_degc", 30.0), ("width_k", 4.0)] {
                 let (found, std) = reported[name];
