@@ -13,11 +13,15 @@ const WORTH: f64 = 20.0;
 const STEPS: usize = 3;
 
 impl Search<'_> {
-    /// The model at the beginning: the declared one, with a clip if the record has rails.
+    /// The model at the beginning: the declared one, with a clip if the record has rails; or what this run is given.
     ///
     /// # Errors
     /// Too few rows.
     pub(super) fn beginning(&self) -> Result<Model, Unusable> {
+        let given = self.beginning.borrow().given.clone();
+        if !given.is_empty() {
+            return self.polished(self.model(&given)?);
+        }
         let Some(clip) = self.clip() else {
             return self.model(&[]);
         };

@@ -27,6 +27,7 @@ mod rounding;
 pub mod stairs;
 pub mod structure;
 pub mod sweep;
+mod together;
 pub mod tones;
 pub mod undone;
 pub mod validate;

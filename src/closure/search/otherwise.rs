@@ -35,12 +35,14 @@ const NOTHING: f64 = 1e-4;
 const MUCH: f64 = 3.0;
 
 /// How a search begins.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Clone, Default)]
 pub(super) struct Beginning {
     /// Never candidates: what was taken and did not hold, or what this run does without.
     pub barred: Vec<String>,
     /// The first step, if it is beyond chance.
     pub opening: Option<String>,
+    /// Terms that are in from the beginning.
+    pub given: Vec<Term>,
 }
 
 impl Search<'_> {
@@ -64,7 +66,7 @@ impl Search<'_> {
         let model = self.model(&first.terms)?;
         let clustered = self.clustered(&model);
         // Names that leave a wander may be the wrong ones, or not all.
-        let wanders = !first.terms.is_empty() && self.wander(&model) > WANDER;
+        let wanders = self.wander(&model) > WANDER;
         let clean = first.left.is_none() && !clustered && !wanders;
         if clean || !first.undecided.is_empty() {
             return Ok(first);
@@ -73,7 +75,18 @@ impl Search<'_> {
         let strange = reached.terms.iter().any(|t| !t.candidate.named());
         let due = self.net(&reached) - if strange { STRANGER } else { 0.0 };
         let barred = self.begin(Beginning::default());
-        for beginning in beginnings(&reached.terms, &first) {
+        let mut others = Vec::new();
+        if wanders {
+            let given = self.together(&model)?;
+            others.extend(given.map(|given| Beginning {
+                given,
+                ..Beginning::default()
+            }));
+        }
+        if first.left.is_some() || clustered || !first.terms.is_empty() {
+            others.extend(beginnings(&reached.terms, &first));
+        }
+        for beginning in others {
             self.begin(beginning);
             let (other, _) = self.run_once(true)?;
             let own = self.begin(Beginning::default());
@@ -188,14 +201,14 @@ fn beginnings(terms: &[Term], first: &Found) -> Vec<Beginning> {
     let mut out: Vec<Beginning> = without
         .map(|t| Beginning {
             barred: vec![t.id()],
-            opening: None,
+            ..Beginning::default()
         })
         .collect();
     let names = first.first.iter().filter(|j| Judged::is_found(j));
     let openings = names.map(|j| j.candidate.id()).skip(1).take(OPENINGS);
     out.extend(openings.map(|id| Beginning {
-        barred: Vec::new(),
         opening: Some(id),
+        ..Beginning::default()
     }));
     out
 }
