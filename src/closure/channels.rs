@@ -341,18 +341,25 @@ fn slope_noise(k: usize) -> f64 {
     (3.0 / (k * (k + 1.0) * (2.0 * k + 1.0))).sqrt()
 }
 
+/// Shares of the third differences below which the noise of a reading is looked at, with the share's quantile of a normal
+/// deviate's magnitude: where the course bends all the time, its smallest differences are least the course's.
+const QUANTILES: [(f64, f64); 2] = [(0.5, 0.674_489_75), (0.2, 0.253_347_1)];
+
 /// White noise of a reading, from its third differences (a smooth course has none).
 pub fn reading_noise(values: &[f64]) -> f64 {
     let mut sizes: Vec<f64> = values
         .windows(4)
         .map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs())
         .collect();
-    if sizes.is_empty() {
-        return 0.0;
-    }
-    let middle = sizes.len() / 2;
+    sizes.sort_by(f64::total_cmp);
     // The four weights' squares add up to 20.
-    *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 / (0.674_489_75 * 20f64.sqrt())
+    let noise = |(share, deviate): (f64, f64)| {
+        let size = sizes.get((share * sizes.len() as f64) as usize)?;
+        Some(size / (deviate * 20f64.sqrt()))
+    };
+    let [most, least] = QUANTILES.map(|q| noise(q).unwrap_or(0.0));
+    // A coarse reading stands still in many rows, which says nothing of its noise.
+    if least > 0.0 { most.min(least) } else { most }
 }
 
 /// The narrowest half width at which a slope's noise is small beside the slopes themselves.

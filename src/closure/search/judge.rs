@@ -29,7 +29,7 @@ pub const EQUAL: f64 = 4.0;
 const EQUAL_ONE_WAY: f64 = 12.0;
 
 /// No slow noise.
-const WHITE: Shape = Shape {
+pub(super) const WHITE: Shape = Shape {
     flicker: 0.0,
     walk: 0.0,
 };

@@ -1,12 +1,13 @@
 //! After the forward steps: every term again, with the others in.
 
-use super::judge::{EQUAL, Judged, PRICE, price};
+use super::judge::{EQUAL, Judged, PRICE, WHITE, price};
 use super::refine::{self, Bench};
+use super::reported::WANDER;
 use super::{LEVEL, MOST_RIVALS, Model, Search, Term, stairs};
 use crate::closure::effects::{Bias, Point, map};
 use crate::closure::likelihood::Unusable;
 use crate::closure::likelihood::linear::add_scaled;
-use crate::closure::likelihood::noise::Timeline;
+use crate::closure::likelihood::noise::{Shape, Timeline};
 
 /// Net gain by which another candidate takes a term's place.
 const BETTER: f64 = 1.5;
@@ -33,6 +34,21 @@ fn best_of_forms(places: &[(Point, f64)], net: impl Fn(&Point, f64) -> f64) -> V
         }
     }
     best.into_iter().map(|b| b.0).collect()
+}
+
+/// A shape in the other forms of its candidate, of which `points` has examples: with its own parameters where the form
+/// has as many, else all examples. What was the best form beside other terms need not be the best beside these.
+fn in_other_forms(points: &[Point], own: &Point) -> Vec<Point> {
+    let mut out: Vec<Point> = Vec::new();
+    for point in points.iter().filter(|p| p.form != own.form) {
+        let same = point.theta.len() == own.theta.len();
+        if same && out.iter().any(|p| p.form == point.form) {
+            continue;
+        }
+        let theta = if same { &own.theta } else { &point.theta };
+        out.push(Point::at(point.form, theta));
+    }
+    out
 }
 
 /// Whether a term is a clip whose levels are sought.
@@ -114,29 +130,32 @@ impl Search<'_> {
     fn polished_once(&self, mut model: Model, from: usize) -> Result<Model, Unusable> {
         for k in from..model.terms.len() {
             let term = &model.terms[k];
-            let finer = || {
-                !term
-                    .candidate
-                    .fine(self.channels, &term.point, &self.used)
-                    .is_empty()
-            };
-            if term.evident || term.point.theta.is_empty() && !finer() {
+            if term.evident {
                 continue;
             }
-            let mut lines = vec![model.fit.problem.line.clone()];
+            let line = model.fit.problem.line.clone();
+            let mut ways = vec![(line.clone(), model.fit.at.shape)];
             if self.spikes(&model.fit) > 0 && model.fit.decimated.is_none() {
                 let full = |u: &bool| if *u { 1.0 } else { f64::INFINITY };
                 let factors = self.used.iter().map(full).collect();
-                lines.push(lines[0].with_white_factor(factors));
+                ways.push((line.with_white_factor(factors), model.fit.at.shape));
             }
-            for line in lines {
-                let point = self.repolished(&model, k, line);
+            if self.wander(&model) > WANDER {
+                // A shape that is off makes the very wander under which it seems to be right.
+                ways.push((line, WHITE));
+            }
+            for (line, shape) in ways {
+                let point = self.repolished(&model, k, (line, shape));
                 if point == model.terms[k].point {
                     continue;
                 }
                 let mut terms = model.terms.clone();
                 terms[k].point = point;
-                let next = self.model_with(&terms, &self.near(&model))?;
+                let options = match shape == WHITE {
+                    true => self.options(),
+                    false => self.near(&model),
+                };
+                let next = self.model_with(&terms, &options)?;
                 if self.net(&next) > self.net(&model) && next.admits(self.channels, k) {
                     model = next;
                 }
@@ -145,8 +164,8 @@ impl Search<'_> {
         Ok(model)
     }
 
-    /// The best point of one term on a timeline, the others held.
-    fn repolished(&self, model: &Model, k: usize, line: Timeline) -> Point {
+    /// The best point of one term on a timeline with a noise, the others held.
+    fn repolished(&self, model: &Model, k: usize, (line, shape): (Timeline, Shape)) -> Point {
         let c = self.channels;
         let mut problem = model.fit.problem.clone();
         problem.line = line;
@@ -168,7 +187,7 @@ impl Search<'_> {
                 }
             }
         }
-        let bench = Bench::of_problem(&model.fit, &problem, model.fit.at.shape);
+        let bench = Bench::of_problem(&model.fit, &problem, shape);
         let term = &model.terms[k];
         let candidate = term.candidate.as_ref();
         // A shape that acts on the bias moves it: each is judged by the bias that is there beside it.
@@ -209,7 +228,21 @@ impl Search<'_> {
         };
         let mut top = climbed(&term.point);
         let mut best = net(&top, gain(&top));
-        for start in best_of_forms(&fine, net) {
+        let others: Vec<(Point, f64)> = match fine.is_empty() {
+            true => in_other_forms(&candidate.points(c), &top)
+                .into_iter()
+                .map(|p| {
+                    let there = gain(&p);
+                    (p, there)
+                })
+                .collect(),
+            false => Vec::new(),
+        };
+        let other = others
+            .iter()
+            .max_by(|a, b| net(&a.0, a.1).total_cmp(&net(&b.0, b.1)));
+        let starts = best_of_forms(&fine, net).into_iter();
+        for start in starts.chain(other.map(|o| &o.0)) {
             // Between the places of another form its top may be far above them all.
             let point = climbed(start);
             let there = net(&point, gain(&point));

@@ -4,6 +4,7 @@
 //! none is beyond chance: with both in, the noise is seen to be fast, and each is beyond chance beside the other.
 
 use super::judge::{Judged, PRICE, price};
+use super::reported::WANDER;
 use super::{LEVEL, Model, Search, Term, declared};
 use crate::closure::likelihood::Unusable;
 use crate::closure::likelihood::linear::{Basis, dot};
@@ -12,8 +13,9 @@ use crate::closure::likelihood::linear::{Basis, dot};
 /// some two hundred pairs (Wilks 1938: four coefficients and a time constant rarely gain ten).
 const WORTH: f64 = 15.0;
 
-/// Pairs of which the noise is sought.
+/// Pairs of which the noise is sought, and names alone; and how many times over.
 const TRIED: usize = 3;
+const TIMES: usize = 2;
 
 /// A candidate beside a model: its columns over the fitted rows without what the model's span has of them.
 struct Beside<'a> {
@@ -23,28 +25,25 @@ struct Beside<'a> {
 }
 
 impl Search<'_> {
-    /// The terms of a model and two names more, if these are worth more than the slow noise that the model has in their
-    /// place, and each is beyond chance beside the other.
+    /// The terms of a model and one, two or more names, if these are worth more than the slow noise that the model has in
+    /// their place, and each is beyond chance beside the others.
     ///
     /// # Errors
     /// Too few rows.
     pub(super) fn together(&self, model: &Model) -> Result<Option<Vec<Term>>, Unusable> {
-        let mut best: Option<(Model, f64)> = None;
-        for pair in self.pairs(model) {
-            let mut terms = model.terms.clone();
-            terms.extend(pair.map(|j| Term::of(&j, Vec::new())));
-            let with = self.tried(&terms, model.terms.len())?;
-            let net = self.net(&with);
-            if best.as_ref().is_none_or(|b| net > b.1) {
-                best = Some((with, net));
+        let mut with = model.clone();
+        for _ in 0..TIMES {
+            match self.with_more(&with)? {
+                Some(more) => with = more,
+                None => break,
+            }
+            if self.wander(&with) <= WANDER {
+                break;
             }
         }
-        let due = self.net(model) + WORTH;
-        let Some((with, _)) = best.filter(|(_, net)| *net > due) else {
-            return Ok(None);
-        };
+        let known = model.terms.len();
         let mut terms = with.terms.clone();
-        for k in model.terms.len()..terms.len() {
+        for k in known..terms.len() {
             let mut others = with.terms.clone();
             let own = others.remove(k);
             let round = self.round(&self.model(&others)?, self.effort.surrogates);
@@ -57,40 +56,59 @@ impl Search<'_> {
                 ..Term::of(again, round.rivals(again))
             };
         }
-        Ok(Some(terms))
+        Ok((terms.len() > known).then_some(terms))
     }
 
-    /// The pairs of names that leave least of the fitted rows, best first.
-    fn pairs(&self, model: &Model) -> Vec<[Judged; 2]> {
+    /// The model with the one or two names more that are worth most, if they are worth enough.
+    fn with_more(&self, model: &Model) -> Result<Option<Model>, Unusable> {
+        let mut best: Option<(Model, f64)> = None;
+        for added in self.sets(model) {
+            let mut terms = model.terms.clone();
+            terms.extend(added.iter().map(|j| Term::of(j, Vec::new())));
+            let with = self.tried(&terms, 0)?;
+            let net = self.net(&with);
+            if best.as_ref().is_none_or(|b| net > b.1) {
+                best = Some((with, net));
+            }
+        }
+        let due = self.net(model) + WORTH;
+        Ok(best.filter(|(_, net)| *net > due).map(|(with, _)| with))
+    }
+
+    /// The names and pairs of names that leave least of the fitted rows.
+    fn sets(&self, model: &Model) -> Vec<Vec<Judged>> {
         let round = self.round(model, 0);
-        let rest = self.weighed(model, &model.residual(self.channels));
         let spanned = declared(self.channels);
         let spanned = spanned.iter().chain(&model.columns);
         let spanned: Vec<Vec<f64>> = spanned.map(|c| self.weighed(model, c)).collect();
         let span = Basis::new(&spanned);
-        let mut left = rest.clone();
+        let mut left = self.weighed(model, &model.residual(self.channels));
         span.project_off(&mut left);
-        let each: Vec<Beside<'_>> = round
-            .judged
-            .iter()
-            .filter(|j| is_slow(j))
-            .map(|judged| self.beside(model, &span, judged))
-            .collect();
+        let slow = round.judged.iter().filter(|j| is_slow(j));
+        let each: Vec<Beside<'_>> = slow.map(|j| self.beside(model, &span, j)).collect();
         let rows = self.used.iter().filter(|u| **u).count() as f64;
+        let net = |set: &[&Beside<'_>]| {
+            let columns: Vec<Vec<f64>> = set.iter().flat_map(|b| b.columns.clone()).collect();
+            let mut unexplained = left.clone();
+            Basis::new(&columns).project_off(&mut unexplained);
+            let square = dot(&unexplained, &unexplained).max(f64::MIN_POSITIVE);
+            let paid: f64 = set.iter().map(|b| b.paid).sum();
+            -0.5 * rows * square.ln() - paid
+        };
         let mut pairs = Vec::new();
         for (k, one) in each.iter().enumerate() {
-            for other in &each[..k] {
-                let columns = [one.columns.as_slice(), other.columns.as_slice()].concat();
-                let mut unexplained = left.clone();
-                Basis::new(&columns).project_off(&mut unexplained);
-                let square = dot(&unexplained, &unexplained).max(f64::MIN_POSITIVE);
-                let net = -0.5 * rows * square.ln() - one.paid - other.paid;
-                pairs.push((net, [one.judged, other.judged]));
-            }
+            pairs.extend(each[..k].iter().map(|other| vec![one, other]));
         }
-        pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let best = pairs.into_iter().take(TRIED);
-        best.map(|(_, pair)| pair.map(Judged::clone)).collect()
+        let ones = each.iter().map(|one| vec![one]).collect();
+        [pairs, ones]
+            .into_iter()
+            .flat_map(|sets: Vec<Vec<&Beside<'_>>>| {
+                let mut ranked: Vec<(f64, _)> = sets.into_iter().map(|s| (net(&s), s)).collect();
+                ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+                ranked.into_iter().take(TRIED)
+            })
+            .map(|(_, set)| set.into_iter().map(|b| b.judged.clone()).collect())
+            .collect()
     }
 
     fn beside<'a>(&self, model: &Model, span: &Basis, judged: &'a Judged) -> Beside<'a> {
