@@ -20,6 +20,7 @@ pub mod effects;
 pub mod firmware;
 pub mod folds;
 mod heats;
+mod holes;
 pub mod intake;
 pub mod likelihood;
 pub mod noise;

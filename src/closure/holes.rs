@@ -1,0 +1,135 @@
+//! Rows in which a reading is missing that its neighbours do not give.
+//!
+//! Channels are filled between measured rows (`channels::filled`), for what depends on their past needs them whole. A filled
+//! cell of a thermometer is an error of the declared bias, and one of a channel that changes from row to row is no
+//! reading at all: an output beside it says nothing of any model.
+
+use crate::record::Warning;
+use std::collections::BTreeMap;
+
+/// Error of a straight line between a reading's neighbours, rms over the channel's deviation, up to which it gives a
+/// missing one.
+const NEAR: f64 = 0.01;
+
+/// Share of the rows that may be missing: a channel that is read seldom is filled all the same.
+const SELDOM: f64 = 0.2;
+
+/// Columns whose holes have rules of their own.
+const APART: [&str; 4] = [
+    "time_s",
+    "time_since_power_on_s",
+    "rate_out_dps",
+    "rate_dps",
+];
+
+/// Takes the output from rows in which the thermometer, or another channel that its neighbours do not give, was not
+/// measured.
+pub(super) fn take(
+    time_s: &[f64],
+    columns: &mut BTreeMap<String, Vec<f64>>,
+    thermometer: &str,
+) -> Option<Warning> {
+    let mut lost = vec![false; time_s.len()];
+    let mut names = Vec::new();
+    for (name, values) in columns.iter() {
+        let holes = values.iter().filter(|v| v.is_nan()).count();
+        let few = holes > 0 && holes as f64 <= SELDOM * values.len() as f64;
+        if APART.contains(&name.as_str()) || !few {
+            continue;
+        }
+        if name == thermometer || !is_given(time_s, values) {
+            names.push(name.as_str());
+            lost.iter_mut()
+                .zip(values)
+                .for_each(|(l, v)| *l |= v.is_nan());
+        }
+    }
+    let names = names.join(", ");
+    let output = columns.get_mut("rate_out_dps")?;
+    let mut count = 0;
+    for (value, _) in output
+        .iter_mut()
+        .zip(&lost)
+        .filter(|(v, l)| **l && !v.is_nan())
+    {
+        *value = f64::NAN;
+        count += 1;
+    }
+    (count > 0).then(|| {
+        let said = format!(
+            "{count} of {} rows lack a reading of {names} that its neighbours do not give; they take no part in any fit or \
+             figure",
+            time_s.len()
+        );
+        Warning::general("rows_with_holes", said)
+    })
+}
+
+/// Whether measured readings lie on the line between their neighbours.
+fn is_given(time_s: &[f64], values: &[f64]) -> bool {
+    let known: Vec<usize> = (0..values.len())
+        .filter(|i| values[*i].is_finite())
+        .collect();
+    let count = known.len().max(1) as f64;
+    let mean = known.iter().map(|i| values[*i]).sum::<f64>() / count;
+    let square = known
+        .iter()
+        .map(|i| (values[*i] - mean).powi(2))
+        .sum::<f64>()
+        / count;
+    let off = known.windows(3).map(|w| {
+        let [a, i, b] = [w[0], w[1], w[2]];
+        let width_s = time_s[b] - time_s[a];
+        let share = match width_s > 0.0 {
+            true => (time_s[i] - time_s[a]) / width_s,
+            false => 0.5,
+        };
+        (values[i] - values[a] - share * (values[b] - values[a])).powi(2)
+    });
+    off.sum::<f64>() / count <= NEAR.powi(2) * square
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Which of 200 rows keep their output with holes in a column, and whether that is said.
+    fn kept(name: &str, value: impl Fn(usize) -> f64, holes: &[usize]) -> (Vec<usize>, bool) {
+        let time_s: Vec<f64> = (0..200).map(|k| 10.0 * k as f64).collect();
+        let read = |k: usize| {
+            if holes.contains(&k) {
+                f64::NAN
+            } else {
+                value(k)
+            }
+        };
+        let mut columns = BTreeMap::from([
+            ("rate_out_dps".to_owned(), vec![1.0; 200]),
+            (name.to_owned(), (0..200).map(read).collect()),
+        ]);
+        let warning = take(&time_s, &mut columns, "die_degc");
+        let output = &columns["rate_out_dps"];
+        let lost = (0..200).filter(|k| output[*k].is_nan()).collect();
+        (lost, warning.is_some_and(|w| w.code == "rows_with_holes"))
+    }
+
+    #[test]
+    fn a_row_without_what_its_neighbours_do_not_give_has_no_error() {
+        let slow = |k: usize| (k as f64 / 40.0).sin();
+        let fast = |k: usize| (1.7 * k as f64).sin();
+        let nothing = (Vec::new(), false);
+        assert_eq!(kept("agc", slow, &[5, 50, 51]), nothing);
+        assert_eq!(kept("agc", fast, &[5, 50, 51]), (vec![5, 50, 51], true));
+        assert_eq!(
+            kept("die_degc", slow, &[5, 50, 51]),
+            (vec![5, 50, 51], true)
+        );
+        assert_eq!(kept("agc", |_| 1.0, &[5]), nothing);
+        assert_eq!(kept("agc", fast, &[]), nothing);
+        // Their holes have other rules.
+        assert_eq!(kept("rate_dps", fast, &[5]), nothing);
+        // One row in three.
+        let seldom: Vec<usize> = (0..200).filter(|k| k % 3 > 0).collect();
+        assert_eq!(kept("chamber_degc", fast, &seldom), nothing);
+    }
+}
