@@ -26,6 +26,9 @@ const SAME: f64 = 1e-9;
 const NEAR: f64 = 3.5;
 const PILED: usize = 4;
 
+/// Share of the range that such noise may be.
+const SMALL: f64 = 0.05;
+
 /// Probability of as many equal readings by chance up to which they are a rail.
 const LEVEL: f64 = 1e-4;
 
@@ -94,8 +97,10 @@ pub fn of(c: &Channels, rows: &[bool]) -> Option<Rails> {
         .map(|((v, _), _)| *v)
         .collect();
     let width = NEAR * noise_dps;
-    let upper_pile = upper_dps.filter(|l| is_piled(short.iter().map(|v| l - v), width));
-    let lower_pile = lower_dps.filter(|l| is_piled(short.iter().map(|v| v - l), width));
+    // Else the rate is not that of this output.
+    let small = width <= SMALL * (readings[0].0 - readings[readings.len() - 1].0);
+    let upper_pile = upper_dps.filter(|l| small && is_piled(short.iter().map(|v| l - v), width));
+    let lower_pile = lower_dps.filter(|l| small && is_piled(short.iter().map(|v| v - l), width));
     let held = |v: f64| {
         upper_pile.is_some_and(|l| v > l - width) || lower_pile.is_some_and(|l| v < l + width)
     };

@@ -6,15 +6,11 @@
 use super::thermal::ThermalRecord;
 use super::warning::Warning;
 
-/// Share of the larger neighbouring rate by which the output may be beyond the errors of the rows before and after.
+/// Share of the largest rate by which the output at rest may differ from the error of the row before (or after), at most,
+/// and how many times what all but one in twenty neighbouring rows differ by.
 const NEAR: f64 = 0.1;
-
-/// A row beside a hole: its error, and the applied rate of the last measured one, deg/s.
-#[derive(Clone, Copy)]
-struct Beside {
-    rate_dps: f64,
-    error_dps: f64,
-}
+const USUAL: f64 = 0.95;
+const TIMES: f64 = 4.0;
 
 /// Empty cells of an applied rate become 0 where the output is that of a gyro at rest; the other rows lose their output.
 pub(super) fn take(record: &mut ThermalRecord, warnings: &mut Vec<Warning>) {
@@ -26,20 +22,15 @@ pub(super) fn take(record: &mut ThermalRecord, warnings: &mut Vec<Warning>) {
     if rate.iter().all(|r| r.is_nan()) || rate.iter().all(|r| !r.is_nan()) {
         return;
     }
+    let forth = at_rest(&rate, &output, 0..rate.len());
+    let back = at_rest(&rate, &output, (0..rate.len()).rev());
     let mut unknown = 0;
-    let after = after(&rate, &output);
-    let mut before: Option<Beside> = None;
     for row in 0..rate.len() {
-        if !rate[row].is_nan() {
-            before = measured(rate[row], output[row]).or(before);
-        } else if output[row].is_nan() {
+        if !rate[row].is_nan() || output[row].is_nan() {
             continue;
-        } else if rests(output[row], before, after[row]) {
+        }
+        if forth[row] || back[row] {
             rate[row] = 0.0;
-            // The bias may go far while the table stands.
-            if let Some(before) = &mut before {
-                before.error_dps = output[row];
-            }
         } else {
             output[row] = f64::NAN;
             unknown += 1;
@@ -60,36 +51,37 @@ pub(super) fn take(record: &mut ThermalRecord, warnings: &mut Vec<Warning>) {
     }
 }
 
-/// A row with both readings.
-fn measured(rate_dps: f64, output_dps: f64) -> Option<Beside> {
-    let error_dps = output_dps - rate_dps;
-    (!error_dps.is_nan()).then_some(Beside {
-        rate_dps,
-        error_dps,
-    })
-}
-
-/// The next row with both readings after each row.
-fn after(rate: &[f64], output: &[f64]) -> Vec<Option<Beside>> {
-    let mut out = vec![None; rate.len()];
-    let mut next = None;
-    for row in (0..rate.len()).rev() {
-        out[row] = next;
-        next = measured(rate[row], output[row]).or(next);
+/// The rows without a rate whose output follows on from the error of the rows before them, in the order of `rows`: the bias
+/// may go far while the table stands, but not from row to row.
+fn at_rest(rate: &[f64], output: &[f64], rows: impl Iterator<Item = usize>) -> Vec<bool> {
+    let within_dps = usual_change(rate, output);
+    let mut out = vec![false; rate.len()];
+    let mut error_dps: Option<f64> = None;
+    for row in rows {
+        if output[row].is_nan() {
+            continue;
+        }
+        if !rate[row].is_nan() {
+            error_dps = Some(output[row] - rate[row]);
+        } else if error_dps.is_some_and(|e| (output[row] - e).abs() <= within_dps) {
+            out[row] = true;
+            error_dps = Some(output[row]);
+        }
     }
     out
 }
 
-/// Whether an output is that of a gyro at rest, by the rows before and after it.
-fn rests(output_dps: f64, before: Option<Beside>, after: Option<Beside>) -> bool {
-    let sides = || before.iter().chain(&after);
-    let most_dps = sides().map(|s| s.rate_dps.abs()).fold(0.0, f64::max);
-    let low_dps = sides().map(|s| s.error_dps).fold(f64::INFINITY, f64::min);
-    let high_dps = sides()
-        .map(|s| s.error_dps)
-        .fold(f64::NEG_INFINITY, f64::max);
-    let around = low_dps - NEAR * most_dps..=high_dps + NEAR * most_dps;
-    most_dps == 0.0 || around.contains(&output_dps)
+/// What the error may differ by from row to row, deg/s.
+fn usual_change(rate: &[f64], output: &[f64]) -> f64 {
+    let errors: Vec<f64> = output.iter().zip(rate).map(|(o, r)| o - r).collect();
+    let mut changes: Vec<f64> = errors.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
+    changes.retain(|c| !c.is_nan());
+    changes.sort_by(f64::total_cmp);
+    let usual = changes.get((USUAL * changes.len() as f64) as usize);
+    let most_dps = rate.iter().fold(0.0, |m: f64, r| m.max(r.abs()));
+    let near_dps = NEAR * most_dps;
+    // Decimals of a bias that stands still round.
+    usual.map_or(near_dps, |u| near_dps.min(TIMES * u + 1e-6 * most_dps))
 }
 
 #[cfg(test)]
