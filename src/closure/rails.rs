@@ -89,14 +89,14 @@ pub fn of(c: &Channels, rows: &[bool]) -> Option<Rails> {
     let pairs = c.error_dps.iter().zip(rows).zip(&stand);
     let free = pairs.filter(|((_, row), stands)| **row && !**stands);
     let free: Vec<f64> = free.map(|((e, _), _)| *e).collect();
-    let noise_dps = stats::difference_noise(&free);
-    let coarse = in_steps(&gaps, resolution) && noise_dps < resolution;
+    let coarse = in_steps(&gaps, resolution) && stats::difference_noise(&free) < resolution;
     let pairs = output.iter().zip(rows).zip(&stand);
     let short: Vec<f64> = pairs
         .filter(|((_, row), stands)| **row && !**stands)
         .map(|((v, _), _)| *v)
         .collect();
-    let width = NEAR * noise_dps;
+    // The bias may go far from row to row.
+    let width = NEAR * stats::curvature_noise(&free);
     // Else the rate is not that of this output.
     let small = width <= SMALL * (readings[0].0 - readings[readings.len() - 1].0);
     let upper_pile = upper_dps.filter(|l| small && is_piled(short.iter().map(|v| l - v), width));
