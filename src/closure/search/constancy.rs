@@ -28,7 +28,7 @@ impl Search<'_> {
         let c = self.channels;
         let fit = &model.fit;
         let whitener = Whitener::new(&fit.problem.line, fit.at.shape);
-        let columns = term.candidate.columns(c, &model.acting, &term.point);
+        let columns = model.shown(term.candidate.columns(c, &model.acting, &term.point));
         let own: Vec<Vec<f64>> = columns.iter().map(|c| fit.reduce(c)).collect();
         let white = whitener.apply_all(&own);
         // All other regressors.

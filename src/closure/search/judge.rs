@@ -117,7 +117,7 @@ impl Search<'_> {
     /// Judges all candidates that are not among the model's terms. `surrogates` = 0: gains alone.
     pub fn judge(&self, model: &Model, surrogates: usize) -> Round {
         let c = self.channels;
-        let (fit, bias) = (&model.fit, &model.bias);
+        let fit = &model.fit;
         let mut missing = Vec::new();
         let mut running: Running = Vec::new();
         let taken: Vec<String> = model.terms.iter().map(|t| t.id()).collect();
@@ -137,7 +137,7 @@ impl Search<'_> {
             .map(|(candidate, points)| Group {
                 points: points
                     .iter()
-                    .map(|p| reduced(self, fit, candidate.as_ref(), bias, p))
+                    .map(|p| reduced(self, model, candidate.as_ref(), p))
                     .collect(),
             })
             .collect();
@@ -211,7 +211,7 @@ impl Search<'_> {
             .iter()
             .zip(&biases)
             .map(|((candidate, point, _), bias)| {
-                candidate.columns(c, bias.as_ref().unwrap_or(&model.bias), point)
+                model.shown(candidate.columns(c, bias.as_ref().unwrap_or(&model.bias), point))
             })
             .collect();
         let gains = refine::profiled(fit, &scores.grid, &columns);
@@ -261,11 +261,11 @@ impl Search<'_> {
             return top;
         }
         // At one noise; the null hypothesis may choose the one that suits it best.
-        let mut benches = vec![(shape, Bench::new(fit, shape))];
+        let mut benches = vec![(shape, Bench::new(model, shape))];
         // A residual with sharp ends looks like a walk without white noise, to which a threshold that is off by a row, or
         // a form that is not quite the one, is no better than none: it is found where the noise is white.
         if near && (acting || candidate.is_whole() || candidate.is_local()) {
-            benches.push((WHITE, Bench::new(fit, WHITE)));
+            benches.push((WHITE, Bench::new(model, WHITE)));
         }
         let best = |point: &Point, bias: &Option<Bias>| {
             let bias = bias.as_ref().unwrap_or(&model.bias);
@@ -359,12 +359,13 @@ impl Search<'_> {
         for (column, b) in model.columns.iter().zip(&model.beta).skip(order) {
             add_scaled(&mut rest, -b, column);
         }
-        let data = (rest.as_slice(), model.fit.row_weights.as_slice());
+        let weights = model.free_weights();
+        let data = (rest.as_slice(), weights.as_slice());
         let acting = [(candidate, point)];
         bias.coefficients_dps = acting::settled(c, data, &bias.coefficients_dps, &acting, &[]);
         let mut columns = super::declared(c);
         columns.extend(candidate.columns(c, &bias, point));
-        let own = super::weighted(&columns, &rest, &model.fit.row_weights);
+        let own = super::weighted(&columns, &rest, &weights);
         (bias, own.get(order..).unwrap_or_default().to_vec())
     }
 }
@@ -398,13 +399,13 @@ fn scored(fit: &Fit, groups: &[Group], surrogates: usize) -> Scores {
 /// Columns of a shape in the rows of the fit's problem.
 fn reduced(
     search: &Search<'_>,
-    fit: &Fit,
+    model: &Model,
     candidate: &dyn Candidate,
-    bias: &Bias,
     point: &Point,
 ) -> Vec<Vec<f64>> {
-    let columns = candidate.columns(search.channels, bias, point);
-    columns.iter().map(|c| fit.reduce(c)).collect()
+    let columns = candidate.columns(search.channels, &model.bias, point);
+    let columns = model.shown(columns);
+    columns.iter().map(|c| model.fit.reduce(c)).collect()
 }
 
 /// Whether a model has a tone of a frequency, to `within_hz`.

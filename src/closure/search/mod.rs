@@ -140,6 +140,8 @@ pub struct Model {
     pub beta: Vec<f64>,
     /// Regressors over all rows: declared ones, then the terms'.
     pub columns: Vec<Vec<f64>>,
+    /// Rows at a clip's level, where no other term shows; empty: none is.
+    pub clipped: Vec<bool>,
     /// How far the clipped rows lie from the levels of the clip, deg/s.
     pub off_dps: f64,
     /// Log-likelihood of all training rows, spikes included: for models of the same rows.
@@ -378,6 +380,10 @@ impl<'a> Search<'a> {
             }
         }
         let clips = clipped.contains(&1.0);
+        let held = match clips {
+            true => clipped.iter().map(|c| *c > 0.0).collect(),
+            false => Vec::new(),
+        };
         if clips {
             // The noise needs a constant over all rows, clipped ones too.
             free.push(clipped);
@@ -418,6 +424,7 @@ impl<'a> Search<'a> {
             bias,
             beta,
             columns,
+            clipped: held,
             off_dps,
         })
     }
@@ -452,6 +459,24 @@ impl Model {
             add_scaled(&mut out, -b, column);
         }
         out
+    }
+
+    /// Columns of a further term as they show beside a clip: not in the rows that it holds.
+    fn shown(&self, mut columns: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+        if !self.clipped.is_empty() {
+            for column in &mut columns {
+                let rows = column.iter_mut().zip(&self.clipped);
+                rows.filter(|(_, held)| **held).for_each(|(v, _)| *v = 0.0);
+            }
+        }
+        columns
+    }
+
+    /// Weights of the fit's rows; 0 where a clip holds the output, which says nothing of the declared bias.
+    fn free_weights(&self) -> Vec<f64> {
+        let mut weights = vec![self.fit.row_weights.clone()];
+        weights = self.shown(weights);
+        weights.swap_remove(0)
     }
 
     /// Whether physics admits the coefficients of a term.

@@ -1,5 +1,6 @@
 //! Non-linear parameters, and likelihoods of a few shapes under every noise of the grid.
 
+use super::Model;
 use crate::closure::channels::Channels;
 use crate::closure::effects::{Bias, Candidate, Point};
 use crate::closure::likelihood::candidates::{AtShape, Grid, Group};
@@ -12,6 +13,8 @@ use crate::closure::likelihood::whiten::Whitener;
 /// One noise, ready for many columns.
 pub struct Bench<'a> {
     fit: &'a Fit,
+    /// Beside which candidates are judged; `None`: columns show in all rows.
+    model: Option<&'a Model>,
     whitener: Whitener,
     declared: Basis,
     /// The whitened signal without the declared regressors.
@@ -19,9 +22,12 @@ pub struct Bench<'a> {
 }
 
 impl<'a> Bench<'a> {
-    /// For a fit and a shape of its noise.
-    pub fn new(fit: &'a Fit, shape: Shape) -> Self {
-        Self::of_problem(fit, &fit.problem, shape)
+    /// For what comes beside a model, and a shape of its noise.
+    pub fn new(model: &'a Model, shape: Shape) -> Self {
+        Bench {
+            model: Some(model),
+            ..Self::of_problem(&model.fit, &model.fit.problem, shape)
+        }
     }
 
     /// For other regressors than the fit's own, on the fit's rows.
@@ -31,6 +37,7 @@ impl<'a> Bench<'a> {
         declared.project_off(&mut y);
         Bench {
             fit,
+            model: None,
             whitener,
             declared,
             y,
@@ -130,7 +137,10 @@ pub fn gain(
     bias: &Bias,
     point: &Point,
 ) -> f64 {
-    let columns = candidate.columns(c, bias, point);
+    let mut columns = candidate.columns(c, bias, point);
+    if let Some(model) = bench.model {
+        columns = model.shown(columns);
+    }
     if candidate.is_sized(point) {
         bench.gain_whole(&columns)
     } else {

@@ -130,7 +130,8 @@ impl Search<'_> {
 
     /// A column over the rows of the fit, those that stand out at their weight.
     fn weighed(&self, model: &Model, column: &[f64]) -> Vec<f64> {
-        let rows = column.iter().zip(&model.fit.row_weights).zip(&self.used);
+        let weights = model.free_weights();
+        let rows = column.iter().zip(&weights).zip(&self.used);
         let weighed = rows.map(|((v, w), used)| if *used && *w > 0.0 { v * w.sqrt() } else { 0.0 });
         weighed.collect()
     }
