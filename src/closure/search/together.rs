@@ -144,3 +144,7 @@ fn is_slow(judged: &Judged) -> bool {
     let threshold = candidate.is_local() || candidate.is_whole();
     candidate.named() && !fast && !threshold && !candidate.is_sized(&judged.point)
 }
+
+#[cfg(test)]
+#[path = "together_tests.rs"]
+mod tests;

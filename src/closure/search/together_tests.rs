@@ -1,0 +1,132 @@
+//! Causes that show beside each other only.
+
+use crate::closure::channels::Channels;
+use crate::closure::search::{Effort, Found, Search};
+use crate::closure::synthetic::{Random, triangle};
+use std::collections::BTreeMap;
+
+const ROWS: usize = 420;
+const NOISE_DPS: f64 = 0.02;
+
+fn found(columns: Vec<(&str, Vec<f64>)>) -> (Vec<String>, Option<String>) {
+    let columns: BTreeMap<String, Vec<f64>> = columns
+        .into_iter()
+        .map(|(name, values)| (name.to_owned(), values))
+        .collect();
+    let time_s: Vec<f64> = (0..ROWS).map(|k| 60.0 * k as f64).collect();
+    let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+    let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+    let Found { terms, left, .. } = search.run().unwrap();
+    let mut names: Vec<String> = terms.iter().map(|t| t.id()).collect();
+    names.sort();
+    (names, left)
+}
+
+fn degc() -> Vec<f64> {
+    [triangle(ROWS / 2), triangle(ROWS - ROWS / 2)].concat()
+}
+
+/// A walk of unit deviation.
+fn walk(random: &mut Random) -> Vec<f64> {
+    let mut sum = 0.0;
+    let steps = (0..ROWS).map(|_| {
+        sum += random.normal();
+        sum
+    });
+    let walk: Vec<f64> = steps.collect();
+    let mean = walk.iter().sum::<f64>() / ROWS as f64;
+    let square = walk.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / ROWS as f64;
+    walk.iter().map(|v| (v - mean) / square.sqrt()).collect()
+}
+
+#[test]
+fn a_supply_that_wanders_and_ageing_are_found_though_each_alone_is_no_better_than_a_walk() {
+    for seed in 0..4 {
+        let mut random = Random::new(seed);
+        let (degc, supply) = (degc(), walk(&mut random));
+        let output = (0..ROWS)
+            .map(|k| {
+                let ageing = 0.25 * k as f64 / ROWS as f64;
+                0.3 - 0.01 * degc[k] + 0.05 * supply[k] + ageing + NOISE_DPS * random.normal()
+            })
+            .collect();
+        let supply = supply.iter().map(|v| 5.0 + 0.05 * v).collect();
+        let (names, left) = found(vec![
+            ("rate_out_dps", output),
+            ("die_degc", degc),
+            ("supply_v", supply),
+        ]);
+        assert_eq!(names, ["ageing_drift", "supply_sensitivity"], "{seed}");
+        assert_eq!(left, None, "{seed}");
+    }
+}
+
+#[test]
+fn a_walk_of_the_rate_beside_a_walk_of_the_supply_has_no_name() {
+    for seed in 0..12 {
+        let mut random = Random::new(100 + seed);
+        let (degc, supply, rate) = (degc(), walk(&mut random), walk(&mut random));
+        let output = (0..ROWS)
+            .map(|k| 0.3 - 0.01 * degc[k] + 0.1 * rate[k] + NOISE_DPS * random.normal())
+            .collect();
+        let supply = supply.iter().map(|v| 5.0 + 0.05 * v).collect();
+        let columns = vec![
+            ("rate_out_dps", output),
+            ("die_degc", degc),
+            ("supply_v", supply),
+        ];
+        assert_eq!(found(columns).0, Vec::<String>::new(), "{seed}");
+    }
+}
+
+#[test]
+fn what_a_clip_holds_back_is_no_part_of_another_effect() {
+    for seed in 0..3 {
+        let mut random = Random::new(200 + seed);
+        let degc = degc();
+        // The gain steps from row to row, and a fifth of the rows are clipped, before the noise.
+        let agc: Vec<f64> = (0..ROWS)
+            .map(|k| 1.0 + 0.02 * ((k / 7 % 5) as f64))
+            .collect();
+        let rate: Vec<f64> = (0..ROWS)
+            .map(|k| [0.0, 60.0, -60.0, 110.0, -130.0][k / 2 % 5])
+            .collect();
+        let output = (0..ROWS)
+            .map(|k| {
+                let total = rate[k] + 0.3 - 0.01 * degc[k] + 4.0 * (agc[k] - 1.0);
+                total.clamp(-129.7, 100.0) + NOISE_DPS * random.normal()
+            })
+            .collect();
+        let (names, left) = found(vec![
+            ("rate_out_dps", output),
+            ("rate_dps", rate),
+            ("die_degc", degc),
+            ("agc", agc),
+        ]);
+        assert_eq!(names, ["damping_bias", "output_saturation"], "{seed}");
+        assert_eq!(left, None, "{seed}");
+    }
+}
+
+#[test]
+fn a_scale_factor_that_is_off_in_one_direction_is_an_asymmetry_alone() {
+    for (seed, sign) in [(0, 1.0), (1, -1.0)] {
+        let mut random = Random::new(300 + seed);
+        let degc = degc();
+        let rate: Vec<f64> = (0..ROWS)
+            .map(|k| [0.0, 40.0, -40.0, 90.0, -90.0][k / 3 % 5])
+            .collect();
+        let output = (0..ROWS)
+            .map(|k| {
+                let off = 2e-3 * f64::max(sign * rate[k], 0.0);
+                rate[k] + 0.3 - 0.01 * degc[k] + off + NOISE_DPS * random.normal()
+            })
+            .collect();
+        let columns = vec![
+            ("rate_out_dps", output),
+            ("rate_dps", rate),
+            ("die_degc", degc),
+        ];
+        assert_eq!(found(columns).0, ["scale_factor_asymmetry"], "{sign}");
+    }
+}
