@@ -73,7 +73,11 @@ impl Search<'_> {
         }
         // A shape without a name has to be better than names by as much here as where it is taken.
         let strange = reached.terms.iter().any(|t| !t.candidate.named());
-        let due = self.net(&reached) - if strange { STRANGER } else { 0.0 };
+        let due = match strange {
+            true => self.net(&reached) - STRANGER,
+            // Names that did not hold are no measure for others.
+            false => self.net(&model),
+        };
         let barred = self.begin(Beginning::default());
         let mut others = Vec::new();
         if wanders {
