@@ -71,12 +71,15 @@ impl Search<'_> {
         if clean || !first.undecided.is_empty() {
             return Ok(first);
         }
-        // A shape without a name has to be better than names by as much here as where it is taken.
         let strange = reached.terms.iter().any(|t| !t.candidate.named());
-        let due = match strange {
-            true => self.net(&reached) - STRANGER,
+        let due = if strange {
+            // Such a shape has to be better than names by as much here as where it is taken.
+            self.net(&reached) - STRANGER
+        } else if first.strangers.is_empty() {
             // Names that did not hold are no measure for others.
-            false => self.net(&model),
+            self.net(&model)
+        } else {
+            self.net(&reached)
         };
         let barred = self.begin(Beginning::default());
         let mut others = Vec::new();

@@ -47,7 +47,7 @@ fn a_supply_that_wanders_and_ageing_are_found_though_each_alone_is_no_better_tha
         let output = (0..ROWS)
             .map(|k| {
                 let ageing = 0.25 * k as f64 / ROWS as f64;
-                0.3 - 0.01 * degc[k] + 0.05 * supply[k] + ageing + NOISE_DPS * random.normal()
+                0.3 - 0.01 * degc[k] - 0.05 * supply[k] + ageing + NOISE_DPS * random.normal()
             })
             .collect();
         let supply = supply.iter().map(|v| 5.0 + 0.05 * v).collect();
