@@ -4,6 +4,7 @@ use crate::closure::channels::Channels;
 use crate::closure::search::{Effort, Found, Search};
 use crate::closure::synthetic::{Random, triangle};
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 
 const ROWS: usize = 420;
 const NOISE_DPS: f64 = 0.02;
@@ -41,16 +42,18 @@ fn walk(random: &mut Random) -> Vec<f64> {
 
 #[test]
 fn a_supply_that_wanders_and_ageing_are_found_though_each_alone_is_no_better_than_a_walk() {
-    for seed in 0..4 {
+    // A part of a period against a part of a line.
+    for (seed, turn) in [(0, 0.637), (1, 0.262), (2, 0.637), (3, 0.262)] {
         let mut random = Random::new(seed);
-        let (degc, supply) = (degc(), walk(&mut random));
+        let degc = degc();
+        let supply = |k: usize| (TAU * (0.8 * k as f64 / ROWS as f64 + turn)).sin();
         let output = (0..ROWS)
             .map(|k| {
-                let ageing = 0.25 * k as f64 / ROWS as f64;
-                0.3 - 0.01 * degc[k] - 0.05 * supply[k] + ageing + NOISE_DPS * random.normal()
+                let ageing = 0.3 * k as f64 / ROWS as f64;
+                0.3 - 0.01 * degc[k] - 0.085 * supply(k) + ageing + NOISE_DPS * random.normal()
             })
             .collect();
-        let supply = supply.iter().map(|v| 5.0 + 0.05 * v).collect();
+        let supply = (0..ROWS).map(|k| 5.0 + 0.05 * supply(k)).collect();
         let (names, left) = found(vec![
             ("rate_out_dps", output),
             ("die_degc", degc),
@@ -84,17 +87,15 @@ fn what_a_clip_holds_back_is_no_part_of_another_effect() {
     for seed in 0..3 {
         let mut random = Random::new(200 + seed);
         let degc = degc();
-        // The gain steps from row to row, and a fifth of the rows are clipped, before the noise.
-        let agc: Vec<f64> = (0..ROWS)
-            .map(|k| 1.0 + 0.02 * ((k / 7 % 5) as f64))
-            .collect();
+        // Two fifths of the rows are clipped, before the noise.
+        let agc: Vec<f64> = walk(&mut random).iter().map(|v| 1.0 + 0.02 * v).collect();
         let rate: Vec<f64> = (0..ROWS)
             .map(|k| [0.0, 60.0, -60.0, 110.0, -130.0][k / 2 % 5])
             .collect();
         let output = (0..ROWS)
             .map(|k| {
-                let total = rate[k] + 0.3 - 0.01 * degc[k] + 4.0 * (agc[k] - 1.0);
-                total.clamp(-129.7, 100.0) + NOISE_DPS * random.normal()
+                let total = rate[k] + 0.3 - 0.01 * degc[k] + 8.0 * (agc[k] - 1.0);
+                total.clamp(-100.0, 90.0) + NOISE_DPS * random.normal()
             })
             .collect();
         let (names, left) = found(vec![
