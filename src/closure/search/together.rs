@@ -43,14 +43,14 @@ impl Search<'_> {
         }
         let known = model.terms.len();
         let mut terms = with.terms.clone();
-        for k in known..terms.len() {
+        for (k, term) in terms.iter_mut().enumerate().skip(known) {
             let mut others = with.terms.clone();
             let own = others.remove(k);
             let round = self.round(&self.model(&others)?, self.effort.surrogates);
             let mut judged = round.judged.iter();
             let again = judged.find(|j| j.candidate.id() == own.id() && j.p_value <= LEVEL);
             let Some(again) = again else { return Ok(None) };
-            terms[k] = Term {
+            *term = Term {
                 point: own.point,
                 beside: others.iter().map(Term::id).collect(),
                 ..Term::of(again, round.rivals(again))
