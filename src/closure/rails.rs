@@ -86,15 +86,14 @@ pub fn of(c: &Channels, rows: &[bool]) -> Option<Rails> {
     let stands = |v: &f64| at(upper_dps, *v) || at(lower_dps, *v);
     let stand: Vec<bool> = output.iter().map(stands).collect();
     // Readings of an output that is coarser than its noise agree wherever it rests.
-    let pairs = c.error_dps.iter().zip(rows).zip(&stand);
-    let free = pairs.filter(|((_, row), stands)| **row && !**stands);
-    let free: Vec<f64> = free.map(|((e, _), _)| *e).collect();
+    let not_at_one = |values: &[f64]| -> Vec<f64> {
+        let pairs = values.iter().zip(rows).zip(&stand);
+        let free = pairs.filter(|((_, row), stands)| **row && !**stands);
+        free.map(|((v, _), _)| *v).collect()
+    };
+    let free = not_at_one(&c.error_dps);
     let coarse = in_steps(&gaps, resolution) && stats::difference_noise(&free) < resolution;
-    let pairs = output.iter().zip(rows).zip(&stand);
-    let short: Vec<f64> = pairs
-        .filter(|((_, row), stands)| **row && !**stands)
-        .map(|((v, _), _)| *v)
-        .collect();
+    let short = not_at_one(&output);
     // The bias may go far from row to row.
     let width = NEAR * stats::curvature_noise(&free);
     // Else the rate is not that of this output.
