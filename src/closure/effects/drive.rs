@@ -219,6 +219,12 @@ impl Candidate for Coupling {
         true
     }
 
+    fn admits(&self, point: &Point, beta: &[f64]) -> bool {
+        // Beside a bias that hardly moves, a small pull would have to be a huge one.
+        let small = beta.first().filter(|_| point.theta.is_empty());
+        small.is_none_or(|pull_u| pull_u.abs() <= MOST_PULL_U)
+    }
+
     fn correction(&self, c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
         let columns = self.columns(c, &f.bias.clone(), &e.point);
         f.surface(c, "agc", &columns, &e.beta)
@@ -239,6 +245,9 @@ impl Candidate for Coupling {
 /// Courses of the pull: the drive gain's first and second power, and those of the amplitude, which is the gain without Q's
 /// course in temperature.
 const PULLS: usize = 4;
+
+/// Most pull per unit of the gain, in units of u: three times the largest that is plausible, over a range of a milliradian.
+const MOST_PULL_U: f64 = 1000.0;
 
 /// Largest pulls, in units of u, at which the search looks.
 const LARGE: [f64; 6] = [0.15, -0.15, 0.4, -0.4, 1.0, -1.0];

@@ -187,6 +187,12 @@ pub trait Candidate: Send + Sync {
         (Vec::new(), Vec::new())
     }
 
+    /// The shape that the rows `seen` do not tell from the given one, and that claims least of the others: a dead band no
+    /// wider than the rates that showed it.
+    fn least(&self, _c: &Channels, _point: &Point, _seen: &[bool]) -> Option<Point> {
+        None
+    }
+
     /// The columns of a shape, one value a row.
     fn columns(&self, c: &Channels, bias: &Bias, point: &Point) -> Vec<Vec<f64>>;
 

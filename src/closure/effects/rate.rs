@@ -271,6 +271,35 @@ fn odd_part(point: &Point) -> f64 {
 /// Dead zone around rate zero.
 struct Deadband;
 
+/// Most edges of a dead band that are tried, and how many to each side of one that is near.
+const MOST_EDGES: usize = 300;
+const NEAREST_EDGES: usize = 20;
+
+/// Magnitudes of rates, in order, each once, without 0.
+fn magnitudes(rates: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut sizes: Vec<f64> = rates.map(f64::abs).filter(|s| *s > 0.0).collect();
+    sizes.sort_by(f64::total_cmp);
+    sizes.dedup();
+    sizes
+}
+
+/// Those of the rows that are seen.
+fn seen_magnitudes(c: &Channels, seen: &[bool]) -> Vec<f64> {
+    let rate = c.column("rate_dps").unwrap_or(&[]);
+    magnitudes(rate.iter().zip(seen).filter(|(_, s)| **s).map(|(r, _)| *r))
+}
+
+/// A rate is within a half width that is equal to it, whatever logarithms do.
+const ROUNDING: f64 = 1e-9;
+
+/// Logarithms of half widths, one between any two neighbouring magnitudes.
+fn between(sizes: &[f64]) -> Vec<f64> {
+    sizes
+        .windows(2)
+        .map(|w| 0.5 * (w[0].ln() + w[1].ln()))
+        .collect()
+}
+
 const DEADBAND: Sheet = Sheet {
     id: "output_deadband",
     physics: "below a threshold the loop does not answer to rate; beyond it the full rate, or what \
@@ -297,14 +326,7 @@ impl Candidate for Deadband {
 
     fn points(&self, c: &Channels) -> Vec<Point> {
         // Half widths between neighbouring magnitudes that were applied.
-        let mut sizes: Vec<f64> = c
-            .column("rate_dps")
-            .unwrap_or(&[])
-            .iter()
-            .map(|r| r.abs())
-            .collect();
-        sizes.retain(|s| *s > 0.0);
-        sizes.sort_by(f64::total_cmp);
+        let sizes = magnitudes(c.column("rate_dps").unwrap_or(&[]).iter().copied());
         let least = sizes.first().copied().unwrap_or(0.0).max(1e-4 * top(c));
         let small = 0.3 * stats::difference_noise(&c.error_dps);
         let mut out = Vec::new();
@@ -334,6 +356,36 @@ impl Candidate for Deadband {
             }
         };
         vec![map(c.column("rate_dps").unwrap_or(&[]), missing)]
+    }
+
+    fn fine(&self, c: &Channels, _point: &Point, seen: &[bool]) -> Vec<Point> {
+        // What jumps at its edge changes where a rate comes within: between two magnitudes, all are alike.
+        let sizes = seen_magnitudes(c, seen);
+        let edges = between(&sizes);
+        let every = edges.len().div_ceil(MOST_EDGES).max(1);
+        let jumps = edges.iter().step_by(every).map(|d| Point::at(0, &[*d]));
+        let subtracts = self.points(c).into_iter().filter(|p| p.form == 1);
+        jumps.chain(subtracts).collect()
+    }
+
+    fn stairs(&self, c: &Channels, point: &Point) -> (Vec<Vec<Point>>, Vec<Point>) {
+        if point.form == 1 {
+            return (Vec::new(), Vec::new());
+        }
+        let edges = between(&magnitudes(
+            c.column("rate_dps").unwrap_or(&[]).iter().copied(),
+        ));
+        let own = edges.partition_point(|d| *d < point.theta[0]);
+        let near = own.saturating_sub(NEAREST_EDGES)..edges.len().min(own + NEAREST_EDGES);
+        let along = edges[near].iter().map(|d| Point::at(0, &[*d]));
+        (vec![along.collect()], Vec::new())
+    }
+
+    fn least(&self, c: &Channels, point: &Point, seen: &[bool]) -> Option<Point> {
+        let sizes = seen_magnitudes(c, seen);
+        let within = sizes.partition_point(|s| s.ln() <= point.theta[0]);
+        let widest = sizes.get(within.checked_sub(1)?)?.ln();
+        (point.form == 0).then(|| Point::at(0, &[widest + ROUNDING]))
     }
 
     fn spacing(&self, _c: &Channels, _point: &Point) -> Vec<f64> {

@@ -31,6 +31,23 @@ impl Blocks {
         })
     }
 
+    /// The same blocks with other weights, and their timeline.
+    ///
+    /// # Errors
+    /// Times that do not advance from block to block.
+    pub fn reweighted(
+        &self,
+        times_s: &[f64],
+        weights: Vec<f64>,
+    ) -> Result<(Self, Timeline), Unusable> {
+        let blocks = Blocks {
+            weights,
+            ..self.clone()
+        };
+        let line = Timeline::new(&blocks_times(times_s, &blocks), blocks.white_factor())?;
+        Ok((blocks, line))
+    }
+
     /// Variance factor of each mean: 1 over the weight in it.
     fn white_factor(&self) -> Vec<f64> {
         self.each(|rows| 1.0 / self.weights[rows].iter().sum::<f64>())

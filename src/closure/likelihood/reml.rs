@@ -76,6 +76,30 @@ impl Fit {
         }
     }
 
+    /// The same record and noise with every row of `used` at full weight, nothing fitted again: only
+    /// [`Fit::problem`]'s timeline, [`Fit::row_weights`] and [`Fit::reduce`] are those of the new weights.
+    ///
+    /// # Errors
+    /// Times that do not advance.
+    pub fn unspiked(&self, times_s: &[f64], used: &[bool]) -> Result<Fit, Unusable> {
+        let weights: Vec<f64> = used.iter().map(|u| f64::from(u8::from(*u))).collect();
+        let mut out = self.clone();
+        match &self.decimated {
+            Some(blocks) => {
+                let (blocks, line) = blocks.reweighted(times_s, weights.clone())?;
+                out.problem.line = line;
+                out.decimated = Some(blocks);
+            }
+            None => {
+                let full = |u: &bool| if *u { 1.0 } else { f64::INFINITY };
+                let factors = used.iter().map(full).collect();
+                out.problem.line = self.problem.line.with_white_factor(factors);
+            }
+        }
+        out.row_weights = weights;
+        Ok(out)
+    }
+
     /// The same record, weights and blocks with further regressors (already reduced): noise
     /// estimated again from the lattice on.
     pub fn with_columns(&self, further: &[Vec<f64>], options: &Options) -> Evaluated {

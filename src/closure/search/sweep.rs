@@ -7,7 +7,8 @@ use super::{LEVEL, MOST_RIVALS, Model, Search, Term, stairs};
 use crate::closure::effects::{Bias, Point, map};
 use crate::closure::likelihood::Unusable;
 use crate::closure::likelihood::linear::add_scaled;
-use crate::closure::likelihood::noise::{Shape, Timeline};
+use crate::closure::likelihood::noise::Shape;
+use crate::closure::likelihood::reml::Fit;
 
 /// Net gain by which another candidate takes a term's place.
 const BETTER: f64 = 1.5;
@@ -133,19 +134,17 @@ impl Search<'_> {
             if term.evident {
                 continue;
             }
-            let line = model.fit.problem.line.clone();
-            let mut ways = vec![(line.clone(), model.fit.at.shape)];
-            if self.spikes(&model.fit) > 0 && model.fit.decimated.is_none() {
-                let full = |u: &bool| if *u { 1.0 } else { f64::INFINITY };
-                let factors = self.used.iter().map(full).collect();
-                ways.push((line.with_white_factor(factors), model.fit.at.shape));
+            let mut ways = vec![(model.fit.clone(), model.fit.at.shape)];
+            if self.spikes(&model.fit) > 0 {
+                let full = model.fit.unspiked(&self.channels.time_s, &self.used)?;
+                ways.push((full, model.fit.at.shape));
             }
             if self.wander(&model) > WANDER {
                 // A shape that is off makes the very wander under which it seems to be right.
-                ways.push((line, WHITE));
+                ways.push((model.fit.clone(), WHITE));
             }
-            for (line, shape) in ways {
-                let point = self.repolished(&model, k, (line, shape));
+            for (fit, shape) in ways {
+                let point = self.repolished(&model, k, (&fit, shape));
                 if point == model.terms[k].point {
                     continue;
                 }
@@ -164,22 +163,21 @@ impl Search<'_> {
         Ok(model)
     }
 
-    /// The best point of one term on a timeline with a noise, the others held.
-    fn repolished(&self, model: &Model, k: usize, (line, shape): (Timeline, Shape)) -> Point {
+    /// The best point of one term on a fit's rows and weights under a noise, the others held.
+    fn repolished(&self, model: &Model, k: usize, (fit, shape): (&Fit, Shape)) -> Point {
         let c = self.channels;
-        let mut problem = model.fit.problem.clone();
-        problem.line = line;
-        problem.y = model.fit.reduce(&c.error_dps);
+        let mut problem = fit.problem.clone();
+        problem.y = fit.reduce(&c.error_dps);
         problem.columns = super::declared(c)
             .iter()
-            .map(|c| model.fit.reduce(c))
+            .map(|c| fit.reduce(c))
             .collect();
         for (j, other) in model.terms.iter().enumerate() {
             if j == k {
                 continue;
             }
             for column in other.candidate.columns(c, &model.acting, &other.point) {
-                let column = model.fit.reduce(&column);
+                let column = fit.reduce(&column);
                 if other.candidate.is_sized(&other.point) {
                     add_scaled(&mut problem.y, -1.0, &column);
                 } else {
@@ -187,7 +185,7 @@ impl Search<'_> {
                 }
             }
         }
-        let bench = Bench::of_problem(&model.fit, &problem, shape);
+        let bench = Bench::of_problem(fit, &problem, shape);
         let term = &model.terms[k];
         let candidate = term.candidate.as_ref();
         // A shape that acts on the bias moves it: each is judged by the bias that is there beside it.

@@ -74,6 +74,7 @@ impl Search<'_> {
         model = self.without_likenesses(model)?;
         model = self.without_accidents(model, found)?;
         model = self.without_chance(model, found)?;
+        model = self.modest(model)?;
         let mut k = 0;
         while k < model.terms.len() {
             let term = model.terms[k].clone();
@@ -96,6 +97,32 @@ impl Search<'_> {
                 model = without;
             } else {
                 k += 1;
+            }
+        }
+        Ok(model)
+    }
+
+    /// Shapes that fitted rows leave open where held-out ones contradict them: as small as the fitted rows allow. In the
+    /// middle of what is open a threshold errs least in the mean; there it may err where nothing said
+    /// that the effect is.
+    fn modest(&self, mut model: Model) -> Result<Model, Unusable> {
+        for k in 0..model.terms.len() {
+            let term = &model.terms[k];
+            let Some(point) = term
+                .candidate
+                .least(self.channels, &term.point, &self.used)
+                .filter(|_| !term.evident)
+            else {
+                continue;
+            };
+            let mut terms = model.terms.clone();
+            terms[k].point = point;
+            let mut others = model.terms.clone();
+            others.remove(k);
+            let square = |m: &Model| self.heldout_error(m, &model).square;
+            let (own, least) = (square(&model), self.model(&terms)?);
+            if own > square(&self.model(&others)?) && own > square(&least) {
+                model = least;
             }
         }
         Ok(model)
