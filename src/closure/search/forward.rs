@@ -1,6 +1,6 @@
 //! Forward steps.
 
-use super::judge::{Judged, Round};
+use super::judge::{Judged, PRICE, Round};
 use super::memo::Memo;
 use super::{Found, LEVEL, MOST_RIVALS, Model, Search, Term};
 use crate::closure::likelihood::{Unusable, reml};
@@ -134,8 +134,9 @@ impl Search<'_> {
 
     /// The next step from a round.
     fn next(&self, model: &Model, round: &Round) -> Result<Next, Unusable> {
-        let significant: Vec<&Judged> =
-            round.judged.iter().filter(|j| j.p_value <= LEVEL).collect();
+        // A name that gains no more than it costs is no better than none, however rare that is by chance.
+        let called_for = |j: &&Judged| j.p_value <= LEVEL && (j.net > PRICE || !j.is_named());
+        let significant: Vec<&Judged> = round.judged.iter().filter(called_for).collect();
         let leader = significant.first();
         let begins = model.terms.iter().all(|t| t.evident);
         if let Some(opening) = self.beginning.borrow().opening.as_ref().filter(|_| begins)
