@@ -345,6 +345,9 @@ fn slope_noise(k: usize) -> f64 {
 /// deviate's magnitude: where the course bends all the time, its smallest differences are least the course's.
 const QUANTILES: [(f64, f64); 2] = [(0.5, 0.674_489_75), (0.2, 0.253_347_1)];
 
+/// Share of the usual noise that is none.
+const STILL: f64 = 1e-6;
+
 /// White noise of a reading, from its third differences (a smooth course has none).
 pub fn reading_noise(values: &[f64]) -> f64 {
     let mut sizes: Vec<f64> = values
@@ -358,8 +361,12 @@ pub fn reading_noise(values: &[f64]) -> f64 {
         Some(size / (deviate * 20f64.sqrt()))
     };
     let [most, least] = QUANTILES.map(|q| noise(q).unwrap_or(0.0));
-    // A coarse reading stands still in many rows, which says nothing of its noise.
-    if least > 0.0 { most.min(least) } else { most }
+    // A coarse reading stands still in many rows (but for the rounding of its scale), which says nothing of its noise.
+    if least > STILL * most {
+        most.min(least)
+    } else {
+        most
+    }
 }
 
 /// The narrowest half width at which a slope's noise is small beside the slopes themselves.
@@ -440,6 +447,24 @@ pub fn smoothed(time_s: &[f64], values: &[f64]) -> Vec<f64> {
         1 => values.to_vec(),
         k => local(time_s, values, k).0,
     }
+}
+
+/// Most that a mean over rows may take away, in units of the reading's noise.
+const NOISE_ALONE: f64 = 1.1;
+
+/// The mean over as many rows as take away nothing but noise: where temperatures are wanted, not their slopes.
+pub fn averaged(time_s: &[f64], values: &[f64]) -> Vec<f64> {
+    let noise = reading_noise(values);
+    let mut out = values.to_vec();
+    for k in HALF_WIDTHS.into_iter().filter(|k| *k > 1) {
+        let mean = local(time_s, values, k).0;
+        let away: Vec<f64> = mean.iter().zip(values).map(|(m, v)| v - m).collect();
+        if stats::rms(&away) > NOISE_ALONE * noise {
+            break;
+        }
+        out = mean;
+    }
+    out
 }
 
 /// Rate of change, per second, over `rows` rows to each side.

@@ -6,7 +6,7 @@
 //! they matter they are taken out before a physical cause is looked for. The temperature itself is smooth, so it is
 //! the smoothest course that stays within the cell of every reading.
 
-use super::channels::Channels;
+use super::channels::{Channels, averaged};
 use super::search::declared_by;
 use super::staircase::Staircase;
 use crate::design::Design;
@@ -54,7 +54,10 @@ pub fn course(c: &Channels, design: &Design) -> Option<Course> {
         .collect();
     let artefact_rms_dps = stats::rms(&artefact);
     let matters = artefact_rms_dps > MATTERS * stats::difference_noise(&smooth);
-    (matters && stats::rms(&smooth) < stats::rms(&rounded)).then_some(Course {
+    // Noise of more than a step leads from cell to cell, and is no rounding: a mean over rows follows the temperature then.
+    let (_, mean) = declared_by(&averaged(&c.time_s, &c.u), &c.error_dps);
+    let others = stats::rms(&rounded).min(stats::rms(&mean));
+    (matters && stats::rms(&smooth) < others).then_some(Course {
         step,
         reading,
         artefact_rms_dps,

@@ -66,6 +66,7 @@ impl Search<'_> {
         };
         let of = |t: &Term| reduce(t.candidate.columns(c, &model.acting, &t.point));
         let mut base = reduce(declared(c));
+        base.extend(self.blur.iter().map(|c| fit.reduce(c)));
         for (k, other) in model.terms.iter().enumerate() {
             if k != term {
                 base.extend(of(other));

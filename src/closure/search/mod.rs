@@ -22,6 +22,7 @@ pub mod judge;
 mod memo;
 mod model;
 mod otherwise;
+mod reading;
 pub mod refine;
 mod reported;
 mod rounding;
@@ -160,6 +161,8 @@ pub struct Search<'a> {
     pub effort: Effort,
     /// Levels at which the output stands.
     pub rails: Option<Rails>,
+    /// Regressors of every fit that are no part of a model: what the thermometer's readings err by.
+    blur: Vec<Vec<f64>>,
     candidates: Vec<Arc<dyn Candidate>>,
     models: Memo<Arc<Model>>,
     rounds: Memo<Arc<Round>>,
@@ -190,6 +193,7 @@ impl<'a> Search<'a> {
             heldout: both(&split.heldout),
             effort,
             rails,
+            blur: reading::errors_of(channels),
             candidates,
             models: Memo::default(),
             rounds: Memo::default(),
@@ -361,6 +365,10 @@ impl<'a> Search<'a> {
             true => clipped.iter().map(|c| *c > 0.0).collect(),
             false => Vec::new(),
         };
+        for column in &self.blur {
+            let off = |(v, held): (&f64, &f64)| v * (1.0 - held);
+            free.push(column.iter().zip(&clipped).map(off).collect());
+        }
         if clips {
             // The noise needs a constant over all rows, clipped ones too.
             free.push(clipped);

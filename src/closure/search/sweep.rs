@@ -168,10 +168,9 @@ impl Search<'_> {
         let c = self.channels;
         let mut problem = fit.problem.clone();
         problem.y = fit.reduce(&c.error_dps);
-        problem.columns = super::declared(c)
-            .iter()
-            .map(|c| fit.reduce(c))
-            .collect();
+        let declared = super::declared(c);
+        let beside = declared.iter().chain(&self.blur);
+        problem.columns = beside.map(|c| fit.reduce(c)).collect();
         for (j, other) in model.terms.iter().enumerate() {
             if j == k {
                 continue;

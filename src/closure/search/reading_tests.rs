@@ -1,0 +1,75 @@
+//! A bias that follows the temperature, and a thermometer whose readings have noise.
+
+use super::*;
+use crate::closure::search::{Effort, Search, Term};
+use crate::closure::synthetic::{Random, triangle};
+use std::collections::BTreeMap;
+
+const ROWS: usize = 1000;
+const NOISE_DPS: f64 = 0.1;
+
+/// A record of a bias in the temperature; its thermometer's noise makes `share` of the output's noise. A quadrature wanders
+/// beside it that nothing follows.
+fn record(seed: u64, share: f64, step_k: f64) -> Channels {
+    let mut random = Random::new(seed);
+    let degc = [triangle(ROWS / 2), triangle(ROWS / 2)].concat();
+    let output = |u: f64| 2.0 - 1.5 * u + 0.4 * u * u;
+    let rate: Vec<f64> = degc
+        .iter()
+        .map(|t| output(t / 35.0 - 1.0) + NOISE_DPS * random.normal())
+        .collect();
+    // The slope is 1.6 deg/s per unit of u, rms.
+    let noise_k = share * NOISE_DPS / 1.6 * 35.0;
+    let read = |t: f64| (t / step_k).round() * step_k;
+    let die: Vec<f64> = degc
+        .iter()
+        .map(|t| read(t + noise_k * random.normal()))
+        .collect();
+    let mut quadrature_dps = -20.0;
+    let quadrature: Vec<f64> = (0..ROWS)
+        .map(|_| {
+            quadrature_dps += 0.3 * random.normal();
+            quadrature_dps
+        })
+        .collect();
+    let columns = BTreeMap::from([
+        ("rate_out_dps".to_owned(), rate),
+        ("die_degc".to_owned(), die),
+        ("quad_dps".to_owned(), quadrature),
+    ]);
+    let time_s: Vec<f64> = (0..ROWS).map(|k| 10.0 * k as f64).collect();
+    Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap()
+}
+
+#[test]
+fn what_readings_err_by_is_no_effect_of_the_temperature() {
+    for (seed, share, step_k) in [
+        (1, 0.5, 1e-6),
+        (2, 0.5, 1e-6),
+        (3, 0.4, 1e-6),
+        (4, 0.5, 0.5),
+    ] {
+        let c = record(seed, share, step_k);
+        assert_eq!(errors_of(&c).len(), 2, "{seed}");
+        let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+        let found = search.run().unwrap();
+        let names: Vec<String> = found.terms.iter().map(Term::id).collect();
+        assert_eq!((names, found.left), (Vec::new(), None), "{seed}");
+        // The model is the declared one and no more: it predicts by the reading.
+        let model = search.model(&[]).unwrap();
+        assert_eq!(model.columns.len(), 3);
+    }
+}
+
+#[test]
+fn readings_that_hardly_err_cost_nothing() {
+    assert!(errors_of(&record(1, 0.001, 1e-6)).is_empty());
+    // A thermometer that stands still errs by nothing.
+    let columns = BTreeMap::from([
+        ("rate_out_dps".to_owned(), vec![0.0, 1.0, 0.5, 0.2]),
+        ("die_degc".to_owned(), vec![20.0; 4]),
+    ]);
+    let time_s = [0.0, 1.0, 2.0, 3.0];
+    let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+    assert!(errors_of(&c).is_empty());
+}
