@@ -12,6 +12,10 @@ pub struct Pickup {
     pub further: bool,
 }
 
+/// Ids of a tone with a name and of one without.
+pub const NAMED: &str = "periodic_pickup";
+pub const FURTHER: &str = "outside:tone";
+
 /// Fewest periods over the record of a tone with a name. What wanders slowly, a channel that was not recorded
 /// say, turns two or three times in a record as well; that it comes back a fourth time is a prediction.
 const NAMED_PERIODS: f64 = 4.0;
@@ -22,7 +26,7 @@ pub fn returns(c: &Channels, frequency_hz: f64) -> bool {
 }
 
 const PICKUP: Sheet = Sheet {
-    id: "periodic_pickup",
+    id: NAMED,
     physics: "mains, a switching supply or a spur of the oscillator beats with the sampling and \
               comes down to a slow sine",
     equation: "a sin(2 pi f t) + b cos(2 pi f t), f modulo the rate of the rows",
@@ -53,12 +57,7 @@ impl Candidate for Pickup {
     }
 
     fn id(&self) -> String {
-        let id = if self.further {
-            "outside:tone"
-        } else {
-            PICKUP.id
-        };
-        id.to_owned()
+        [NAMED, FURTHER][usize::from(self.further)].to_owned()
     }
 
     fn named(&self) -> bool {

@@ -68,6 +68,7 @@ impl Search<'_> {
             let before: Vec<String> = model.terms.iter().map(Term::id).collect();
             model = self.united(self.spared(self.swept(model)?)?)?;
             model = self.without_undone(model)?;
+            model = self.one_tone_named(model)?;
             model = self.proven(model)?;
             if model.terms.iter().map(Term::id).eq(before) {
                 break;

@@ -34,6 +34,9 @@ const NOTHING: f64 = 1e-4;
 /// it is said that something is left: a walk of the rate, or a cause that wanders as one.
 const MUCH: f64 = 3.0;
 
+/// The same beside names: a part of a cause that nobody knows may look like a name, and the rest like slow noise.
+const MUCH_BESIDE: f64 = 2.2;
+
 /// How a search begins.
 #[derive(Clone, Default)]
 pub(super) struct Beginning {
@@ -53,7 +56,12 @@ impl Search<'_> {
     pub fn run(&self) -> Result<Found, Unusable> {
         let mut found = self.run_any()?;
         let model = self.model(&found.terms)?;
-        let wanders = || self.wander(&model).max(self.roughly(&model)) > MUCH;
+        let most = if found.terms.is_empty() {
+            MUCH
+        } else {
+            MUCH_BESIDE
+        };
+        let wanders = || self.wander(&model) > MUCH || self.roughly(&model) > most;
         if found.left.is_none() && (self.missed(&model) || wanders()) {
             found.left = Some("time_s".to_owned());
         }
