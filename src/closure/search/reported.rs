@@ -5,9 +5,11 @@ use super::{Found, LEVEL, MOST_RIVALS, Model, Search, Term};
 use crate::closure::likelihood::Unusable;
 
 /// Most that the steps may leave of the held-out error without them; the same where more is left than they
-/// explain: what stands beside something larger and unknown may be a part of that.
+/// explain: what stands beside something larger and unknown may be a part of that. And where a clip is seen without a fit:
+/// held-out rows that it does not hold say nothing of it, but the declared bias beside it is another one.
 const ABOVE: f64 = 1.015;
 const BESIDE: f64 = 0.87;
+const EVIDENT: f64 = 1.0195;
 
 /// Slow noise, rms in units of the white, from which on a name needs more than the usual probability, and the powers of
 /// ten that each further unit asks for: what was not recorded wanders as slow noise does, but probabilities are reckoned
@@ -90,11 +92,12 @@ impl Search<'_> {
         };
         let of_before = self.heldout_error(&before, &before).square;
         let limit = |found: &Found| {
-            let mut terms = found.terms.iter();
-            let sure = terms.any(|t| t.p_value <= SURELY || t.evident);
-            let most = match found.left.is_some() && !sure {
-                true => BESIDE,
-                false => ABOVE,
+            let evident = found.terms.iter().any(|t| t.evident);
+            let sure = found.terms.iter().any(|t| t.p_value <= SURELY);
+            let most = match (evident, found.left.is_some() && !sure) {
+                (true, _) => EVIDENT,
+                (_, true) => BESIDE,
+                _ => ABOVE,
             };
             of_before * most.powi(2)
         };
