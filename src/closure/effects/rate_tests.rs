@@ -70,3 +70,69 @@ fn a_hard_dead_band_is_found_where_a_sweep_passes_its_edge_row_by_row() {
         );
     }
 }
+
+/// Channels of a dead band that lets the full rate through beyond `half_dps`, at given rates.
+fn banded(rates: &[f64], half_dps: f64, noise_dps: f64, seed: u64) -> Channels {
+    let mut random = Random::new(seed);
+    let rows = rates.len();
+    let degc = [triangle(rows / 2), triangle(rows - rows / 2)].concat();
+    let passed = |o: f64| if o.abs() <= half_dps { 0.0 } else { o };
+    let pairs = degc.iter().zip(rates);
+    let output = pairs.map(|(t, o)| 0.3 - 0.01 * t + passed(*o) + noise_dps * random.normal());
+    let columns = BTreeMap::from([
+        ("rate_out_dps".to_owned(), output.collect()),
+        ("rate_dps".to_owned(), rates.to_vec()),
+        ("die_degc".to_owned(), degc.clone()),
+    ]);
+    let time_s: Vec<f64> = (0..rows).map(|k| 10.0 * k as f64).collect();
+    Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap()
+}
+
+#[test]
+fn a_few_rows_at_the_edge_of_a_dead_band_are_no_spikes_in_a_long_record_either() {
+    // Fast sweeps through a narrow band: few rows near its edge, each far off where the edge is wrong.
+    for (seed, half_dps) in [(1, 1.05), (2, 0.62), (3, 1.37), (4, 0.9)] {
+        let rates: Vec<f64> = (0..1445)
+            .map(|k| 7.3 * (k as f64 * 0.137 + seed as f64).sin())
+            .collect();
+        let c = banded(&rates, half_dps, 0.02, seed);
+        let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+        let found = search.run().unwrap();
+        let names: Vec<String> = found.terms.iter().map(|t| t.id()).collect();
+        assert_eq!(
+            (names, found.left),
+            (vec!["output_deadband".to_owned()], None),
+            "{seed}"
+        );
+        // No fitted row is on the wrong side.
+        let found_dps = found.terms[0].point.theta[0].exp();
+        let wrong = |o: &f64| (o.abs() <= found_dps) != (o.abs() <= half_dps);
+        let pairs = rates.iter().zip(&search.used);
+        let off = pairs.filter(|(o, used)| **used && wrong(o)).count();
+        assert_eq!(off, 0, "{seed}: {found_dps} {half_dps}");
+    }
+}
+
+#[test]
+fn a_dead_band_claims_no_more_than_fitted_rows_show_where_held_out_ones_contradict() {
+    let half_dps = 0.15;
+    // Rates within the band, just outside of it and far outside; those just outside in held-out rows alone.
+    let far = |k: usize| [2.1, -1.7, 0.05, -2.3, 1.9, -0.06][k / 6 % 6];
+    let rates: Vec<f64> = (0..600).map(far).collect();
+    let held = banded(&rates, half_dps, 0.008, 5).split().unwrap().heldout;
+    let near = |(o, held): (&f64, &bool)| match *held {
+        true => 2.0 * half_dps * o.signum(),
+        false => *o,
+    };
+    let rates: Vec<f64> = rates.iter().zip(&held).map(near).collect();
+    let c = banded(&rates, half_dps, 0.008, 5);
+    let split = c.split().unwrap();
+    let search = Search::new(&c, &split, Effort::default(), Vec::new());
+    let contradicted = |i: usize| split.heldout[i] && (0.2..1.0).contains(&rates[i].abs());
+    assert!((0..600).filter(|i| contradicted(*i)).count() > 50);
+    let found = search.run().unwrap();
+    let names: Vec<String> = found.terms.iter().map(|t| t.id()).collect();
+    assert_eq!(names, ["output_deadband"]);
+    let found_dps = found.terms[0].point.theta[0].exp();
+    assert!((0.06..0.0601).contains(&found_dps), "{found_dps}");
+}
