@@ -1,7 +1,8 @@
 //! What stands for channels with holes, and which way a temperature goes.
 
-use super::channels::{Channels, filled};
+use super::channels::{Channels, averaged, filled, reading_noise};
 use super::synthetic::Random;
+use crate::record::stats;
 use std::collections::BTreeMap;
 
 fn channels(time_s: &[f64], degc: Vec<f64>, on_s: Option<Vec<f64>>) -> Channels {
@@ -137,4 +138,30 @@ fn a_hole_on_a_slope_lies_on_the_line_and_a_hole_at_a_step_on_one_of_its_sides()
     let noisy = [0.0, 1.0, 0.0, nan, 2.0, 0.0, 1.0, 0.0];
     assert_eq!(filled(&time_s, &noisy).unwrap()[3], 1.0);
     assert_eq!(filled(&time_s, &[nan; 8]), None);
+}
+
+#[test]
+fn a_coarse_reading_has_the_noise_of_its_steps_and_a_mean_takes_away_noise_alone() {
+    let mut random = Random::new(7);
+    let rows = 2000;
+    let time_s: Vec<f64> = (0..rows).map(|k| 10.0 * k as f64).collect();
+    let course: Vec<f64> = (0..rows).map(|k| (k as f64 / 90.0).sin()).collect();
+    // Steps of an odd fraction, as a scaled reading has them: a row that stands still does so but for rounding.
+    let step = 0.25 / 7.3;
+    let read = |v: f64| ((v / step).round() * 0.25 + 31.7) / 7.3 - 31.7 / 7.3;
+    let values: Vec<f64> = course
+        .iter()
+        .map(|v| read(v + 0.5 * step * random.normal()))
+        .collect();
+    let noise = reading_noise(&values);
+    // Half a step, and what rounding adds.
+    assert!((0.4 * step..0.8 * step).contains(&noise), "{noise} {step}");
+    let off = |mean: &[f64]| {
+        let off: Vec<f64> = mean.iter().zip(&course).map(|(m, v)| m - v).collect();
+        stats::rms(&off)
+    };
+    let mean = averaged(&time_s, &values);
+    assert!(off(&mean) < 0.4 * off(&values), "{}", off(&mean));
+    // Without noise there is nothing to take away.
+    assert!(off(&averaged(&time_s, &course)) < 1e-4);
 }

@@ -312,6 +312,29 @@ mod tests {
     }
 
     #[test]
+    fn noise_of_a_step_is_no_rounding() {
+        let design = crate::design::reader::read(None).unwrap();
+        let rows = 1500;
+        let [noise, reading] = [3, 4].map(|k| Stream::new(k, 0).normals(rows));
+        let seen = |noise_k: f64| {
+            let degc = |i: usize| 30.0 + 20.0 * (TAU * 1.5 * i as f64 / rows as f64).sin();
+            let rate = |i: usize| 3.0 - 0.2 * degc(i) + 0.02 * noise[i];
+            let read = |i: usize| (degc(i) + noise_k * reading[i]).round();
+            let columns = std::collections::BTreeMap::from([
+                ("rate_out_dps".to_owned(), (0..rows).map(rate).collect()),
+                ("die_degc".to_owned(), (0..rows).map(read).collect()),
+            ]);
+            let time_s: Vec<f64> = (0..rows).map(|i| 10.0 * i as f64).collect();
+            course(
+                &Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap(),
+                &design,
+            )
+        };
+        assert!(seen(0.0).is_some());
+        assert!(seen(1.0).is_none());
+    }
+
+    #[test]
     fn fine_readings_have_no_steps() {
         let noise = Stream::new(9, 0).normals(600);
         assert_eq!(step_of(&noise), None);
