@@ -333,7 +333,7 @@ fn since_power_on(time_s: &[f64], values: &[f64]) -> Option<Vec<f64>> {
 }
 
 /// Half widths, in rows, that [`smoothed`] and [`slope`] choose from.
-const HALF_WIDTHS: [usize; 10] = [1, 2, 3, 4, 6, 9, 14, 21, 31, 46];
+const HALF_WIDTHS: [usize; 7] = [1, 2, 3, 4, 6, 9, 14];
 
 /// Noise of a slope over `k` rows to each side, relative to a reading's and per row.
 fn slope_noise(k: usize) -> f64 {
