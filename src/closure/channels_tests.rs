@@ -1,6 +1,7 @@
 //! What stands for channels with holes, and which way a temperature goes.
 
-use super::channels::{Channels, averaged, filled, reading_noise};
+use super::channels::{Channels, filled};
+use super::smooth::{averaged, reading_noise};
 use super::synthetic::Random;
 use crate::record::stats;
 use std::collections::BTreeMap;
@@ -164,4 +165,8 @@ fn a_coarse_reading_has_the_noise_of_its_steps_and_a_mean_takes_away_noise_alone
     assert!(off(&mean) < 0.4 * off(&values), "{}", off(&mean));
     // Without noise there is nothing to take away.
     assert!(off(&averaged(&time_s, &course)) < 1e-4);
+    // Nor is a dwell of three readings noise.
+    let dwells: Vec<f64> = (0..rows).map(|k| course[k / 3 * 3]).collect();
+    let dwells: Vec<f64> = dwells.iter().map(|v| v + 1e-5 * random.normal()).collect();
+    assert_eq!(averaged(&time_s, &dwells), dwells);
 }

@@ -1,6 +1,7 @@
 //! What a record says of the temperature: the bias model's thermometer, the tangent of a phase, a thermometer on the die.
 
-use super::channels::{Channels, Other, range, scaled, smoothed};
+use super::channels::{Channels, Other, range, scaled};
+use super::smooth::smoothed;
 
 impl Channels {
     /// A further thermometer, if the record has it and it moves.

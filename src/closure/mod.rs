@@ -29,6 +29,7 @@ pub mod polynomial;
 pub mod quantised;
 pub mod rails;
 pub mod search;
+mod smooth;
 pub mod staircase;
 pub mod sweep;
 pub mod verdict;

@@ -6,8 +6,9 @@
 //! they matter they are taken out before a physical cause is looked for. The temperature itself is smooth, so it is
 //! the smoothest course that stays within the cell of every reading.
 
-use super::channels::{Channels, averaged};
+use super::channels::Channels;
 use super::search::declared_by;
+use super::smooth::averaged;
 use super::staircase::Staircase;
 use crate::design::Design;
 use crate::record::stats;

@@ -5,9 +5,10 @@ use super::{
     Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, UNUSUAL, from_log, gain,
     heated, map, spaced,
 };
-use crate::closure::channels::{Channels, lag, slope};
+use crate::closure::channels::{Channels, lag};
 use crate::closure::firmware::{Trial, Words, knots};
 use crate::closure::likelihood::linear::add_scaled;
+use crate::closure::smooth::slope;
 use crate::correction::Term;
 
 /// All of this file.

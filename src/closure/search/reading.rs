@@ -7,8 +7,9 @@
 //! known of the next reading's noise.
 
 use super::declared::{declared_by, powers};
-use crate::closure::channels::{Channels, averaged, range};
+use crate::closure::channels::{Channels, range};
 use crate::closure::likelihood::linear::add_scaled;
+use crate::closure::smooth::averaged;
 use crate::record::stats;
 
 /// Regressors of what the readings err by, in the first and the second power of u; none where a fit of all rows would not

@@ -1,0 +1,161 @@
+//! Readings without their noise: slopes, means over rows, and how large the noise is.
+
+use crate::record::stats;
+
+/// Half widths, in rows, that [`smoothed`] and [`slope`] choose from.
+const HALF_WIDTHS: [usize; 7] = [1, 2, 3, 4, 6, 9, 14];
+
+/// Noise of a slope over `k` rows to each side, relative to a reading's and per row.
+fn slope_noise(k: usize) -> f64 {
+    let k = k as f64;
+    (3.0 / (k * (k + 1.0) * (2.0 * k + 1.0))).sqrt()
+}
+
+/// Shares of the third differences below which the noise of a reading is looked at, with the share's quantile of a normal
+/// deviate's magnitude: where the course bends all the time, its smallest differences are least the course's.
+const QUANTILES: [(f64, f64); 2] = [(0.5, 0.674_489_75), (0.2, 0.253_347_1)];
+
+/// Share of the usual noise that is none.
+const STILL: f64 = 1e-6;
+
+/// White noise of a reading, from its third differences (a smooth course has none).
+pub fn reading_noise(values: &[f64]) -> f64 {
+    let mut sizes: Vec<f64> = values
+        .windows(4)
+        .map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs())
+        .collect();
+    sizes.sort_by(f64::total_cmp);
+    // The four weights' squares add up to 20.
+    let noise = |(share, deviate): (f64, f64)| {
+        let size = sizes.get((share * sizes.len() as f64) as usize)?;
+        Some(size / (deviate * 20f64.sqrt()))
+    };
+    let [most, least] = QUANTILES.map(|q| noise(q).unwrap_or(0.0));
+    // A coarse reading stands still in many rows (but for the rounding of its scale), which says nothing of its noise.
+    if least > STILL * most {
+        most.min(least)
+    } else {
+        most
+    }
+}
+
+/// The same from its first differences, of which half may be a course's.
+fn first_difference_noise(values: &[f64]) -> f64 {
+    let mut sizes: Vec<f64> = values.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
+    sizes.sort_by(f64::total_cmp);
+    let (share, deviate) = QUANTILES[0];
+    let middle = (share * sizes.len() as f64) as usize;
+    sizes
+        .get(middle)
+        .map_or(0.0, |s| s / (deviate * 2f64.sqrt()))
+}
+
+/// The narrowest half width at which a slope's noise is small beside the slopes themselves.
+fn half_width(values: &[f64]) -> usize {
+    let noise = reading_noise(values);
+    for k in HALF_WIDTHS {
+        let steps: Vec<f64> = (k..values.len().saturating_sub(k))
+            .map(|i| (values[i + k] - values[i - k]) / (2 * k) as f64)
+            .collect();
+        let rms = (steps.iter().map(|s| s * s).sum::<f64>() / steps.len().max(1) as f64).sqrt();
+        if noise * slope_noise(k) <= 0.05 * rms {
+            return k;
+        }
+    }
+    HALF_WIDTHS[HALF_WIDTHS.len() - 1]
+}
+
+/// Local straight line or parabola through `k` rows to each side: (value, slope per second) at each row.
+fn local(time_s: &[f64], values: &[f64], k: usize) -> (Vec<f64>, Vec<f64>) {
+    let n = values.len();
+    let mut out = (Vec::with_capacity(n), Vec::with_capacity(n));
+    for i in 0..n {
+        let rows = i.saturating_sub(k)..(i + k + 1).min(n);
+        let centre_s = time_s[i];
+        let unit = (time_s[rows.end - 1] - time_s[rows.start]).max(f64::MIN_POSITIVE);
+        // Normal equations of 1, x, x^2; the parabola only where five rows carry it.
+        let mut sums = [0.0f64; 5];
+        let mut right = [0.0f64; 3];
+        for j in rows.clone() {
+            let x = (time_s[j] - centre_s) / unit;
+            let powers = [1.0, x, x * x, x * x * x, x * x * x * x];
+            for (s, p) in sums.iter_mut().zip(powers) {
+                *s += p;
+            }
+            for (r, p) in right.iter_mut().zip(powers) {
+                *r += p * values[j];
+            }
+        }
+        let (value, slope) = solved(sums, right, rows.len() >= 5);
+        out.0.push(value);
+        out.1.push(slope / unit);
+    }
+    out
+}
+
+/// Value and slope at 0 of the least-squares parabola (or line) with moments `s` and `r`.
+fn solved(s: [f64; 5], r: [f64; 3], parabola: bool) -> (f64, f64) {
+    let line = || {
+        let det = s[0] * s[2] - s[1] * s[1];
+        if det.abs() < 1e-12 {
+            return (r[0] / s[0], 0.0);
+        }
+        (
+            (r[0] * s[2] - r[1] * s[1]) / det,
+            (s[0] * r[1] - s[1] * r[0]) / det,
+        )
+    };
+    if !parabola {
+        return line();
+    }
+    let m = nalgebra::Matrix3::new(s[0], s[1], s[2], s[1], s[2], s[3], s[2], s[3], s[4]);
+    match m.try_inverse() {
+        Some(inverse) => {
+            let b = inverse * nalgebra::Vector3::new(r[0], r[1], r[2]);
+            if b.iter().all(|v| v.is_finite()) {
+                (b[0], b[1])
+            } else {
+                line()
+            }
+        }
+        None => line(),
+    }
+}
+
+/// A column without most of its reading noise: untouched where its noise is small.
+pub fn smoothed(time_s: &[f64], values: &[f64]) -> Vec<f64> {
+    match half_width(values) {
+        1 => values.to_vec(),
+        k => local(time_s, values, k).0,
+    }
+}
+
+/// Most that a mean over rows may take away, in units of the reading's noise.
+const NOISE_ALONE: f64 = 1.1;
+
+/// The mean over as many rows as take away nothing but noise: where temperatures are wanted, not their slopes.
+pub fn averaged(time_s: &[f64], values: &[f64]) -> Vec<f64> {
+    // In dwells of a few readings most rows differ from the one before by noise alone, and third differences hardly do.
+    let still = first_difference_noise(values);
+    let third = reading_noise(values);
+    let noise = if still > STILL * third {
+        third.min(still)
+    } else {
+        third
+    };
+    let mut out = values.to_vec();
+    for k in HALF_WIDTHS.into_iter().filter(|k| *k > 1) {
+        let mean = local(time_s, values, k).0;
+        let away: Vec<f64> = mean.iter().zip(values).map(|(m, v)| v - m).collect();
+        if stats::rms(&away) > NOISE_ALONE * noise {
+            break;
+        }
+        out = mean;
+    }
+    out
+}
+
+/// Rate of change, per second, over `rows` rows to each side.
+pub fn slope(time_s: &[f64], values: &[f64], rows: usize) -> Vec<f64> {
+    local(time_s, values, rows.max(1)).1
+}
