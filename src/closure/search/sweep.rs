@@ -4,13 +4,11 @@ use super::judge::{EQUAL, Judged, PRICE, WHITE, price};
 use super::refine::{self, Bench};
 use super::reported::WANDER;
 use super::{LEVEL, MOST_RIVALS, Model, Search, Term, stairs};
-use crate::closure::effects::tone::{self, Pickup};
 use crate::closure::effects::{Bias, Point, map};
 use crate::closure::likelihood::Unusable;
 use crate::closure::likelihood::linear::add_scaled;
 use crate::closure::likelihood::noise::Shape;
 use crate::closure::likelihood::reml::Fit;
-use std::sync::Arc;
 
 /// Net gain by which another candidate takes a term's place.
 const BETTER: f64 = 1.5;
@@ -350,30 +348,6 @@ impl Search<'_> {
             }
         }
         Ok(model)
-    }
-
-    /// A further tone, which has no name, has that of a first one where that is no longer in: the first may have been a
-    /// mixture of this one and causes that came later.
-    ///
-    /// # Errors
-    /// Too few rows.
-    pub fn one_tone_named(&self, model: Model) -> Result<Model, Unusable> {
-        let barred = &self.beginning.borrow().barred;
-        let of = |id: &str| model.terms.iter().position(|t| t.id() == id);
-        let (None, Some(k)) = (of(tone::NAMED), of(tone::FURTHER)) else {
-            return Ok(model);
-        };
-        let frequency_hz = model.terms[k].point.theta[0];
-        if barred.iter().any(|id| id == tone::NAMED) || !tone::returns(self.channels, frequency_hz)
-        {
-            return Ok(model);
-        }
-        let mut terms = model.terms.clone();
-        terms[k].candidate = Arc::new(Pickup {
-            frequency_hz,
-            further: false,
-        });
-        self.model(&terms)
     }
 
     /// The model with a name more, if it is called for.

@@ -43,31 +43,3 @@ fn a_name_that_mended_anothers_shape_is_taken_back_and_a_cause_is_not() {
         ["amplitude_phase_coupling", "supply_sensitivity"]
     );
 }
-
-/// Whether a tone of so many periods, which came second and has no name, is named where the first is no longer in.
-fn is_named(periods: f64, first_is_in: bool) -> bool {
-    let pulled = Pull::default().made();
-    let c = &pulled.channels;
-    let split = c.split().expect("enough rows");
-    let search = Search::new(c, &split, Effort::default(), Vec::new());
-    let tone = |frequency_hz: f64, further: bool| {
-        let candidate: Arc<dyn Candidate> = Arc::new(Pickup {
-            frequency_hz,
-            further,
-        });
-        Term::new(candidate, Point::at(0, &[frequency_hz]))
-    };
-    let mut terms = vec![tone(periods / c.span_s(), true)];
-    terms.extend(first_is_in.then(|| tone(9.0 / c.span_s(), false)));
-    let model = search.model(&terms).expect("enough rows");
-    let model = search.one_tone_named(model).expect("enough rows");
-    model.terms[0].candidate.named()
-}
-
-#[test]
-fn a_second_tone_has_the_name_of_a_first_that_is_no_longer_in() {
-    assert!(is_named(20.0, false));
-    assert!(!is_named(20.0, true));
-    // Too few to tell from what wanders.
-    assert!(!is_named(2.0, false));
-}

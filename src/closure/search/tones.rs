@@ -1,7 +1,10 @@
 //! A search for sinusoids of its own: thousands of frequencies would drown every other candidate in
 //! multiplicity, and their null distribution is known without surrogates.
 
+use super::{Model, Search};
 use crate::closure::channels::Channels;
+use crate::closure::effects::tone::{self, Pickup};
+use crate::closure::likelihood::Unusable;
 use crate::closure::likelihood::candidates::Grid;
 use crate::closure::likelihood::linear::{dot, dots};
 use crate::closure::likelihood::null::bartlett;
@@ -9,6 +12,7 @@ use crate::closure::likelihood::reml::Fit;
 use crate::closure::likelihood::tail::chi_square_surprise;
 use crate::closure::likelihood::whiten::Whitener;
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 /// The strongest sinusoid.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -193,6 +197,32 @@ pub(super) fn power(time_s: &[f64], y: &[f64], weights: &[f64], hz: f64) -> f64 
         (s + y * sine, c + y * cosine)
     });
     s * s + c * c
+}
+
+impl Search<'_> {
+    /// A further tone, which has no name, has that of a first one where that is no longer in: the first may have been a
+    /// mixture of this one and causes that came later.
+    ///
+    /// # Errors
+    /// Too few rows.
+    pub fn one_tone_named(&self, model: Model) -> Result<Model, Unusable> {
+        let barred = &self.beginning.borrow().barred;
+        let of = |id: &str| model.terms.iter().position(|t| t.id() == id);
+        let (None, Some(k)) = (of(tone::NAMED), of(tone::FURTHER)) else {
+            return Ok(model);
+        };
+        let frequency_hz = model.terms[k].point.theta[0];
+        if barred.iter().any(|id| id == tone::NAMED) || !tone::returns(self.channels, frequency_hz)
+        {
+            return Ok(model);
+        }
+        let mut terms = model.terms.clone();
+        terms[k].candidate = Arc::new(Pickup {
+            frequency_hz,
+            further: false,
+        });
+        self.model(&terms)
+    }
 }
 
 #[cfg(test)]
