@@ -8,7 +8,7 @@
 
 use super::forward::STRANGER;
 use super::judge::{Judged, PRICE, price};
-use super::reported::WANDER;
+use super::reported::{BEYOND, WANDER};
 use super::{Found, LEVEL, Model, Search, Term};
 use crate::closure::channels::range;
 use crate::closure::likelihood::Unusable;
@@ -46,6 +46,9 @@ const MUCH_BESIDE: f64 = 2.2;
 struct Due {
     whole: f64,
     all_but: f64,
+    /// Names that the first run took and that did not hold: what they would say beside others leaves something where
+    /// it did so there.
+    refuted: Vec<String>,
 }
 
 /// How a search begins.
@@ -120,6 +123,9 @@ impl Search<'_> {
     /// shapes.
     fn due(&self, first: &Found, model: &Model, reached: &Model) -> Result<Due, Unusable> {
         let strange = reached.terms.iter().any(|t| !t.candidate.named());
+        let stands = |id: &String| first.terms.iter().any(|t| t.id() == *id);
+        let taken = reached.terms.iter().filter(|t| t.candidate.named());
+        let refuted = taken.map(Term::id).filter(|id| !stands(id)).collect();
         if !strange {
             // Names that did not hold are no measure for others.
             let measure = if first.strangers.is_empty() {
@@ -131,6 +137,7 @@ impl Search<'_> {
             return Ok(Due {
                 whole,
                 all_but: whole,
+                refuted,
             });
         }
         let worth = self.net(reached);
@@ -140,6 +147,7 @@ impl Search<'_> {
         Ok(Due {
             whole,
             all_but: whole.min(worth - ALL_BUT * gained),
+            refuted,
         })
     }
 
@@ -148,7 +156,7 @@ impl Search<'_> {
     fn run_again(&self, first: &Found, due: &Due) -> Result<Option<Found>, Unusable> {
         let (other, _) = self.run_once(true)?;
         let own = self.begin(Beginning::default());
-        let Some(mut found) = self.better(other, due.all_but)? else {
+        let Some(mut found) = self.better(other, due)? else {
             return Ok(None);
         };
         if self.net(&self.model(&found.terms)?) <= due.whole {
@@ -219,18 +227,22 @@ impl Search<'_> {
         self.beginning.replace(how)
     }
 
-    /// A run's names, if they explained everything to it and are worth more than `due`, the model that the first run came
-    /// to with all its shapes. What that run did without may have something to say beside them: then that is left.
-    fn better(&self, mut found: Found, due: f64) -> Result<Option<Found>, Unusable> {
+    /// A run's names, if they explained everything to it and are worth all but a little of what is due. What that run did
+    /// without may have something to say beside them: then that is left.
+    fn better(&self, mut found: Found, due: &Due) -> Result<Option<Found>, Unusable> {
         if found.left.is_some() || found.terms.is_empty() || !found.undecided.is_empty() {
             return Ok(None);
         }
         let model = self.model(&found.terms)?;
-        if self.net(&model) <= due || self.clustered(&model) {
+        if self.net(&model) <= due.all_but || self.clustered(&model) {
             return Ok(None);
         }
         let round = self.round(&model, self.effort.surrogates);
-        if let Some(more) = round.judged.iter().find(|j| j.p_value <= LEVEL) {
+        let says = |j: &&Judged| match due.refuted.contains(&j.candidate.id()) {
+            true => j.p_value <= BEYOND,
+            false => j.p_value <= LEVEL,
+        };
+        if let Some(more) = round.judged.iter().find(says) {
             found.left = self.channel(&Term::of(more, Vec::new()));
             self.kept_alone(&mut found)?;
         }

@@ -5,33 +5,84 @@
 //! the declared model leaves a part of the temperature's own course, and any effect of a smooth temperature seems
 //! to explain it. Beside what the readings err by, in every fit, it does not. That is no part of the model: nothing is
 //! known of the next reading's noise.
+//!
+//! What a reading errs by is known from its neighbours, where the temperature is smooth, and from other channels that follow the
+//! temperature alone and read it with less noise: a curve in such a channel would else explain what the
+//! thermometer's noise makes of any bias.
 
-use super::declared::{declared_by, powers};
+use super::declared::declared_by;
 use crate::closure::channels::{Channels, range};
-use crate::closure::likelihood::linear::add_scaled;
-use crate::closure::smooth::averaged;
+use crate::closure::effects::map;
+use crate::closure::likelihood::linear::Basis;
+use crate::closure::smooth::{averaged, reading_noise};
 use crate::record::stats;
 
-/// Regressors of what the readings err by, in the first and the second power of u; none where a fit of all rows would not
-/// see them (a likelihood that rises by less than a half).
+/// Powers of a channel that make the temperature of it.
+const POWERS: i32 = 6;
+
+/// Most that the temperature by another channel may differ from the reading, rms in units of the reading's noise: it says what
+/// the reading errs by only where most of the difference is the reading's.
+const SAME: f64 = 1.25;
+
+/// Regressors of what the readings err by, times powers of u: those of the declared bias's slope where the neighbours tell, and
+/// two more where another channel does, so that what other effects of the temperature make of the noise is among them.
+/// None where a fit of all rows would not see them (a likelihood that rises by less than a half).
 pub fn errors_of(c: &Channels) -> Vec<Vec<f64>> {
     let (low, high) = range(&c.u);
-    let mean = averaged(&c.time_s, &c.u);
-    if high <= low || c.u == mean {
+    if high <= low {
         return Vec::new();
     }
-    let (bias, rest) = declared_by(&mean, &c.error_dps);
-    let pairs = c.u.iter().zip(&mean);
+    let mean = averaged(&c.time_s, &c.u);
+    let mut out = errors(c, &mean, 2);
+    out.extend(by_others(c).iter().flat_map(|truth| errors(c, truth, 4)));
+    out
+}
+
+/// The first `count` regressors, where `truth` is u without the reading's noise.
+fn errors(c: &Channels, truth: &[f64], count: i32) -> Vec<Vec<f64>> {
+    if c.u == truth {
+        return Vec::new();
+    }
+    let (bias, rest) = declared_by(truth, &c.error_dps);
+    let pairs = c.u.iter().zip(truth);
     let blur: Vec<f64> = pairs.map(|(u, s)| bias.at(*u) - bias.at(*s)).collect();
     let share = stats::rms(&blur) / stats::difference_noise(&rest).max(f64::MIN_POSITIVE);
     if rest.len() as f64 * share.powi(2) <= 1.0 {
         return Vec::new();
     }
-    let mut out = powers(&c.u);
-    for (column, smooth) in out.iter_mut().zip(powers(&mean)) {
-        add_scaled(column, -1.0, &smooth);
-    }
-    out.split_off(1)
+    let power = |k: i32| {
+        let pairs = c.u.iter().zip(truth);
+        pairs.map(|(u, t)| u.powi(k) - t.powi(k)).collect()
+    };
+    (1..=count).map(power).collect()
+}
+
+/// u by all channels that read the temperature as well as the thermometer does: least squares over their powers.
+fn by_others(c: &Channels) -> Option<Vec<f64>> {
+    let noise = reading_noise(&c.u);
+    let follows = |x: &[f64]| {
+        let (_, off) = least_squares(&of_powers(x), &c.u);
+        stats::rms(&off) <= SAME * noise
+    };
+    let names = c.columns.keys().filter(|name| **name != c.thermometer);
+    let scaled = names.filter_map(|name| c.moving(name).and(c.scaled(name)));
+    let thermometers: Vec<Vec<f64>> = scaled.filter(|x| follows(x)).collect();
+    let columns: Vec<Vec<f64>> = thermometers.iter().flat_map(|x| of_powers(x)).collect();
+    (!columns.is_empty()).then(|| least_squares(&columns, &c.u).0)
+}
+
+/// A channel's powers from the first one on.
+fn of_powers(x: &[f64]) -> Vec<Vec<f64>> {
+    (1..POWERS).map(|k| map(x, |x| x.powi(k))).collect()
+}
+
+/// A column by others and a constant, and what they leave of it.
+fn least_squares(columns: &[Vec<f64>], y: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let constant = [vec![1.0; y.len()]];
+    let mut off = y.to_vec();
+    Basis::new(&[&constant, columns].concat()).project_off(&mut off);
+    let by = y.iter().zip(&off).map(|(y, off)| y - off).collect();
+    (by, off)
 }
 
 #[cfg(test)]

@@ -73,3 +73,42 @@ fn readings_that_hardly_err_cost_nothing() {
     let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
     assert!(errors_of(&c).is_empty());
 }
+
+/// As [`record`], slowly curved by a third order, with a drive gain that follows the temperature and is read with little noise.
+fn with_gain(seed: u64, own_k: f64) -> Channels {
+    let mut random = Random::new(seed);
+    let degc = [triangle(ROWS / 2), triangle(ROWS / 2)].concat();
+    let u = |t: f64| t / 35.0 - 1.0;
+    let output = |u: f64| 2.0 - 1.5 * u + 0.4 * u * u + 0.5 * u.powi(3);
+    let rate = degc
+        .iter()
+        .map(|t| output(u(*t)) + NOISE_DPS * random.normal())
+        .collect();
+    let die = degc.iter().map(|t| t + 2.0 * random.normal()).collect();
+    let gain = degc
+        .iter()
+        .map(|t| 1.0 + 0.05 * u(t + own_k * random.normal()))
+        .collect();
+    let columns = BTreeMap::from([
+        ("rate_out_dps".to_owned(), rate),
+        ("die_degc".to_owned(), die),
+        ("agc".to_owned(), gain),
+    ]);
+    let time_s: Vec<f64> = (0..ROWS).map(|k| 10.0 * k as f64).collect();
+    Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap()
+}
+
+#[test]
+fn a_channel_that_reads_the_temperature_better_is_no_cause() {
+    for seed in 1..=3 {
+        let c = with_gain(seed, 0.1);
+        assert_eq!(errors_of(&c).len(), 6, "{seed}");
+        let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+        let found = search.run().unwrap();
+        let names: Vec<String> = found.terms.iter().map(Term::id).collect();
+        let third = vec!["bias_third_order".to_owned()];
+        assert_eq!((names, found.left), (third, None), "{seed}");
+    }
+    // One that moves by itself says nothing of the thermometer's noise.
+    assert_eq!(errors_of(&with_gain(1, 3.0)).len(), 2);
+}
