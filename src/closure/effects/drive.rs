@@ -21,8 +21,9 @@ const DAMPING: Sheet = Sheet {
     id: "damping_bias",
     physics: "anisotropic damping turns part of the drive's motion into the sense axis in phase with \
               the rate: it goes as 1/Q, as the drive gain does; a changing Q also bends the phase",
-    equation: "k (g - 1), g = 1 / Q relative; and B(p') - B(p), tan(p' - p_r) = g tan(p - p_r), p_r at or near a \
-               quarter turn",
+    equation: "k (d - 1), d = 1 / Q relative; and B(p') - B(p), tan(p' - p_r) = d tan(p - p_r), p_r at or near a \
+               quarter turn; d = g, or, of a drive off its resonance, g cos(m (p - p_r)), m (p - p_r) being the structure's \
+               part of the phase",
     parameters: &[
         Parameter {
             name: "gain_dps",
@@ -36,6 +37,10 @@ const DAMPING: Sheet = Sheet {
             name: "resonance_off_rad",
             plausible: (-0.6, 0.6),
         },
+        Parameter {
+            name: "structural_share_of_phase",
+            plausible: (0.1, 1.0),
+        },
     ],
     compensable: true,
     confounders: &["amplitude_phase_coupling", "bias_third_order"],
@@ -46,6 +51,19 @@ const DAMPING: Sheet = Sheet {
 /// Where the phase's own delay puts the resonance beside a quarter turn: places of the search, and the most, rad.
 const OFF_RAD: [f64; 4] = [-0.35, -0.15, 0.15, 0.35];
 const MOST_OFF_RAD: f64 = 0.6;
+
+/// Shapes of the effect: the gain's own, the phase's bend, both; from [`SHAPES`] on, of a drive off its resonance.
+const SHAPES: usize = 3;
+
+/// How much of the measured phase is the structure's: shares of the search, and the least. The rest is the electronics'.
+const STRUCTURAL: [f64; 2] = [0.3, 1.0];
+const LEAST_STRUCTURAL: f64 = 0.1;
+
+/// Largest angle between phase and resonance, rad: beyond it tangents say nothing.
+const STEEP_RAD: f64 = 1.5;
+
+/// One row in so many, those whose gain is next to 1, say what the gain is relative to.
+const NOMINAL: usize = 20;
 
 /// Most bias per unit of the gain, deg/s, twenty times what is plausible: beyond it the gain does not act, but stands in
 /// for the thermometer, next to whose square it differs by a little.
@@ -65,9 +83,15 @@ impl Candidate for Damping {
         if c.thermometer != "phase_rad" {
             return vec![Point::form(0)];
         }
-        let off = [1, 2].into_iter();
-        let off = off.flat_map(|form| OFF_RAD.map(|off_rad| Point::at(form, &[off_rad])));
-        (0..3).map(Point::form).chain(off).collect()
+        let bent = || [1, 2].into_iter();
+        let off = bent().flat_map(|form| OFF_RAD.map(|off_rad| Point::at(form, &[off_rad])));
+        let places = || OFF_RAD.into_iter().chain([0.0]);
+        let detuned = bent().flat_map(|form| {
+            let each = STRUCTURAL.into_iter();
+            each.flat_map(move |m| places().map(move |o| Point::at(SHAPES + form, &[o, m])))
+        });
+        let plain = (0..SHAPES).map(Point::form);
+        plain.chain(off).chain(detuned).collect()
     }
 
     fn spacing(&self, _c: &Channels, point: &Point) -> Vec<f64> {
@@ -83,25 +107,32 @@ impl Candidate for Damping {
         let Some(g) = c.column("agc") else {
             return Vec::new();
         };
-        let plain = map(g, |g| g - 1.0);
-        if point.form == 0 {
-            return vec![plain];
-        }
         let off_rad = point.theta.first().copied().unwrap_or(0.0);
         let resonance = c.resonance_rad() + off_rad.clamp(-MOST_OFF_RAD, MOST_OFF_RAD);
-        let bend =
-            c.u.iter()
-                .zip(g)
-                .map(|(u, g)| {
-                    let p = (c.centre + c.half * u - resonance).clamp(-1.5, 1.5);
-                    let nominal = (g * p.tan()).atan();
-                    bias.at((nominal + resonance - c.centre) / c.half) - bias.at(*u)
-                })
-                .collect();
-        if point.form == 1 {
-            vec![bend]
-        } else {
-            vec![plain, bend]
+        let share = point.theta.get(1).copied().unwrap_or(1.0);
+        let share = share.clamp(LEAST_STRUCTURAL, 1.0);
+        let from_resonance = |u: f64| {
+            let rad = share * (c.centre + c.half * u - resonance);
+            rad.clamp(-STEEP_RAD, STEEP_RAD)
+        };
+        let damping = match point.form / SHAPES {
+            0 => g.to_vec(),
+            _ => detuned(g, &map(&c.u, from_resonance)),
+        };
+        let plain = || map(&damping, |d| d - 1.0);
+        let bend = || {
+            let pairs = c.u.iter().zip(&damping);
+            let each = pairs.map(|(u, d)| {
+                let angle = from_resonance(*u);
+                let bent_rad = (d * angle.tan()).atan() - angle;
+                bias.at(u + bent_rad / c.half) - bias.at(*u)
+            });
+            each.collect()
+        };
+        match point.form % SHAPES {
+            0 => vec![plain()],
+            1 => vec![bend()],
+            _ => vec![plain(), bend()],
         }
     }
 
@@ -116,7 +147,7 @@ impl Candidate for Damping {
             false => DAMPING.parameters[1].plausible,
         };
         let bends = |share: &f64| (least..=most).contains(share);
-        let (by_gain, by_bend) = match point.form {
+        let (by_gain, by_bend) = match point.form % SHAPES {
             0 => (beta.first(), None),
             1 => (None, beta.last()),
             _ => (beta.first(), beta.last()),
@@ -125,7 +156,7 @@ impl Candidate for Damping {
     }
 
     fn surcharge(&self, _c: &Channels, point: &Point) -> f64 {
-        if point.form == 2 { 2.0 } else { 0.0 }
+        if point.form % SHAPES == 2 { 2.0 } else { 0.0 }
     }
 
     fn correction(&self, c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
@@ -134,18 +165,31 @@ impl Candidate for Damping {
     }
 
     fn report(&self, _c: &Channels, e: &Estimate) -> Reported {
-        let names: &[&str] = match e.point.form {
+        let names: &[&str] = match e.point.form % SHAPES {
             0 => &["gain_dps"],
             1 => &["share_of_phase_bend"],
             _ => &["gain_dps", "share_of_phase_bend"],
         };
         let each = names.iter().enumerate();
-        let off = e.point.theta.iter().zip(&e.theta_std);
-        let off = off.map(|(off_rad, std)| entry("resonance_off_rad", *off_rad, *std));
+        let free = ["resonance_off_rad", "structural_share_of_phase"].iter();
+        let off = free.zip(e.point.theta.iter().zip(&e.theta_std));
+        let off = off.map(|(name, (value, std))| entry(name, *value, *std));
         each.map(|(k, name)| gain(name, e, k, 1.0))
             .chain(off)
             .collect()
     }
+}
+
+/// The damping, relative, of a drive that is held at its amplitude off resonance: the force has the elastic part as well,
+/// g = sqrt(d^2 + t^2) with t = d tan(angle), the angle that of the phase from resonance; where the gain is 1, so is the damping.
+fn detuned(g: &[f64], angle_rad: &[f64]) -> Vec<f64> {
+    let damping: Vec<f64> = g.iter().zip(angle_rad).map(|(g, a)| g * a.cos()).collect();
+    let mut order: Vec<usize> = (0..g.len()).filter(|k| damping[*k].is_finite()).collect();
+    order.sort_by(|a, b| (g[*a] - 1.0).abs().total_cmp(&(g[*b] - 1.0).abs()));
+    let near = order.len().div_ceil(NOMINAL).max(1);
+    let sum: f64 = order.iter().take(near).map(|k| damping[*k]).sum();
+    let nominal = sum / near as f64;
+    map(&damping, |d| d / nominal)
 }
 
 /// The drive's amplitude pulls the measured phase.

@@ -73,6 +73,61 @@ fn damping_behind_a_demodulators_delay_is_the_only_name() {
     is("resonance_off_rad", DELAY_RAD);
 }
 
+/// A drive off its resonance, three tenths of whose measured phase are the structure's and the rest the electronics': the
+/// gain holds the amplitude against the spring as well, and what it does beside 1/Q is no third order of the phase.
+#[test]
+fn damping_of_a_drive_off_its_resonance_is_the_only_name() {
+    const ROWS: usize = 300;
+    const STRUCTURAL: f64 = 0.3;
+    let degc = [triangle(100), triangle(200)].concat();
+    let damping: Vec<f64> = (0..ROWS as u32)
+        .map(f64::from)
+        .map(|k| 1.0 + 0.024 * (0.05 * k).sin() + 0.012 * (0.13 * k).sin())
+        .collect();
+    let resonance = -std::f64::consts::FRAC_PI_2;
+    // The structure's phase from resonance, were the damping nominal.
+    let nominal: Vec<f64> = degc
+        .iter()
+        .map(|t| 0.02 - 0.08 * (t / 35.0 - 1.0))
+        .collect();
+    let pairs = || nominal.iter().zip(&damping);
+    let electronics = |angle: f64| (1.0 / STRUCTURAL - 1.0) * angle;
+    let phase = pairs().map(|(a, d)| resonance + (a.tan() / d).atan() + electronics(*a));
+    let gain = pairs().map(|(a, d)| d.hypot(a.tan()));
+    let (phase, gain): (Vec<f64>, Vec<f64>) = (phase.collect(), gain.collect());
+    for seed in 1..=3 {
+        let mut random = Random::new(seed);
+        let output = pairs().map(|(a, d)| {
+            let p = a / STRUCTURAL;
+            65.0 - 187.0 * p + 136.0 * p * p + 20.0 * (d - 1.0) + 0.01 * random.normal()
+        });
+        let columns = BTreeMap::from([
+            ("rate_out_dps".to_owned(), output.collect()),
+            ("phase_rad".to_owned(), phase.clone()),
+            ("agc".to_owned(), gain.clone()),
+        ]);
+        let time_s: Vec<f64> = (0..ROWS).map(|k| 10.0 * k as f64).collect();
+        let degc_of = |rad: f64| 43.75 - (rad - resonance) * 131.25;
+        let channels = Channels::new(&time_s, &columns, "phase_rad", degc_of).unwrap();
+        let split = channels.split().unwrap();
+        let search = Search::new(&channels, &split, Effort::default(), Vec::new());
+        let found = search.run().unwrap();
+        let names: Vec<String> = found.terms.iter().map(Step::id).collect();
+        assert_eq!(names, ["damping_bias"], "{seed}");
+        let model = search.model(&found.terms).unwrap();
+        let estimate = search.estimates(&model).remove(0);
+        let reported = found.terms[0].candidate.report(&channels, &estimate);
+        let is = |name: &str, due: f64, within: f64| {
+            let (value, _) = reported[name];
+            assert!((value - due).abs() < within, "{seed}, {name}: {value}");
+        };
+        is("structural_share_of_phase", STRUCTURAL, 0.06);
+        is("share_of_phase_bend", 1.0, 0.2);
+        is("resonance_off_rad", 0.0, 0.06);
+        is("gain_dps", 20.0, 3.0);
+    }
+}
+
 /// The only name that a pull gets, its pull over the true one, and the held-out error over the noise of the same rows.
 fn named(pull: &Pull) -> (f64, f64) {
     let pulled = pull.made();
