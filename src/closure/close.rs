@@ -377,6 +377,15 @@ impl Told<'_> {
                 ),
             ));
         }
+        for id in &self.found.once {
+            warnings.push(Warning::general(
+                "happens_once",
+                format!(
+                    "{id}: the record shows its step once, so that it may as well be a change at that moment (no effect \
+                     of the catalogue); a second passage of that temperature separates the two"
+                ),
+            ));
+        }
         if !self.found.undecided.is_empty() {
             warnings.push(Warning::general(
                 "undecided",

@@ -55,6 +55,7 @@ impl Search<'_> {
             missing: Vec::new(),
             undecided: Vec::new(),
             within_rounding: Vec::new(),
+            once: Vec::new(),
         };
         let mut model = self.beginning()?;
         for _ in 0..ROUNDS {

@@ -6,7 +6,8 @@
 //! well; sinusoids have a search of their own ([`tones`], and `fast` within blocks of rows). Rows that stand
 //! out are spikes, unless a candidate explains them ([`forward`]). At the end every
 //! step is tried again with the others in, against all other names ([`sweep`]), must hold ([`validate`]) and lower the error of
-//! held-out rows ([`heldout`]). Where a shape without a name wins, it is kept as what is left.
+//! held-out rows ([`heldout`]). Where a shape without a name wins, it is kept as what is left; a step that happens once may
+//! be one of time, and that is said beside it (`once`).
 
 mod acting;
 mod clip;
@@ -21,6 +22,7 @@ pub mod heldout;
 pub mod judge;
 mod memo;
 mod model;
+mod once;
 mod otherwise;
 mod reading;
 pub mod refine;
@@ -145,6 +147,8 @@ pub struct Found {
     pub undecided: Vec<String>,
     /// Names whose whole contribution the circuit's own rounding may be, with its rms, deg/s: no steps.
     pub within_rounding: Vec<(String, f64)>,
+    /// Names of steps that may as well be changes at one moment.
+    pub once: Vec<String>,
 }
 
 /// A search over one record.

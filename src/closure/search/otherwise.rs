@@ -79,6 +79,10 @@ impl Search<'_> {
         if found.left.is_none() && (self.missed(&model) || wanders()) {
             found.left = Some("time_s".to_owned());
         }
+        found.once = self.once(&found)?;
+        if !found.once.is_empty() {
+            found.left = found.left.or_else(|| Some("time_s".to_owned()));
+        }
         Ok(found)
     }
 
@@ -205,7 +209,7 @@ impl Search<'_> {
 
     /// What a model leaves of the fitted rows, in units of what it differs by from row to row, accidents apart: noise with a
     /// memory as well, of which nobody knows whether it is noise.
-    fn roughly(&self, model: &Model) -> f64 {
+    pub(super) fn roughly(&self, model: &Model) -> f64 {
         let rest = model.residual(self.channels);
         let rows = rest.iter().zip(&model.fit.row_weights).zip(&self.used);
         let usual = rows.filter(|((r, w), used)| **used && **w >= 0.5 && r.is_finite());

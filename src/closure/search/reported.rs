@@ -66,7 +66,8 @@ impl Search<'_> {
     /// Drops names that slow noise as strong as what all of them leave may have made.
     fn kept_from_noise(&self, found: &mut Found) -> Result<(), Unusable> {
         let model = self.model(&found.terms)?;
-        let slow = self.wander(&model);
+        // Of few rows nobody can say how little of the noise is white: no less than what they differ by from one to the next.
+        let slow = self.wander(&model).min(self.roughly(&model));
         let asked = LEVEL * 10f64.powf(-DECADES * (slow - WANDER).max(0.0));
         let square = |m: &Model| self.heldout_error(m, &model).square;
         for k in (0..found.terms.len()).rev() {

@@ -77,6 +77,7 @@ fn kept_of(
         missing: Vec::new(),
         undecided: Vec::new(),
         within_rounding: Vec::new(),
+        once: Vec::new(),
     };
     search.kept_alone(&mut found).unwrap();
     assert!(found.left.is_some() || !left);
@@ -170,4 +171,27 @@ fn names_that_predict_worse_than_none_are_dropped() {
     assert_eq!(kept(&against, 1e-60, 0, false).0, BOTH[1..]);
     // What was dropped is left, and the other name too weak beside it.
     assert!(kept_of(&against, [1e-60, 1e-3], 0, false).0.is_empty());
+}
+
+#[test]
+fn of_few_rows_that_a_name_explains_what_is_left_is_no_slow_noise() {
+    // Two staircases of the rate, a reading a level: a cubic of 20 times the noise, and of 7 times.
+    for (rows, noise_dps) in [(22, 0.1), (22, 0.3), (30, 0.1), (30, 0.3)] {
+        let mut random = Random::new(1);
+        let rate: Vec<f64> = (0..rows).map(|k| 40.0 * (k % 11) as f64 - 200.0).collect();
+        let output = rate
+            .iter()
+            .map(|r| r + 2.0 * (r / 200.0).powi(3) + noise_dps * random.normal());
+        let columns = BTreeMap::from([
+            ("rate_out_dps".to_owned(), output.collect()),
+            ("rate_dps".to_owned(), rate.clone()),
+            ("die_degc".to_owned(), vec![25.0; rows]),
+        ]);
+        let time_s: Vec<f64> = (0..rows).map(|k| 10.0 * k as f64).collect();
+        let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+        let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+        let found = search.run().unwrap();
+        let names: Vec<String> = found.terms.iter().map(Term::id).collect();
+        assert_eq!(names, ["scale_factor_nonlinearity"], "{rows}, {noise_dps}");
+    }
 }

@@ -339,7 +339,7 @@ impl Search<'_> {
     }
 
     /// How often a term's column switches between 0 and 1, at once or by and by.
-    fn switches(&self, term: &Term, model: &Model) -> usize {
+    pub(super) fn switches(&self, term: &Term, model: &Model) -> usize {
         let columns = term
             .candidate
             .columns(self.channels, &model.acting, &term.point);

@@ -280,6 +280,7 @@ fn a_dropped_name_leaves_something_if_it_was_beyond_what_chance_makes() {
             missing: Vec::new(),
             undecided: Vec::new(),
             within_rounding: Vec::new(),
+            once: Vec::new(),
         };
         let term = Term {
             p_value,
