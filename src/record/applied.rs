@@ -1,7 +1,8 @@
 //! Rows whose applied rate was not measured.
 //!
-//! A table that stands may leave `rate_dps` empty, and a log may lose a cell while it turns. The output tells: it is near
-//! to what it is at rest, or it is not. Of a row whose rate is not known the error is not known either.
+//! A table that stands may leave `rate_dps` empty, and a log may lose a cell while it turns. Where the log has zeros, it says
+//! so itself when the table stands; else the output of several rows in a row tells: it is near to what it is at rest, or it
+//! is not. Of a row whose rate is not known the error is not known either.
 
 use super::thermal::ThermalRecord;
 use super::warning::Warning;
@@ -12,7 +13,11 @@ const NEAR: f64 = 0.1;
 const USUAL: f64 = 0.95;
 const TIMES: f64 = 4.0;
 
-/// Empty cells of an applied rate become 0 where the output is that of a gyro at rest; the other rows lose their output.
+/// Share of the largest rate below which a rate is none, and the fewest empty cells in a row that are no loss.
+const STANDS: f64 = 1e-6;
+const REST: usize = 3;
+
+/// Empty cells of an applied rate become 0 where the table stands; the other rows lose their output.
 pub(super) fn take(record: &mut ThermalRecord, warnings: &mut Vec<Warning>) {
     let (Some(rate), Some(output)) = (record.column("rate_dps"), record.column("rate_out_dps"))
     else {
@@ -25,11 +30,17 @@ pub(super) fn take(record: &mut ThermalRecord, warnings: &mut Vec<Warning>) {
     let forth = at_rest(&rate, &output, 0..rate.len());
     let back = at_rest(&rate, &output, (0..rate.len()).rev());
     let mut unknown = 0;
+    let rest = where_rest_may_be(&rate);
     for row in 0..rate.len() {
         if !rate[row].is_nan() || output[row].is_nan() {
             continue;
         }
-        if forth[row] || back[row] {
+        let stands = match rest[row] {
+            Rest::Surely => true,
+            Rest::Perhaps => forth[row] || back[row],
+            Rest::No => false,
+        };
+        if stands {
             rate[row] = 0.0;
         } else {
             output[row] = f64::NAN;
@@ -44,11 +55,43 @@ pub(super) fn take(record: &mut ThermalRecord, warnings: &mut Vec<Warning>) {
             "rows_without_applied_rate",
             "rate_dps",
             format!(
-                "{unknown} of {rows} rows have no rate_dps, and their output is not that of a gyro at rest; they take no \
-                 part in any fit"
+                "{unknown} of {rows} rows have no rate_dps, and nothing says that the table stands; they take no part in any fit"
             ),
         ));
     }
+}
+
+/// What the cells about an empty one say of it.
+#[derive(Clone, Copy, PartialEq)]
+enum Rest {
+    Surely,
+    Perhaps,
+    No,
+}
+
+/// Between cells that say that the table stands it does; where no cell says so, it may where several are empty.
+fn where_rest_may_be(rate: &[f64]) -> Vec<Rest> {
+    let most_dps = rate.iter().fold(0.0, |m: f64, r| m.max(r.abs()));
+    let stands = |r: &f64| r.abs() <= STANDS * most_dps;
+    let says_so = rate.iter().any(stands);
+    let mut out = vec![Rest::No; rate.len()];
+    let mut start = 0;
+    while start < rate.len() {
+        let end = start + rate[start..].iter().take_while(|r| r.is_nan()).count();
+        let mut beside = [start.checked_sub(1), (end < rate.len()).then_some(end)]
+            .into_iter()
+            .flatten();
+        let run = if beside.all(|row| stands(&rate[row])) {
+            Rest::Surely
+        } else if !says_so && end - start >= REST {
+            Rest::Perhaps
+        } else {
+            Rest::No
+        };
+        out[start..end].fill(run);
+        start = end + 1;
+    }
+    out
 }
 
 /// The rows without a rate whose output follows on from the error of the rows before them, in the order of `rows`: the bias
@@ -139,6 +182,25 @@ mod tests {
         let steps = |k: usize| [44.0, -74.0, -166.0, 90.0, 21.0][k % 5];
         let (errors, told) = errors(steps, |k| [1, 4, 61, 79].contains(&k));
         are_the_bias_but_in(&errors, &[1, 4, 61, 79]);
+        assert_eq!(told, 1);
+    }
+
+    #[test]
+    fn a_lost_cell_of_a_slow_rate_is_not_rest_though_its_output_may_be() {
+        // About its zeros the sine is within a tenth of what it is at most.
+        let sine = |k: usize| 60.0 * (TAU * (k as f64 + 0.3) / 90.0).sin();
+        let (errors, told) = errors(sine, |k| [1, 44, 45, 88, 90].contains(&k));
+        are_the_bias_but_in(&errors, &[1, 44, 45, 88, 90]);
+        assert_eq!(told, 1);
+    }
+
+    #[test]
+    fn where_the_log_has_zeros_they_decide() {
+        let steps = |k: usize| [0.0, 3.0, 0.0, -60.0][k / 30];
+        // Within a stand; four within the slow rate; at its border.
+        let lost = |k: usize| [4, 5, 40, 41, 42, 43, 60].contains(&k);
+        let (errors, told) = errors(steps, lost);
+        are_the_bias_but_in(&errors, &[40, 41, 42, 43, 60]);
         assert_eq!(told, 1);
     }
 
