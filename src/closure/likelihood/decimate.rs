@@ -95,7 +95,8 @@ pub fn decimate(
     let (usual, deviations) = match rows {
         0..FEWEST => from_neighbours(&residual, &blocks.weights),
         _ => {
-            let deviations = from_block_medians(&residual, &blocks);
+            let (_, apart) = from_neighbours(&residual, &blocks.weights);
+            let deviations = from_block_medians(&residual, &blocks, apart);
             (deviations.clone(), deviations)
         }
     };
@@ -175,12 +176,13 @@ fn from_neighbours(residual: &[f64], weights: &[f64]) -> (Vec<f64>, Vec<f64>) {
     (one_sided, apart)
 }
 
-fn from_block_medians(residual: &[f64], blocks: &Blocks) -> Vec<f64> {
-    let mut out = vec![0.0; residual.len()];
+/// How far each row is from its block's median; `apart` where the block has too few rows left for one.
+fn from_block_medians(residual: &[f64], blocks: &Blocks, apart: Vec<f64>) -> Vec<f64> {
+    let mut out = apart;
     for (a, b) in blocks.starts.iter().zip(blocks.starts.iter().skip(1)) {
         let pairs = residual[*a..*b].iter().zip(&blocks.weights[*a..*b]);
         let mut near: Vec<f64> = pairs.filter(|(_, w)| **w > 0.0).map(|(r, _)| *r).collect();
-        if near.len() < 3 {
+        if near.len() < FEWEST {
             continue;
         }
         let middle = near.len() / 2;
@@ -250,6 +252,27 @@ fn mean_correlation(m: usize, tau: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::closure::synthetic::Random;
+
+    /// White noise of one unit in blocks of three, in some of which a row is not used and another one is a spike.
+    #[test]
+    fn a_spike_in_a_block_of_two_rows_is_seen() {
+        let mut random = Random::new(4);
+        let n = 1200;
+        let (lost, spike) = (|k: &usize| k % 60 == 16, |k: &usize| k % 120 == 17);
+        let y = |k| random.normal() + if spike(&k) { 100.0 } else { 0.0 };
+        let times_s: Vec<f64> = (0..n).map(|k| k as f64).collect();
+        let plain = Problem {
+            line: Timeline::new(&times_s, vec![1.0; n]).unwrap(),
+            y: (0..n).map(y).collect(),
+            columns: vec![vec![1.0; n]],
+        };
+        let used: Vec<bool> = (0..n).map(|k| !lost(&k)).collect();
+        let decimated = decimate(&times_s, &plain, &used, 3).unwrap();
+        let out = |k: &usize| decimated.blocks.weights[*k] < 0.5;
+        let expected: Vec<usize> = (0..n).filter(|k| lost(k) || spike(k)).collect();
+        assert_eq!((0..n).filter(out).collect::<Vec<_>>(), expected);
+        assert!((decimated.within.sqrt() - 1.0).abs() < 0.1);
+    }
 
     /// White noise of one unit in pairs of rows, with spikes of 30 in one row of forty and a step of 40 in the middle: the
     /// rows that lose their weight, and the noise of a row.
