@@ -222,6 +222,7 @@ fn write(
     {
         crate::emit::files::write(files, &out.join(folder))?;
     }
+    crate::closure::residuals::write(closed, &out.join("residuals.csv"))?;
     crate::output::write_whole(&out.join("report.html"), page.as_bytes())?;
     if let Some((diff, _)) = &augmented
         && std::io::stderr().is_terminal()

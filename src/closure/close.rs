@@ -24,12 +24,16 @@ pub struct Closed {
     pub channels: Channels,
     /// Which rows were fitted and which judged.
     pub split: Split,
+    /// Rows that stand out of both models, few and each by itself: no part of any figure.
+    pub accidents: Vec<bool>,
     /// The declared model.
     pub before: Model,
     /// With the named terms.
     pub after: Model,
     /// What firmware runs, if it can.
     pub correction: Option<Correction>,
+    /// What that leaves of each row, bit for bit, deg/s; NaN without a reading.
+    pub firmware_dps: Option<Vec<f64>>,
 }
 
 /// The effects that the design's user suspects, for a record.
@@ -98,38 +102,67 @@ pub fn close(
     let channels = channels_of(record, design, &mut warnings)?;
     let refuse = |why: String| refused(record, why);
     let split = channels.split().map_err(|e| refuse(e.to_string()))?;
-    let (closure, before, after, correction) = {
+    let (closure, before, after, accidents, firmware) = {
         let own = own_candidates(design, &channels, &mut warnings);
         let search = Search::new(&channels, &split, effort, own);
         let unusable = |e: super::likelihood::Unusable| refuse(e.to_string());
         let found = search.run().map_err(unusable)?;
         let before = search.model(&[]).map_err(unusable)?;
         let after = search.model(&found.terms).map_err(unusable)?;
+        let accidents = search.accidents([&before, &after]);
         let told = Told {
             search: &search,
             found: &found,
             before: &before,
             after: &after,
+            judged: Judged::of(&search, &accidents),
         };
         let mut closure = told.closure().map_err(unusable)?;
         told.warn(&mut warnings);
-        let (correction, errors) = told.firmware(record, &mut warnings);
-        closure.firmware = errors;
+        let firmware = told.firmware(record, &mut warnings);
+        closure.firmware = firmware
+            .as_ref()
+            .map_or_else(FirmwareErrors::default, |f| f.errors);
         closure.warnings = warnings;
         closure.command = command.to_owned();
         closure.design_sha256 = crate::emit::manifest::sha256(design.source.text.as_bytes());
-        (closure, before, after, correction)
+        (closure, before, after, accidents, firmware)
     };
+    let (correction, firmware_dps) = firmware.map(|f| (f.correction, f.residual_dps)).unzip();
     let mut closed = Closed {
         closure,
         channels,
         split,
+        accidents,
         before,
         after,
         correction,
+        firmware_dps,
     };
     closed.closure.seconds = start.elapsed().as_secs_f64();
     Ok(closed)
+}
+
+/// The rows that errors are of, and those that stand out alone.
+struct Judged {
+    train: Vec<bool>,
+    heldout: Vec<bool>,
+    accidents: Vec<bool>,
+}
+
+impl Judged {
+    /// Those of a search that are no accidents.
+    fn of(search: &Search, accidents: &[bool]) -> Self {
+        let usual = |rows: &[bool]| -> Vec<bool> {
+            let pairs = rows.iter().zip(accidents);
+            pairs.map(|(row, accident)| *row && !accident).collect()
+        };
+        Judged {
+            train: usual(&search.train),
+            heldout: usual(&search.heldout),
+            accidents: accidents.to_vec(),
+        }
+    }
 }
 
 /// A search put into words.
@@ -138,6 +171,7 @@ struct Told<'a> {
     found: &'a Found,
     before: &'a Model,
     after: &'a Model,
+    judged: Judged,
 }
 
 impl Told<'_> {
@@ -147,9 +181,9 @@ impl Told<'_> {
             let pairs = residual.iter().zip(rows).filter(|(_, m)| **m);
             pairs.map(|(r, _)| *r).collect()
         };
-        let held = over(&self.search.heldout);
+        let held = over(&self.judged.heldout);
         Errors {
-            train_rms: stats::rms(&over(&self.search.train)),
+            train_rms: stats::rms(&over(&self.judged.train)),
             heldout_rms: stats::rms(&held),
             heldout_max_abs: held.iter().fold(0.0, |m, r| m.max(r.abs())),
         }
@@ -158,7 +192,9 @@ impl Told<'_> {
     fn closure(&self) -> std::result::Result<Closure, super::likelihood::Unusable> {
         let left = self.found.left.is_some();
         let residual = self.after.residual(self.search.channels);
-        let finite: Vec<f64> = residual.into_iter().filter(|r| r.is_finite()).collect();
+        let rows = residual.iter().zip(&self.judged.accidents);
+        let usual = rows.filter(|(r, accident)| r.is_finite() && !**accident);
+        let usual: Vec<f64> = usual.map(|(r, _)| *r).collect();
         let steps = self.steps()?;
         Ok(Closure {
             schema: SCHEMA,
@@ -167,7 +203,7 @@ impl Told<'_> {
             command: String::new(),
             verdict: Verdict::of(steps.len(), left),
             unit: "deg/s",
-            noise_floor_rms: stats::difference_noise(&finite),
+            noise_floor_rms: stats::difference_noise(&usual),
             before: self.errors(self.before),
             after: self.errors(self.after),
             firmware: FirmwareErrors::default(),
@@ -212,12 +248,12 @@ impl Told<'_> {
         Ok(out)
     }
 
-    /// The correction and its held-out errors; without figures where firmware cannot carry it.
+    /// The correction and its errors; none where firmware cannot carry it.
     fn firmware(
         &self,
         record: &ThermalRecord,
         warnings: &mut Vec<Warning>,
-    ) -> (Option<Correction>, FirmwareErrors) {
+    ) -> Option<firmware::Judged> {
         let c = self.search.channels;
         // Rates as they come in, and as they go out.
         let most = |name: &str| {
@@ -227,16 +263,15 @@ impl Told<'_> {
         };
         let widest = 1.25 * most("rate_out_dps").max(most("rate_dps")).max(1e-3);
         let estimates = self.search.estimates(self.after);
-        let none = (None, FirmwareErrors::default());
         let Some(plan) = firmware::plan(c, self.after, &estimates, widest) else {
             let terms = self.after.terms.iter();
             let obstacles = terms.filter_map(|t| t.candidate.obstacle(c, &t.point));
             warnings.extend(obstacles.map(|why| Warning::general("not_compensable", why)));
-            return none;
+            return None;
         };
         let noise = self.after.fit.noise.white_rms_dps;
         let judged = |plan: &crate::correction::Plan| {
-            firmware::judged(plan, record, c, &self.search.heldout, noise)
+            firmware::judged(plan, record, c, &self.judged.heldout, noise)
         };
         if plan.keeps() {
             let said = "a lag goes on while the power is off: firmware keeps its state and makes up for the periods \
@@ -244,17 +279,17 @@ impl Told<'_> {
                         here";
             warnings.push(Warning::general("firmware_needs_clock", said));
         }
-        let (correction, errors) = match judged(&plan) {
-            Ok(both) => both,
+        let carried = match judged(&plan) {
+            Ok(carried) => carried,
             Err(e) => {
                 warnings.push(Warning::general("no_firmware", e.to_string()));
-                return none;
+                return None;
             }
         };
         // Coefficients that cancel may be a model's; in words they are worse than no step at all.
         let declared = firmware::plan(c, self.before, &[], widest);
-        let declared = declared.and_then(|plan| judged(&plan).ok()?.1.heldout_rms);
-        if let (Some(with), Some(without)) = (errors.heldout_rms, declared)
+        let declared = declared.and_then(|plan| judged(&plan).ok()?.errors.heldout_rms);
+        if let (Some(with), Some(without)) = (carried.errors.heldout_rms, declared)
             && !self.after.terms.is_empty()
             && with > 1.02 * without
         {
@@ -263,9 +298,9 @@ impl Told<'_> {
                  held-out rows, the declared model alone {without:.3e}; do the separating experiment"
             );
             warnings.push(Warning::general("no_firmware", said));
-            return none;
+            return None;
         }
-        (Some(correction), errors)
+        Some(carried)
     }
 
     fn evidence(&self, steps: &[Step]) -> Vec<Evidence> {
@@ -364,6 +399,7 @@ impl Told<'_> {
     }
 
     fn warn(&self, warnings: &mut Vec<Warning>) {
+        warnings.extend(self.accidents());
         if !self.found.within_rounding.is_empty() {
             let each = self.found.within_rounding.iter();
             let names: Vec<String> = each.map(|(id, rms)| format!("{id} ({rms:.2e})")).collect();
@@ -406,6 +442,32 @@ impl Told<'_> {
                 ),
             ));
         }
+    }
+
+    /// What is said of rows that no figure has in it.
+    fn accidents(&self) -> Option<Warning> {
+        let search = self.search;
+        let residual = self.after.residual(search.channels);
+        let accidents = self.judged.accidents.iter().enumerate();
+        let rows: Vec<usize> = accidents.filter(|(_, a)| **a).map(|(row, _)| row).collect();
+        let held = rows.iter().filter(|row| search.heldout[**row]).count();
+        let farthest = rows
+            .iter()
+            .copied()
+            .max_by(|a, b| residual[*a].abs().total_cmp(&residual[*b].abs()))?;
+        Some(Warning::on(
+            "outliers",
+            "rate_out_dps",
+            format!(
+                "{} of {} rows ({} held out) stand out alone by more than six deviations, whatever the model: they are not in \
+                 the errors; the farthest, at {} s, is off by {:.3e} deg/s",
+                rows.len(),
+                residual.len(),
+                held,
+                search.channels.time_s[farthest],
+                residual[farthest]
+            ),
+        ))
     }
 
     /// Names of other channels' effects that the declared bias has in it.

@@ -28,6 +28,7 @@ pub mod order;
 pub mod polynomial;
 pub mod quantised;
 pub mod rails;
+pub mod residuals;
 pub mod search;
 mod smooth;
 pub mod staircase;

@@ -243,7 +243,17 @@ fn stream(plan: &Plan, record: &ThermalRecord, c: &Channels) -> Result<(Vec<Read
     Ok((readings, places))
 }
 
-/// The correction of a plan, its words chosen for the record's noise, and its held-out errors, bit for bit.
+/// A plan's firmware beside a record.
+pub struct Judged {
+    /// What runs.
+    pub correction: Correction,
+    /// Its errors over the rows that are judged.
+    pub errors: FirmwareErrors,
+    /// What it leaves of each row, bit for bit, deg/s; NaN without a reading.
+    pub residual_dps: Vec<f64>,
+}
+
+/// The correction of a plan, its words chosen for the record's noise, and its errors, bit for bit.
 ///
 /// # Errors
 /// A plan that cannot become firmware, with the rule.
@@ -253,7 +263,7 @@ pub fn judged(
     c: &Channels,
     heldout: &[bool],
     noise_dps: f64,
-) -> Result<(Correction, FirmwareErrors)> {
+) -> Result<Judged> {
     plan.check()?;
     let formats = Formats::choose(plan, noise_dps)?;
     let correction = Correction::new(plan, &formats)?;
@@ -261,20 +271,23 @@ pub fn judged(
     let corrected = correction.run(&all);
     let corrected: Vec<f64> = places.iter().map(|place| corrected[*place]).collect();
     let applied = record.column("rate_dps");
-    let rows = corrected.iter().enumerate().zip(heldout);
+    let of_row = |(i, r): (usize, &f64)| {
+        let rate = applied.map_or(0.0, |a| if a[i].is_nan() { 0.0 } else { a[i] });
+        r - rate
+    };
+    let residual_dps: Vec<f64> = corrected.iter().enumerate().map(of_row).collect();
+    let rows = residual_dps.iter().zip(heldout);
     let errors: Vec<f64> = rows
-        .filter(|((_, r), h)| **h && r.is_finite())
-        .map(|((i, r), _)| {
-            let rate = applied.map_or(0.0, |a| if a[i].is_nan() { 0.0 } else { a[i] });
-            r - rate
-        })
+        .filter(|(r, h)| **h && r.is_finite())
+        .map(|(r, _)| *r)
         .collect();
-    Ok((
+    Ok(Judged {
         correction,
-        FirmwareErrors {
+        errors: FirmwareErrors {
             compensable: true,
             heldout_rms: Some(stats::rms(&errors)),
             heldout_max_abs: Some(errors.iter().fold(0.0, |m: f64, e| m.max(e.abs()))),
         },
-    ))
+        residual_dps,
+    })
 }

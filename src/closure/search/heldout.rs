@@ -1,33 +1,70 @@
 //! Rows that no estimate used.
 
+use super::otherwise::stand_together;
 use super::{Model, Search};
 use crate::closure::likelihood::noise::Timeline;
 use crate::closure::likelihood::reml::whitener_of;
-
-/// The error over held-out rows.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct HeldOut {
-    /// Mean square, (deg/s)^2.
-    pub square: f64,
-    /// Sum of squares of the residual's innovations under the model's noise, in units of their
-    /// variance, each at most 16: slow noise, which no model predicts, counts little.
-    pub innovations: f64,
-}
+use crate::record::stats;
 
 /// Most that one row's innovation counts.
 const MOST: f64 = 16.0;
 
+/// Robust deviations from which on a row that no model explains is an accident, and the share of the rows above which such
+/// rows are no accidents. In a record of a few dozen rows each is something by itself.
+const ACCIDENT: f64 = 6.0;
+const FEW: f64 = 0.05;
+const LEAST: usize = 60;
+
 impl Search<'_> {
-    /// Over held-out rows; the noise is that of `judge`, so that models can be compared.
-    pub fn heldout_error(&self, model: &Model, judge: &Model) -> HeldOut {
+    /// Sum of squares over held-out rows of the residual's innovations under the noise of `judge`, in units of their
+    /// variance, each at most 16: slow noise, which no model predicts, counts little. Of one judge, comparable.
+    pub fn surprise(&self, model: &Model, judge: &Model) -> f64 {
         let residual = model.residual(self.channels);
-        let rows = || residual.iter().zip(&self.heldout).filter(|(_, h)| **h);
-        let count = rows().count().max(1) as f64;
-        let square = rows().map(|(r, _)| r * r).sum::<f64>() / count;
-        HeldOut {
-            square,
-            innovations: self.innovations(&residual, judge).unwrap_or(count * square),
+        let innovations = self.innovations(&residual, judge);
+        innovations.unwrap_or_else(|| {
+            let rows = residual.iter().zip(&self.heldout).filter(|(_, h)| **h);
+            rows.map(|(r, _)| r * r).sum()
+        })
+    }
+
+    /// Rows, fitted or held out, that are accidents to all models that are compared: few, each by itself, and far off. One
+    /// of them may outweigh whatever the models differ by, so that errors are of the other rows.
+    pub fn accidents<const N: usize>(&self, models: [&Model; N]) -> Vec<bool> {
+        let residuals = models.map(|m| m.residual(self.channels));
+        let judged = |row: usize| self.train[row] || self.heldout[row];
+        let least = |row: usize| {
+            let of_row = residuals.iter().map(|r| r[row].abs());
+            of_row.fold(f64::INFINITY, f64::min)
+        };
+        let rows: Vec<usize> = (0..self.train.len()).filter(|row| judged(*row)).collect();
+        let nearest: Vec<f64> = rows.iter().map(|row| least(*row)).collect();
+        let far_dps = ACCIDENT * stats::MAD_TO_STD * stats::median(&nearest);
+        let far_dps = far_dps.max(self.nothing_dps());
+        let far: Vec<bool> = nearest.iter().map(|n| *n > far_dps).collect();
+        let count = far.iter().filter(|f| **f).count();
+        let mut out = vec![false; self.train.len()];
+        let few = rows.len() >= LEAST && count as f64 <= FEW * rows.len() as f64;
+        if few && !stand_together(&far) {
+            for (row, far) in rows.iter().zip(far) {
+                out[*row] = far;
+            }
         }
+        out
+    }
+
+    /// Mean squares over the held-out rows, (deg/s)^2, of models that are compared, without accidents.
+    pub fn heldout_squares<const N: usize>(&self, models: [&Model; N]) -> [f64; N] {
+        let accidents = self.accidents(models);
+        let rows = self.heldout.iter().zip(&accidents).enumerate();
+        let rows: Vec<usize> = rows
+            .filter(|(_, (held, accident))| **held && !**accident)
+            .map(|(row, _)| row)
+            .collect();
+        models.map(|m| {
+            let residual = m.residual(self.channels);
+            let sum: f64 = rows.iter().map(|row| residual[*row].powi(2)).sum();
+            sum / rows.len().max(1) as f64
+        })
     }
 
     /// What a term says of the held-out rows: the same sum for what two models differ by. Where it is

@@ -200,9 +200,7 @@ impl Search<'_> {
         fitted.sort_by(f64::total_cmp);
         let usual = fitted.get((USUAL * fitted.len() as f64) as usize);
         // A record without noise has none that is usual.
-        let (low, high) = range(&self.channels.error_dps);
-        let least_dps = NOTHING * (high - low);
-        let far_dps = (FAR * usual.copied().unwrap_or(f64::INFINITY)).max(least_dps);
+        let far_dps = (FAR * usual.copied().unwrap_or(f64::INFINITY)).max(self.nothing_dps());
         let out: Vec<bool> = of(&self.heldout).iter().map(|r| *r > far_dps).collect();
         stand_together(&out)
     }
@@ -214,8 +212,13 @@ impl Search<'_> {
         let rows = rest.iter().zip(&model.fit.row_weights).zip(&self.used);
         let usual = rows.filter(|((r, w), used)| **used && **w >= 0.5 && r.is_finite());
         let usual: Vec<f64> = usual.map(|((r, _), _)| *r).collect();
+        stats::rms(&usual) / stats::difference_noise(&usual).max(self.nothing_dps())
+    }
+
+    /// An error that is nothing beside what there is of it.
+    pub(super) fn nothing_dps(&self) -> f64 {
         let (low, high) = range(&self.channels.error_dps);
-        stats::rms(&usual) / stats::difference_noise(&usual).max(NOTHING * (high - low))
+        NOTHING * (high - low)
     }
 
     /// Never again a candidate: it was taken and did not hold. Rounds with it are forgotten.
@@ -263,7 +266,7 @@ impl Search<'_> {
 }
 
 /// Whether marked rows have more marked neighbours than chance gives them.
-fn stand_together(out: &[bool]) -> bool {
+pub(super) fn stand_together(out: &[bool]) -> bool {
     let count = out.iter().filter(|o| **o).count() as f64;
     let pairs = out.windows(2).filter(|w| w[0] && w[1]).count() as f64;
     pairs > PAIRS * (1.0 + count * count / out.len().max(1) as f64)

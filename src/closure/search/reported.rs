@@ -69,45 +69,40 @@ impl Search<'_> {
         // Of few rows nobody can say how little of the noise is white: no less than what they differ by from one to the next.
         let slow = self.wander(&model).min(self.roughly(&model));
         let asked = LEVEL * 10f64.powf(-DECADES * (slow - WANDER).max(0.0));
-        let square = |m: &Model| self.heldout_error(m, &model).square;
         for k in (0..found.terms.len()).rev() {
             if found.terms[k].p_value <= asked.max(SURELY) || found.terms[k].evident {
                 continue;
             }
             let mut others = model.terms.clone();
             others.remove(k);
-            if square(&self.model(&others)?) <= THREEFOLD.powi(2) * square(&model) {
+            let [without, with] = self.heldout_squares([&self.model(&others)?, &model]);
+            if without <= THREEFOLD.powi(2) * with {
                 self.drop(found, k);
             }
         }
         Ok(())
     }
 
-    /// Drops names until the held-out error is not above that of the declared model, or clearly below it where more
-    /// is left.
+    /// Drops names until the held-out error is not above that of the declared model, or clearly below it where
+    /// more is left.
     fn kept_below(&self, found: &mut Found) -> Result<(), Unusable> {
         let before = self.model(&[])?;
-        let square = |terms: &[Term]| -> Result<f64, Unusable> {
-            let model = self.model(terms)?;
-            Ok(self.heldout_error(&model, &before).square)
-        };
-        let of_before = self.heldout_error(&before, &before).square;
-        let limit = |found: &Found| {
+        while !found.terms.is_empty() {
             let evident = found.terms.iter().any(|t| t.evident);
             let sure = found.terms.iter().any(|t| t.p_value <= SURELY);
-            let most = match (evident, found.left.is_some() && !sure) {
-                (true, _) => EVIDENT,
-                (_, true) => BESIDE,
-                _ => ABOVE,
-            };
-            of_before * most.powi(2)
-        };
-        while !found.terms.is_empty() && square(&found.terms)? > limit(found) {
+            let model = self.model(&found.terms)?;
+            let most = if evident { EVIDENT } else { ABOVE };
+            let [of_before, of_after] = self.heldout_squares([&before, &model]);
+            let above = of_after > most.powi(2) * of_before;
+            let beside = found.left.is_some() && !sure && !evident;
+            if !above && !(beside && of_after > BESIDE.powi(2) * of_before) {
+                break;
+            }
             let mut least: Option<(usize, f64)> = None;
             for k in 0..found.terms.len() {
                 let mut others = found.terms.clone();
                 others.remove(k);
-                let square = square(&others)?;
+                let [_, square] = self.heldout_squares([&before, &self.model(&others)?]);
                 if least.is_none_or(|l| square < l.1) {
                     least = Some((k, square));
                 }
@@ -147,8 +142,8 @@ impl Search<'_> {
         }
         let mut others = model.terms.clone();
         others.remove(own);
-        let square = |m: &Model| self.heldout_error(m, model).square;
-        Ok(square(model) <= RULES.powi(2) * square(&self.model(&others)?))
+        let [with, without] = self.heldout_squares([model, &self.model(&others)?]);
+        Ok(with <= RULES.powi(2) * without)
     }
 
     /// Takes a name back.

@@ -2,7 +2,7 @@
 
 use super::judge::Judged;
 use super::reported::BEYOND;
-use super::{Found, LEVEL, Model, Search, Term};
+use super::{Found, LEVEL, Model, Search, Term, declared};
 use crate::closure::channels::Channels;
 use crate::closure::effects::map;
 use crate::closure::effects::tone::{self, Pickup};
@@ -85,14 +85,12 @@ impl Search<'_> {
             let mut others = model.terms.clone();
             others.remove(k);
             let without = self.model(&others)?;
-            let (a, b) = (
-                self.heldout_error(&model, &model),
-                self.heldout_error(&without, &model),
-            );
+            let surprise = |m: &Model| self.surprise(m, &model);
+            let [with, less] = self.heldout_squares([&model, &without]);
             let silent = term.p_value <= CERTAIN
                 && (self.unseen(&model, &without)
-                    || a.square < WITHIN * b.square && self.said(&model, &without, &model) < SAYS);
-            if !silent && a.innovations >= b.innovations && a.square >= b.square {
+                    || with < WITHIN * less && self.said(&model, &without, &model) < SAYS);
+            if !silent && surprise(&model) >= surprise(&without) && with >= less {
                 self.leaves(found, &term);
                 model = without;
             } else {
@@ -119,9 +117,10 @@ impl Search<'_> {
             terms[k].point = point;
             let mut others = model.terms.clone();
             others.remove(k);
-            let square = |m: &Model| self.heldout_error(m, &model).square;
-            let (own, least) = (square(&model), self.model(&terms)?);
-            if own > square(&self.model(&others)?) && own > square(&least) {
+            let least = self.model(&terms)?;
+            let [own, of_least, without] =
+                self.heldout_squares([&model, &least, &self.model(&others)?]);
+            if own > without && own > of_least {
                 model = least;
             }
         }
@@ -326,11 +325,23 @@ impl Search<'_> {
             let least_dps = model.fit.noise.white_rms_dps.min(0.5 * most_dps);
             return off_dps.iter().filter(|v| **v > least_dps).count() < 2;
         }
-        let once = |column: &Vec<f64>| {
-            let used = column.iter().zip(&self.used).filter(|(_, u)| **u);
-            let squares = used.map(|(v, _)| v * v);
+        let of_used = |column: &Vec<f64>| -> Vec<f64> {
+            let rows = column.iter().zip(&self.used).filter(|(_, u)| **u);
+            rows.map(|(v, _)| *v).collect()
+        };
+        // A step after the first row is that row's accident and a constant.
+        let declared: Vec<Vec<f64>> = declared(self.channels).iter().map(of_used).collect();
+        let declared = Basis::new(&declared);
+        let most_of_one = |column: &[f64]| {
+            let squares = column.iter().map(|v| v * v);
             let (sum, most) = squares.fold((0.0, 0.0_f64), |(s, m), v| (s + v, m.max(v)));
             most > ONE_ROW * sum
+        };
+        let once = |column: &Vec<f64>| {
+            let column = of_used(column);
+            let mut beyond = column.clone();
+            declared.project_off(&mut beyond);
+            most_of_one(&column) || most_of_one(&beyond)
         };
         let columns = term
             .candidate
