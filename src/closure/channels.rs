@@ -135,6 +135,11 @@ impl Channels {
         each.map(|(i, e)| e + rate.map_or(0.0, |r| r[i])).collect()
     }
 
+    /// Whether the power came back within the record.
+    pub fn restarts(&self) -> bool {
+        self.on_s.windows(2).any(|w| w[1] < w[0])
+    }
+
     /// Which rows are fitted on and which are held out.
     ///
     /// # Errors
@@ -145,6 +150,8 @@ impl Channels {
         let names = self.columns.keys().filter(moving);
         let mut cared: Vec<&[f64]> = names.filter_map(|name| self.moving(name)).collect();
         cared.extend(output.as_deref());
+        // What begins anew with the power is seen after each power-on alone.
+        cared.extend(self.restarts().then_some(&self.on_s[..]));
         blocks::split(&self.time_s, &self.u, &cared)
     }
 

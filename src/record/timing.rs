@@ -103,7 +103,9 @@ fn too_short(record: &ThermalRecord) -> Option<Warning> {
             "die_degc",
             format!(
                 "die_degc jumps from {:.1} to {:.1} degC at {:.1} s, faster than a die can: were \
-                 two sessions joined? Give time_s the pause between them, or close them one by one",
+                 two sessions joined? Then whatever else changed between them (orientation, mounting, power) \
+                 goes with the temperature, and a difference may be any of these: record both temperatures \
+                 in one session. Give time_s the pause between them, or close them one by one",
                 a.1, b.1, b.0
             ),
         ));

@@ -24,8 +24,9 @@ pub(super) fn past_lags(
     kinds: &[&LagTerm<'_>],
 ) -> Option<Vec<Term>> {
     let most_dps = wanted.iter().fold(1e-3, |m: f64, v| m.max(4.0 * v.abs()));
-    let restarts = c.on_s.windows(2).any(|w| w[1] < w[0]);
-    let kept = [false, true].into_iter().take(1 + usize::from(restarts));
+    let kept = [false, true]
+        .into_iter()
+        .take(1 + usize::from(c.restarts()));
     let each = kinds
         .iter()
         .flat_map(|term| kept.clone().map(move |kept| (term, kept)));

@@ -63,7 +63,7 @@ impl Candidate for Warmup {
         let fastest = 1.5 * c.period_s();
         let taus = spaced(fastest, (longest / 1.5).max(2.0 * fastest), 16);
         let mut out: Vec<Point> = taus.iter().map(|t| Point::at(0, &[t.ln()])).collect();
-        if c.on_known && c.on_s.windows(2).any(|w| w[1] < w[0]) {
+        if c.on_known && c.restarts() {
             for ratio in COOLING {
                 out.extend(
                     taus.iter()
@@ -83,7 +83,8 @@ impl Candidate for Warmup {
     }
 
     fn odds_against(&self, c: &Channels, point: &Point) -> f64 {
-        UNUSUAL * (warm_s(c, point) / SLOWEST_S).ln().max(0.0)
+        let rested = if point.form == RESTED { SELDOM } else { 0.0 };
+        UNUSUAL * (warm_s(c, point) / SLOWEST_S).ln().max(0.0) + rested
     }
 
     fn spacing(&self, c: &Channels, point: &Point) -> Vec<f64> {
@@ -122,8 +123,10 @@ impl Candidate for Warmup {
     }
 }
 
-/// Form of a warm-up that depends on the rest before it.
+/// Form of a warm-up that depends on the rest before it, and minus the logarithm of its odds: it is about the beginnings of
+/// a few power-ons, and no firmware can carry it.
 const RESTED: usize = 1;
+const SELDOM: f64 = 4.0;
 
 /// Time constants of the way back while the power is off, over that of the warm-up: where the search starts, and the
 /// least and the most that the record is asked for.

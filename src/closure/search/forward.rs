@@ -20,6 +20,10 @@ const FEW: usize = 2;
 const WORTH: f64 = 20.0;
 const WORTH_WHOLE: f64 = 5.0;
 
+/// Log-likelihood above its worth from which on a threshold without a free coefficient needs no surrogates: among noise that
+/// has all spikes in it many of them are nothing.
+const SURELY: f64 = 30.0;
+
 /// Names that are looked at for spikes; what a quick look may be short of a thorough one.
 const LOOKED: usize = 5;
 const MARGIN: f64 = 4.0;
@@ -194,8 +198,12 @@ impl Search<'_> {
         // one leads without the spikes.
         let quick = self.judge(&plain, 0);
         let mut worthy: Option<(&Judged, f64)> = None;
+        let mut sure: Vec<String> = Vec::new();
         for j in looked(&quick.judged, Judged::is_named) {
             let above = value(j)? - model.value - worth(j) + MARGIN;
+            if j.candidate.is_whole() && above > SURELY {
+                sure.push(j.candidate.id());
+            }
             if above >= worthy.map_or(0.0, |w| w.1) {
                 worthy = Some((j, above));
             }
@@ -210,7 +218,8 @@ impl Search<'_> {
         let all = self.judge(&plain, self.effort.surrogates);
         let mut best: Option<(&Judged, f64)> = None;
         let mut others = Vec::new();
-        for j in looked(&all.judged, Judged::is_found) {
+        let is_sure = |j: &Judged| sure.contains(&j.candidate.id());
+        for j in looked(&all.judged, |j| j.is_found() || is_sure(j)) {
             let value = value(j)?;
             others.push((j.candidate.id(), value));
             if best.is_none_or(|b| value > b.1) {
@@ -230,7 +239,13 @@ impl Search<'_> {
         }
         others.retain(|(id, value)| *id != best.candidate.id() && *value > reached - all.equal);
         let rivals = others.into_iter().map(|(id, _)| id).collect();
-        Ok(Some(Term::of(best, rivals)))
+        let mut term = Term::of(best, rivals);
+        if is_sure(best) {
+            term.p_value = term
+                .p_value
+                .min((model.value + worth(best) - reached).exp());
+        }
+        Ok(Some(term))
     }
 
     /// A quick fit beside a model: the noise is looked for near its own.
@@ -312,7 +327,7 @@ impl Search<'_> {
 /// those that only a few of them explain.
 fn looked(judged: &[Judged], are: impl Fn(&Judged) -> bool) -> impl Iterator<Item = &Judged> {
     let each = judged.iter().filter(move |j| are(j)).enumerate();
-    each.filter(|(k, j)| *k < LOOKED || j.candidate.is_last())
+    each.filter(|(k, j)| *k < LOOKED || j.candidate.is_last() || j.candidate.is_whole())
         .map(|(_, j)| j)
 }
 

@@ -37,10 +37,13 @@ impl Search<'_> {
             of_row.fold(f64::INFINITY, f64::min)
         };
         let rows: Vec<usize> = (0..self.train.len()).filter(|row| judged(*row)).collect();
-        let nearest: Vec<f64> = rows.iter().map(|row| least(*row)).collect();
-        let far_dps = ACCIDENT * stats::MAD_TO_STD * stats::median(&nearest);
+        let deviation_dps = residuals.iter().map(|r| {
+            let sizes: Vec<f64> = rows.iter().map(|row| r[*row].abs()).collect();
+            stats::MAD_TO_STD * stats::median(&sizes)
+        });
+        let far_dps = ACCIDENT * deviation_dps.fold(f64::INFINITY, f64::min);
         let far_dps = far_dps.max(self.nothing_dps());
-        let far: Vec<bool> = nearest.iter().map(|n| *n > far_dps).collect();
+        let far: Vec<bool> = rows.iter().map(|row| least(*row) > far_dps).collect();
         let count = far.iter().filter(|f| **f).count();
         let mut out = vec![false; self.train.len()];
         let few = rows.len() >= LEAST && count as f64 <= FEW * rows.len() as f64;
@@ -92,3 +95,7 @@ impl Search<'_> {
         Some(pairs.map(|(w, _)| (w / unit).powi(2).min(MOST)).sum())
     }
 }
+
+#[cfg(test)]
+#[path = "heldout_tests.rs"]
+mod tests;

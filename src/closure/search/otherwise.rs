@@ -34,12 +34,13 @@ const ALL_BUT: f64 = 0.02;
 /// Share of the error's range that is nothing.
 const NOTHING: f64 = 1e-4;
 
-/// Slow noise, in units of the white (or all that is left, in units of what it differs by from row to row), from which on
-/// it is said that something is left: a walk of the rate, or a cause that wanders as one.
+/// Slow noise, in units of the white, from which on it is said that something is left: a walk of the rate, or a cause that
+/// wanders as one.
 const MUCH: f64 = 3.0;
 
-/// The same beside names: a part of a cause that nobody knows may look like a name, and the rest like slow noise.
-const MUCH_BESIDE: f64 = 2.2;
+/// The same of all that is left, in units of what it differs by from row to row: what nobody knows may look like slow
+/// noise. Of white noise it is 1, with 1/f noise of a third of its strength per decade 1.2 to 1.3.
+const ROUGH: f64 = 1.5;
 
 /// What another run has to be worth, log-likelihood less the price of the terms: to explain as much as the first, and all
 /// but a little of it.
@@ -70,14 +71,15 @@ impl Search<'_> {
     pub fn run(&self) -> Result<Found, Unusable> {
         let mut found = self.run_any()?;
         let model = self.model(&found.terms)?;
-        let most = if found.terms.is_empty() {
-            MUCH
-        } else {
-            MUCH_BESIDE
-        };
-        let wanders = || self.wander(&model) > MUCH || self.roughly(&model) > most;
+        let rough = || self.roughly(&model) > ROUGH && !self.forgets(&model);
+        let wanders = || self.wander(&model) > MUCH || rough();
         if found.left.is_none() && (self.missed(&model) || wanders()) {
             found.left = Some("time_s".to_owned());
+        }
+        let named: Vec<String> = found.terms.iter().map(Term::id).collect();
+        for term in &mut found.terms {
+            // What is in beside a step is no other name for it.
+            term.rivals.retain(|id| !named.contains(id));
         }
         found.once = self.once(&found)?;
         if !found.once.is_empty() {

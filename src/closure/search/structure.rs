@@ -81,7 +81,7 @@ impl Search<'_> {
 
     /// Whether what a model leaves is noise with a short memory: that explains it better than 1/f noise and a walk do, and
     /// all of it.
-    fn forgets(&self, model: &Model) -> bool {
+    pub(super) fn forgets(&self, model: &Model) -> bool {
         let fit = &model.fit;
         let rest = fit.reduce(&model.residual(self.channels));
         let line = &fit.problem.line;

@@ -154,6 +154,28 @@ fn a_transient_of_one_row_is_an_accident_and_one_of_twelve_is_none() {
 }
 
 #[test]
+fn a_step_after_the_first_row_is_that_rows_accident_and_one_after_twelve_is_none() {
+    let mut random = Random::new(4);
+    let degc = triangle(2 * ROWS + 1)[..ROWS].to_vec();
+    let output = (0..ROWS).map(|_| 0.01 * random.normal()).collect();
+    let columns = BTreeMap::from([
+        ("rate_out_dps".to_owned(), output),
+        ("die_degc".to_owned(), degc),
+    ]);
+    let time_s: Vec<f64> = (0..ROWS).map(|k| 10.0 * k as f64).collect();
+    let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+    let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+    let is_it = |c: &&Arc<dyn Candidate>| c.id() == "stress_jump";
+    let candidate = search.candidates().iter().find(is_it).unwrap();
+    for (rows, once) in [(1, true), (12, false), (ROWS - 1, true), (ROWS - 12, false)] {
+        let centre = 0.5 * (c.smooth_u[rows - 1] + c.smooth_u[rows]);
+        let term = Term::new(candidate.clone(), Point::at(0, &[centre]));
+        let model = search.model(std::slice::from_ref(&term)).unwrap();
+        assert_eq!(search.shows_once(&term, &model), once, "{rows}");
+    }
+}
+
+#[test]
 fn a_clip_of_one_row_is_an_accident_and_one_of_two_is_none() {
     let mut random = Random::new(3);
     // Peaks of 100, 97, 94, ... deg/s, each of one row.
