@@ -71,10 +71,13 @@ impl Search<'_> {
     pub fn run(&self) -> Result<Found, Unusable> {
         let mut found = self.run_any()?;
         let model = self.model(&found.terms)?;
-        let rough = || self.roughly(&model) > ROUGH && !self.forgets(&model);
+        // Alone, noise that a filter made is noise; beside names it may be a part of what these are of.
+        let filtered = || found.terms.is_empty() && self.forgets(&model);
+        let rough = || self.roughly(&model) > ROUGH && !filtered();
         let wanders = || self.wander(&model) > MUCH || rough();
         if found.left.is_none() && (self.missed(&model) || wanders()) {
             found.left = Some("time_s".to_owned());
+            self.kept_alone(&mut found)?;
         }
         let named: Vec<String> = found.terms.iter().map(Term::id).collect();
         for term in &mut found.terms {
