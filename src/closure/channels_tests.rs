@@ -170,3 +170,30 @@ fn a_coarse_reading_has_the_noise_of_its_steps_and_a_mean_takes_away_noise_alone
     let dwells: Vec<f64> = dwells.iter().map(|v| v + 1e-5 * random.normal()).collect();
     assert_eq!(averaged(&time_s, &dwells), dwells);
 }
+
+/// Of the power-ons in the middle of a record, how many begin in held-out rows, with and without their clock.
+#[test]
+fn the_rows_after_a_power_on_are_fitted() {
+    let rows = 450;
+    let time_s: Vec<f64> = (0..rows).map(|k| 60.0 * k as f64).collect();
+    let degc: Vec<f64> = [1.0, -1.0, 1.0, -1.0, 1.0, -1.0]
+        .iter()
+        .flat_map(|sign| (0..rows / 6).map(move |k| sign * (k as f64 - 37.0)))
+        .collect();
+    let (mut held_out, mut without) = (0, 0);
+    for again in (50..400).step_by(7) {
+        let on_s = |k: usize| time_s[k] - if k < again { 0.0 } else { time_s[again] - 3.0 };
+        let on_s = Some((0..rows).map(on_s).collect());
+        let seen = |on_s| {
+            channels(&time_s, degc.clone(), on_s)
+                .split()
+                .unwrap()
+                .heldout[again]
+        };
+        held_out += usize::from(seen(on_s));
+        without += usize::from(seen(None));
+    }
+    assert_eq!(held_out, 0);
+    // The rule has something to do.
+    assert!(without > 8, "{without}");
+}

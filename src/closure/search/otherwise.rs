@@ -42,6 +42,9 @@ const MUCH: f64 = 3.0;
 /// noise. Of white noise it is 1, with 1/f noise of a third of its strength per decade 1.2 to 1.3.
 const ROUGH: f64 = 1.5;
 
+/// Deviations by which the ratio of few rows has to be beyond what white noise makes it.
+const BY_CHANCE: f64 = 3.5;
+
 /// What another run has to be worth, log-likelihood less the price of the terms: to explain as much as the first, and all
 /// but a little of it.
 struct Due {
@@ -73,11 +76,12 @@ impl Search<'_> {
         let model = self.model(&found.terms)?;
         // Alone, noise that a filter made is noise; beside names it may be a part of what these are of.
         let filtered = || found.terms.is_empty() && self.forgets(&model);
-        let rough = || self.roughly(&model) > ROUGH && !filtered();
+        let used = self.used.iter().filter(|u| **u).count();
+        let rough = || self.roughly(&model) > ROUGH.max(rough_by_chance(used)) && !filtered();
         let wanders = || self.wander(&model) > MUCH || rough();
         if found.left.is_none() && (self.missed(&model) || wanders()) {
             found.left = Some("time_s".to_owned());
-            self.kept_alone(&mut found)?;
+            self.kept_stable(&mut found)?;
         }
         let named: Vec<String> = found.terms.iter().map(Term::id).collect();
         for term in &mut found.terms {
@@ -270,6 +274,17 @@ impl Search<'_> {
     }
 }
 
+/// What so many rows of white noise are in units of what they differ by, at most: half of the mean square difference over
+/// the variance is 1 with a standard deviation of 1 / sqrt(rows) (von Neumann 1941).
+fn rough_by_chance(rows: usize) -> f64 {
+    let least = 1.0 - BY_CHANCE / (rows as f64).sqrt();
+    if least > 0.0 {
+        (1.0 / least).sqrt()
+    } else {
+        f64::INFINITY
+    }
+}
+
 /// Whether marked rows have more marked neighbours than chance gives them.
 pub(super) fn stand_together(out: &[bool]) -> bool {
     let count = out.iter().filter(|o| **o).count() as f64;
@@ -342,6 +357,21 @@ mod tests {
             );
         }
         assert_eq!(of_noisy_squares(4, 0.0), (name(), None));
+    }
+
+    #[test]
+    fn white_noise_is_hardly_ever_as_rough_as_what_is_left() {
+        let mut random = Random::new(6);
+        for rows in [16, 25, 40, 200] {
+            let rough = |random: &mut Random| {
+                let noise: Vec<f64> = (0..rows).map(|_| random.normal()).collect();
+                stats::rms(&noise) / stats::difference_noise(&noise)
+                    > ROUGH.max(rough_by_chance(rows))
+            };
+            let count = (0..4000).filter(|_| rough(&mut random)).count();
+            assert!(count < 20, "{rows}: {count}");
+        }
+        assert!(rough_by_chance(60) < ROUGH && rough_by_chance(20) > ROUGH);
     }
 
     #[test]

@@ -116,7 +116,7 @@ impl Search<'_> {
     /// Where something is left, drops the names that are not far beyond chance, not as stable as a local shape has to
     /// be or not of one gain: a cause that was not recorded looks a little like many things, each in a part of
     /// the record. What is as good and listed does not count against a name.
-    fn kept_stable(&self, found: &mut Found) -> Result<(), Unusable> {
+    pub(super) fn kept_stable(&self, found: &mut Found) -> Result<(), Unusable> {
         if found.left.is_none() {
             return Ok(());
         }
