@@ -115,7 +115,7 @@ pub fn close(
             found: &found,
             before: &before,
             after: &after,
-            judged: Judged::of(&search, &accidents),
+            judged: JudgedRows::of(&search, &accidents),
         };
         let mut closure = told.closure().map_err(unusable)?;
         told.warn(&mut warnings);
@@ -144,20 +144,20 @@ pub fn close(
 }
 
 /// The rows that errors are of, and those that stand out alone.
-struct Judged {
+struct JudgedRows {
     train: Vec<bool>,
     heldout: Vec<bool>,
     accidents: Vec<bool>,
 }
 
-impl Judged {
+impl JudgedRows {
     /// Those of a search that are no accidents.
     fn of(search: &Search, accidents: &[bool]) -> Self {
         let usual = |rows: &[bool]| -> Vec<bool> {
             let pairs = rows.iter().zip(accidents);
             pairs.map(|(row, accident)| *row && !accident).collect()
         };
-        Judged {
+        JudgedRows {
             train: usual(&search.train),
             heldout: usual(&search.heldout),
             accidents: accidents.to_vec(),
@@ -171,7 +171,7 @@ struct Told<'a> {
     found: &'a Found,
     before: &'a Model,
     after: &'a Model,
-    judged: Judged,
+    judged: JudgedRows,
 }
 
 impl Told<'_> {

@@ -95,7 +95,8 @@ impl Search<'_> {
             let [of_before, of_after] = self.heldout_squares([&before, &model]);
             let above = of_after > most.powi(2) * of_before;
             let beside = found.left.is_some() && !sure && !evident;
-            if !above && !(beside && of_after > BESIDE.powi(2) * of_before) {
+            let little = beside && of_after > BESIDE.powi(2) * of_before;
+            if !above && !little {
                 break;
             }
             let mut least: Option<(usize, f64)> = None;

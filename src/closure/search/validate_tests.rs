@@ -131,17 +131,23 @@ fn a_clip_that_no_held_out_row_shows_stands() {
     }
 }
 
-#[test]
-fn a_transient_of_one_row_is_an_accident_and_one_of_twelve_is_none() {
-    let mut random = Random::new(2);
-    let degc = [triangle(ROWS / 2), triangle(ROWS / 2)].concat();
-    let output = (0..ROWS).map(|_| 0.01 * random.normal()).collect();
+/// Noise alone beside a thermometer.
+fn quiet(seed: u64, degc: Vec<f64>) -> Channels {
+    let mut random = Random::new(seed);
     let columns = BTreeMap::from([
-        ("rate_out_dps".to_owned(), output),
+        (
+            "rate_out_dps".to_owned(),
+            (0..ROWS).map(|_| 0.01 * random.normal()).collect(),
+        ),
         ("die_degc".to_owned(), degc),
     ]);
     let time_s: Vec<f64> = (0..ROWS).map(|k| 10.0 * k as f64).collect();
-    let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+    Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap()
+}
+
+#[test]
+fn a_transient_of_one_row_is_an_accident_and_one_of_twelve_is_none() {
+    let c = quiet(2, [triangle(ROWS / 2), triangle(ROWS / 2)].concat());
     let split = c.split().unwrap();
     let search = Search::new(&c, &split, Effort::default(), Vec::new());
     let is_it = |c: &&Arc<dyn Candidate>| c.id() == "warmup_transient";
@@ -155,15 +161,7 @@ fn a_transient_of_one_row_is_an_accident_and_one_of_twelve_is_none() {
 
 #[test]
 fn a_step_after_the_first_row_is_that_rows_accident_and_one_after_twelve_is_none() {
-    let mut random = Random::new(4);
-    let degc = triangle(2 * ROWS + 1)[..ROWS].to_vec();
-    let output = (0..ROWS).map(|_| 0.01 * random.normal()).collect();
-    let columns = BTreeMap::from([
-        ("rate_out_dps".to_owned(), output),
-        ("die_degc".to_owned(), degc),
-    ]);
-    let time_s: Vec<f64> = (0..ROWS).map(|k| 10.0 * k as f64).collect();
-    let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+    let c = quiet(4, triangle(2 * ROWS + 1)[..ROWS].to_vec());
     let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
     let is_it = |c: &&Arc<dyn Candidate>| c.id() == "stress_jump";
     let candidate = search.candidates().iter().find(is_it).unwrap();
