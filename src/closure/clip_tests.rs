@@ -70,7 +70,6 @@ fn levels_lie_where_the_clipped_rows_do_wherever_the_search_left_them() {
                     "{seed}, {start:?}: {found}"
                 );
             }
-            assert!(model.off_dps.abs() < 3.0 * std_dps, "{}", model.off_dps);
         }
     }
 }

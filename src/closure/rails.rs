@@ -39,7 +39,8 @@ pub struct Rails {
     pub upper_dps: Option<f64>,
     /// deg/s.
     pub lower_dps: Option<f64>,
-    /// Rows that stand at one, or are held at one but for noise that came after the clip.
+    /// Rows that stand at one, or are held at one but for noise that came after the clip: they pile up there, or the applied
+    /// rate is far beyond it.
     pub rows: Vec<bool>,
     /// Probability that chance makes so many readings agree at the less certain of them.
     pub p_value: f64,
@@ -100,11 +101,22 @@ pub fn of(c: &Channels, rows: &[bool]) -> Option<Rails> {
     let small = width <= SMALL * (readings[0].0 - readings[readings.len() - 1].0);
     let upper_pile = upper_dps.filter(|l| small && is_piled(short.iter().map(|v| l - v), width));
     let lower_pile = lower_dps.filter(|l| small && is_piled(short.iter().map(|v| v - l), width));
-    let held = |v: f64| {
-        upper_pile.is_some_and(|l| v > l - width) || lower_pile.is_some_and(|l| v < l + width)
+    let above = |level: Option<f64>, v: f64| level.is_some_and(|l| v > l - width);
+    let below = |level: Option<f64>, v: f64| level.is_some_and(|l| v < l + width);
+    let piled = |v: f64| above(upper_pile, v) || below(lower_pile, v);
+    // What the output would be without a clip, to within how far the error goes.
+    let (usual, far) = (stats::median(&free), NEAR * stats::robust_std(&free));
+    let rate = c.column("rate_dps");
+    let driven = |row: usize, v: f64| {
+        let due = rate.map_or(0.0, |r| r[row]) + usual;
+        small
+            && (above(upper_dps, v) && above(upper_dps, due - far - 2.0 * width)
+                || below(lower_dps, v) && below(lower_dps, due + far + 2.0 * width))
     };
-    let pairs = output.iter().zip(&stand);
-    let held = pairs.map(|(v, stands)| *stands || held(*v)).collect();
+    let pairs = output.iter().zip(&stand).enumerate();
+    let held = pairs
+        .map(|(row, (v, stands))| *stands || piled(*v) || driven(row, *v))
+        .collect();
     (!coarse).then_some(Rails {
         upper_dps,
         lower_dps,

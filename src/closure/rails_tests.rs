@@ -361,3 +361,67 @@ fn noise_between_two_clips_leaves_half_of_the_clipped_readings_short_of_the_rail
     let worst = residual.iter().fold(0.0, |m: f64, r| m.max(r.abs()));
     assert!(worst < 0.1, "{worst}");
 }
+
+/// A rate table of an output whose upper end is hard, but in two readings, a little short of that (their means have a sample
+/// within the range); its rates.
+fn nearly_hard() -> (Vec<f64>, Vec<f64>) {
+    let mut random = Random::new(5);
+    let rate = |k: usize| [0.0, 60.0, -60.0, 100.0, -100.0, 140.0, 240.0][k % 7];
+    let output = (0..84).map(|k| {
+        let total = rate(k) - 0.5 + 0.02 * random.normal();
+        let short = match k {
+            12 => 0.001,
+            27 => 0.002,
+            _ => 0.0,
+        };
+        if total > 121.0 { 121.0 - short } else { total }
+    });
+    (output.collect(), (0..84).map(rate).collect())
+}
+
+#[test]
+fn a_reading_near_to_a_rail_is_held_there_where_the_rate_is_far_beyond_it() {
+    let (output, rates) = nearly_hard();
+    let c = channels(&output, Some(&rates));
+    let rails = of_all(&c).unwrap();
+    let beyond: Vec<bool> = rates.iter().map(|r| *r > 130.0).collect();
+    assert_eq!(rails.upper_dps, Some(121.0));
+    assert_eq!(rails.rows, beyond);
+    let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+    let found = search.run().unwrap();
+    let residual = search.model(&found.terms).unwrap().residual(&c);
+    let worst = residual.iter().fold(0.0, |m: f64, r| m.max(r.abs()));
+    assert!(worst < 0.1, "{worst}");
+    // What lies a noise below, at a rate that is no more than that beyond, may have been there without the clip.
+    let mut output = output;
+    output[5] = 120.97;
+    let mut rates = rates;
+    rates[5] = 121.47;
+    let c = channels(&output, Some(&rates));
+    assert!(!of_all(&c).unwrap().rows[5]);
+}
+
+#[test]
+fn a_level_opposite_to_a_rail_is_where_its_rows_are_whatever_wanders_beside_it() {
+    // Sweeps of a rate table whose zero wanders. What wanders comes before the clip.
+    for seed in 0..6 {
+        let mut random = Random::new(seed);
+        let sweeps = [50.0, 100.0, 200.0, 400.0].iter();
+        let rates: Vec<f64> = sweeps
+            .flat_map(|most| (-5..=5).map(move |k| most * f64::from(k) / 5.0))
+            .collect();
+        let mut zero = 0.0;
+        let output = rates.iter().map(|rate| {
+            zero += 0.1 * random.normal();
+            let held = f64::max(rate + zero, -120.0) + 0.01 * random.normal();
+            held.min(121.0)
+        });
+        let output: Vec<f64> = output.collect();
+        let c = channels(&output, Some(&rates));
+        let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+        assert_eq!(search.rails.as_ref().unwrap().lower_dps, None);
+        let model = search.beginning().unwrap();
+        let levels = &model.terms[0].point.theta;
+        assert!((levels[1] + 120.0).abs() < 0.02, "{seed}: {levels:?}");
+    }
+}

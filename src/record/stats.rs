@@ -29,7 +29,16 @@ pub fn quantile_sorted(v: &[f64], p: f64) -> f64 {
 
 /// The median.
 pub fn median(values: &[f64]) -> f64 {
-    quantile_sorted(&sorted(values), 0.5)
+    let mut v: Vec<f64> = values.iter().copied().filter(|x| !x.is_nan()).collect();
+    let Some(last) = v.len().checked_sub(1) else {
+        return f64::NAN;
+    };
+    let (_, low, above) = v.select_nth_unstable_by(last / 2, f64::total_cmp);
+    let low = *low;
+    match last % 2 {
+        0 => low,
+        _ => 0.5 * low + 0.5 * above.iter().copied().fold(f64::INFINITY, f64::min),
+    }
 }
 
 /// Median absolute deviation about the median, scaled to a standard deviation; 0 where more than

@@ -1,8 +1,8 @@
 //! Effects of the drive loop: damping and amplitude.
 
 use super::{
-    Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, entry, gain, map,
-    moving, spaced,
+    Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, UNUSUAL, entry, gain,
+    map, moving, spaced,
 };
 use crate::closure::channels::Channels;
 use crate::closure::firmware::Words;
@@ -51,6 +51,9 @@ const DAMPING: Sheet = Sheet {
 /// Where the phase's own delay puts the resonance beside a quarter turn: places of the search, and the most, rad.
 const OFF_RAD: [f64; 4] = [-0.35, -0.15, 0.15, 0.35];
 const MOST_OFF_RAD: f64 = 0.6;
+
+/// From here on it is unusual: far from its resonance a bend is the same at all temperatures, as a pull is.
+const USUAL_OFF_RAD: f64 = 0.1;
 
 /// Shapes of the effect: the gain's own, the phase's bend, both; from [`SHAPES`] on, of a drive off its resonance.
 const SHAPES: usize = 3;
@@ -104,8 +107,13 @@ impl Candidate for Damping {
     }
 
     fn columns(&self, c: &Channels, bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
+        let mut all = self.columns_of(c, std::slice::from_ref(bias), point);
+        all.pop().unwrap_or_default()
+    }
+
+    fn columns_of(&self, c: &Channels, biases: &[Bias], point: &Point) -> Vec<Vec<Vec<f64>>> {
         let Some(g) = c.column("agc") else {
-            return Vec::new();
+            return vec![Vec::new(); biases.len()];
         };
         let off_rad = point.theta.first().copied().unwrap_or(0.0);
         let resonance = c.resonance_rad() + off_rad.clamp(-MOST_OFF_RAD, MOST_OFF_RAD);
@@ -115,25 +123,32 @@ impl Candidate for Damping {
             let rad = share * (c.centre + c.half * u - resonance);
             rad.clamp(-STEEP_RAD, STEEP_RAD)
         };
-        let damping = match point.form / SHAPES {
-            0 => g.to_vec(),
-            _ => detuned(g, &map(&c.u, from_resonance)),
+        let form = point.form % SHAPES;
+        let (bends, is_detuned) = (form != 0, point.form >= SHAPES);
+        let angles = match bends || is_detuned {
+            true => map(&c.u, from_resonance),
+            false => Vec::new(),
         };
-        let plain = || map(&damping, |d| d - 1.0);
-        let bend = || {
-            let pairs = c.u.iter().zip(&damping);
-            let each = pairs.map(|(u, d)| {
-                let angle = from_resonance(*u);
-                let bent_rad = (d * angle.tan()).atan() - angle;
-                bias.at(u + bent_rad / c.half) - bias.at(*u)
-            });
-            each.collect()
+        let damping = match is_detuned {
+            true => detuned(g, &angles),
+            false => g.to_vec(),
         };
-        match point.form % SHAPES {
-            0 => vec![plain()],
-            1 => vec![bend()],
-            _ => vec![plain(), bend()],
-        }
+        let bent_u: Vec<f64> = match bends {
+            true => {
+                let rows = c.u.iter().zip(&damping).zip(&angles);
+                let bent = rows.map(|((u, d), a)| u + ((d * a.tan()).atan() - a) / c.half);
+                bent.collect()
+            }
+            false => Vec::new(),
+        };
+        let plain = map(&damping, |d| d - 1.0);
+        let bend = |bias: &Bias| moved(&c.u, &bent_u, bias);
+        let each = biases.iter().map(|bias| match form {
+            0 => vec![plain.clone()],
+            1 => vec![bend(bias)],
+            _ => vec![plain.clone(), bend(bias)],
+        });
+        each.collect()
     }
 
     fn acts_on_bias(&self) -> bool {
@@ -159,6 +174,11 @@ impl Candidate for Damping {
         if point.form % SHAPES == 2 { 2.0 } else { 0.0 }
     }
 
+    fn odds_against(&self, _c: &Channels, point: &Point) -> f64 {
+        let off_rad = point.theta.first().map_or(0.0, |off| off.abs());
+        UNUSUAL * (off_rad / USUAL_OFF_RAD).ln().max(0.0)
+    }
+
     fn correction(&self, c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
         let columns = self.columns(c, &f.bias.clone(), &e.point);
         f.surface(c, "agc", &columns, &e.beta)
@@ -180,13 +200,25 @@ impl Candidate for Damping {
     }
 }
 
+/// What a bias is at other readings than those that are there, less what it is at these.
+fn moved(from_u: &[f64], to_u: &[f64], bias: &Bias) -> Vec<f64> {
+    let pairs = from_u.iter().zip(to_u);
+    pairs
+        .map(|(from, to)| bias.at(*to) - bias.at(*from))
+        .collect()
+}
+
 /// The damping, relative, of a drive that is held at its amplitude off resonance: the force has the elastic part as well,
 /// g = sqrt(d^2 + t^2) with t = d tan(angle), the angle that of the phase from resonance; where the gain is 1, so is the damping.
 fn detuned(g: &[f64], angle_rad: &[f64]) -> Vec<f64> {
     let damping: Vec<f64> = g.iter().zip(angle_rad).map(|(g, a)| g * a.cos()).collect();
     let mut order: Vec<usize> = (0..g.len()).filter(|k| damping[*k].is_finite()).collect();
-    order.sort_by(|a, b| (g[*a] - 1.0).abs().total_cmp(&(g[*b] - 1.0).abs()));
     let near = order.len().div_ceil(NOMINAL).max(1);
+    let off = |k: &usize| (g[*k] - 1.0).abs();
+    if near < order.len() {
+        // The first of equal ones.
+        order.select_nth_unstable_by(near, |a, b| off(a).total_cmp(&off(b)).then(a.cmp(b)));
+    }
     let sum: f64 = order.iter().take(near).map(|k| damping[*k]).sum();
     let nominal = sum / near as f64;
     map(&damping, |d| d / nominal)
@@ -239,16 +271,21 @@ impl Candidate for Coupling {
     }
 
     fn columns(&self, c: &Channels, bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
+        let mut all = self.columns_of(c, std::slice::from_ref(bias), point);
+        all.pop().unwrap_or_default()
+    }
+
+    fn columns_of(&self, c: &Channels, biases: &[Bias], point: &Point) -> Vec<Vec<Vec<f64>>> {
         let (pull, most) = pulls(c, point.form);
-        let pairs = c.u.iter().zip(&pull);
-        vec![match point.theta.first() {
-            Some(most_u) => {
-                let k = most_u / most;
-                let moved = |(u, d): (&f64, &f64)| bias.at(u - k * d) - bias.at(*u);
-                pairs.map(moved).collect()
-            }
-            None => pairs.map(|(u, d)| -bias.slope(*u) * d).collect(),
-        }]
+        let rows = || c.u.iter().zip(&pull);
+        let Some(most_u) = point.theta.first() else {
+            let along = |b: &Bias| vec![rows().map(|(u, d)| -b.slope(*u) * d).collect()];
+            return biases.iter().map(along).collect();
+        };
+        let k = most_u / most;
+        let pulled_u: Vec<f64> = rows().map(|(u, d)| u - k * d).collect();
+        let each = biases.iter().map(|b| vec![moved(&c.u, &pulled_u, b)]);
+        each.collect()
     }
 
     fn is_sized(&self, point: &Point) -> bool {

@@ -196,6 +196,11 @@ pub trait Candidate: Send + Sync {
     /// The columns of a shape, one value a row.
     fn columns(&self, c: &Channels, bias: &Bias, point: &Point) -> Vec<Vec<f64>>;
 
+    /// The same for several biases: what a shape is apart from the bias is worked out once.
+    fn columns_of(&self, c: &Channels, biases: &[Bias], point: &Point) -> Vec<Vec<Vec<f64>>> {
+        biases.iter().map(|b| self.columns(c, b, point)).collect()
+    }
+
     /// Distance of neighbouring points in each non-linear parameter.
     fn spacing(&self, _c: &Channels, point: &Point) -> Vec<f64> {
         vec![0.2; point.theta.len()]

@@ -23,16 +23,15 @@ struct Affine {
 impl Affine {
     /// Those of a shape, for a bias with `order` coefficients.
     fn of(c: &Channels, candidate: &dyn Candidate, point: &Point, order: usize) -> Vec<Affine> {
-        let columns = |coefficients_dps: Vec<f64>| {
-            let bias = Bias {
-                coefficients_dps,
-                others_dps: Vec::new(),
-            };
-            candidate.columns(c, &bias, point)
+        let bias = |coefficients_dps: Vec<f64>| Bias {
+            coefficients_dps,
+            others_dps: Vec::new(),
         };
-        let still = columns(vec![0.0; order]);
         let unit = |j: usize| (0..order).map(|k| f64::from(u8::from(k == j))).collect();
-        let units: Vec<Vec<Vec<f64>>> = (0..order).map(|j| columns(unit(j))).collect();
+        let mut biases = vec![bias(vec![0.0; order])];
+        biases.extend((0..order).map(|j| bias(unit(j))));
+        let mut units = candidate.columns_of(c, &biases, point);
+        let still = units.remove(0);
         let each = still.into_iter().enumerate();
         each.map(|(i, still)| {
             let by_bias = units.iter().map(|columns| {

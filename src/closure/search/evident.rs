@@ -17,7 +17,7 @@ impl Search<'_> {
     ///
     /// # Errors
     /// Too few rows.
-    pub(super) fn beginning(&self) -> Result<Model, Unusable> {
+    pub fn beginning(&self) -> Result<Model, Unusable> {
         let given = self.beginning.borrow().given.clone();
         if !given.is_empty() {
             return self.polished(self.model(&given)?);
@@ -66,9 +66,10 @@ impl Search<'_> {
             return Ok(None);
         };
         for _ in 0..STEPS {
+            let off_dps = self.off_level(&best);
             let term = &best.terms[0];
-            let level_dps = self.free_level(term) + best.off_dps;
-            let Some(point) = self.with_level(&term.candidate, level_dps) else {
+            let Some(point) = self.with_level(&term.candidate, self.free_level(term) + off_dps)
+            else {
                 break;
             };
             let term = Term {
@@ -76,7 +77,7 @@ impl Search<'_> {
                 ..term.clone()
             };
             let next = self.model(&[term])?;
-            if next.off_dps.abs() >= best.off_dps.abs() {
+            if self.off_level(&next).abs() >= off_dps.abs() {
                 break;
             }
             best = next;
@@ -98,6 +99,16 @@ impl Search<'_> {
         let is_upper = self.rails.as_ref().is_some_and(|r| r.upper_dps.is_none());
         let level = term.point.theta.get(usize::from(!is_upper));
         level.copied().unwrap_or(0.0)
+    }
+
+    /// How far the rows that a clip holds on the side without a rail lie from its level on average, deg/s: what they have in
+    /// common beside slow noise says less of it, for a clip holds back what wanders before it.
+    fn off_level(&self, model: &Model) -> f64 {
+        let [upper, lower] = self.off_levels(model, &model.terms[0]);
+        match self.rails.as_ref().is_some_and(|r| r.upper_dps.is_none()) {
+            true => upper,
+            false => lower,
+        }
     }
 
     /// Levels to try on the side without a rail.

@@ -17,7 +17,7 @@ const FEW: usize = 2;
 /// Log-likelihood by which an explanation of spikes has to be better than none: two accidents near
 /// to each other are soon explained by a shape with a few parameters, less so by a threshold
 /// without a free coefficient.
-const WORTH: f64 = 20.0;
+pub(super) const WORTH: f64 = 20.0;
 const WORTH_WHOLE: f64 = 5.0;
 
 /// Log-likelihood above its worth from which on a threshold without a free coefficient needs no surrogates: among noise that

@@ -15,6 +15,9 @@ const ACCIDENT: f64 = 6.0;
 const FEW: f64 = 0.05;
 const LEAST: usize = 60;
 
+/// Rows by which a step's place may be off.
+const ASTRAY: usize = 3;
+
 impl Search<'_> {
     /// Sum of squares over held-out rows of the residual's innovations under the noise of `judge`, in units of their
     /// variance, each at most 16: slow noise, which no model predicts, counts little. Of one judge, comparable.
@@ -28,12 +31,15 @@ impl Search<'_> {
     }
 
     /// Rows, fitted or held out, that are accidents to all models that are compared: few, each by itself, and far off. One
-    /// of them may outweigh whatever the models differ by, so that errors are of the other rows.
+    /// of them may outweigh whatever the models differ by, so that errors are of the other rows. A row next to a step, on
+    /// whose other side it would be none, is an error of the model.
     pub fn accidents<const N: usize>(&self, models: [&Model; N]) -> Vec<bool> {
         let residuals = models.map(|m| m.residual(self.channels));
+        let switched = models.map(|m| self.across_steps(m));
         let judged = |row: usize| self.train[row] || self.heldout[row];
         let least = |row: usize| {
-            let of_row = residuals.iter().map(|r| r[row].abs());
+            let of_model = residuals.iter().zip(&switched);
+            let of_row = of_model.map(|(r, by)| (r[row] + by[row]).abs().min(r[row].abs()));
             of_row.fold(f64::INFINITY, f64::min)
         };
         let rows: Vec<usize> = (0..self.train.len()).filter(|row| judged(*row)).collect();
@@ -53,6 +59,27 @@ impl Search<'_> {
             }
         }
         out
+    }
+
+    /// By how much a model's residual would change, deg/s, if a step that a row is near to came on its other side: of what
+    /// the neighbours have, what suits the row best. 0 where no step is near.
+    fn across_steps(&self, model: &Model) -> Vec<f64> {
+        let mut by_dps = vec![0.0; self.train.len()];
+        let residual = model.residual(self.channels);
+        let parts = model.contributions(self.channels);
+        let steps = model.terms.iter().zip(&parts);
+        for (_, part) in steps.filter(|(t, _)| t.candidate.is_local()) {
+            for row in 0..part.len() {
+                let near = row.saturating_sub(ASTRAY)..(row + ASTRAY + 1).min(part.len());
+                for neighbour in near {
+                    let by = part[row] - part[neighbour];
+                    if (residual[row] + by).abs() < (residual[row] + by_dps[row]).abs() {
+                        by_dps[row] = by;
+                    }
+                }
+            }
+        }
+        by_dps
     }
 
     /// Mean squares over the held-out rows, (deg/s)^2, of models that are compared, without accidents.

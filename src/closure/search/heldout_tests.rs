@@ -2,6 +2,7 @@
 
 use super::super::{Effort, Search, Term};
 use crate::closure::channels::Channels;
+use crate::closure::effects::Point;
 use crate::closure::synthetic::{Random, triangle};
 use std::collections::BTreeMap;
 
@@ -81,4 +82,40 @@ fn accidents_among_held_out_rows_do_not_take_a_name_back() {
         (names, found.left),
         (vec!["supply_sensitivity".to_owned()], None)
     );
+}
+
+#[test]
+fn a_row_on_the_wrong_side_of_a_step_is_the_models_error() {
+    let (rows, mut random) = (300, Random::new(3));
+    let degc = [triangle(rows / 2), triangle(rows / 2)].concat();
+    let middle = degc.iter().sum::<f64>() / rows as f64;
+    // The first crossing is a row late; a spike is as large, but far from there.
+    let first = degc.iter().position(|t| *t > middle).unwrap();
+    let spike = degc.iter().position(|t| *t > middle + 15.0).unwrap();
+    let output = (0..rows).map(|k| {
+        let step = f64::from(u8::from(degc[k] > middle && k != first));
+        let off = step + f64::from(u8::from(k == spike));
+        0.3 - 0.002 * degc[k] + NOISE_DPS * (30.0 * off + random.normal())
+    });
+    let columns = BTreeMap::from([
+        ("rate_out_dps".to_owned(), output.collect()),
+        ("die_degc".to_owned(), degc.clone()),
+    ]);
+    let time_s: Vec<f64> = (0..rows).map(|k| 10.0 * k as f64).collect();
+    let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+    let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+    let jump = search.candidates().iter();
+    let jump = jump.clone().find(|s| s.id() == "stress_jump").unwrap();
+    let at = (middle - c.middle_degc) / c.kelvin_per_u;
+    let term = Term::new(jump.clone(), Point::at(0, &[at]));
+    let model = search.model(&[term]).unwrap();
+    let residual = model.residual(&c);
+    for row in [first, spike] {
+        assert!(
+            residual[row].abs() > 20.0 * NOISE_DPS,
+            "{row}: {residual:?}"
+        );
+    }
+    let accidents = search.accidents([&model]);
+    assert!(accidents[spike] && !accidents[first]);
 }

@@ -28,6 +28,9 @@ pub const EQUAL: f64 = 4.0;
 /// the other way round, so that a catalogue's idealised forms differ by less than the truth from each.
 const EQUAL_ONE_WAY: f64 = 12.0;
 
+/// Sizes from which a shape that moves the bias is climbed where one without a size is the best of those tried.
+const SIZES: usize = 2;
+
 /// No slow noise.
 pub(super) const WHITE: Shape = Shape {
     flicker: 0.0,
@@ -336,10 +339,23 @@ impl Search<'_> {
             let gain = || refine::gain(bench, candidate, c, &bias, point);
             admitted.then(|| gain() - paid)
         };
-        let each = points.iter().filter_map(|p| Some((net(p)?, p)));
-        let (_, start) = each.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        let steps = map(&candidate.spacing(c, start), |s| 0.5 * s);
-        let top = refine::climbed(start, steps, |p| net(p).unwrap_or(f64::NEG_INFINITY));
+        let mut places: Vec<(f64, &Point)> =
+            points.iter().filter_map(|p| Some((net(p)?, p))).collect();
+        places.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let (_, first) = *places.first()?;
+        let mut starts = vec![first];
+        if !candidate.is_sized(first) {
+            // The bias follows closely: between two sizes the top may be far above both, and above what has no size.
+            let sized = places.iter().map(|p| p.1);
+            starts.extend(sized.filter(|p| candidate.is_sized(p)).take(SIZES));
+        }
+        let reached = |p: &Point| net(p).unwrap_or(f64::NEG_INFINITY);
+        let tops = starts.into_iter().map(|start| {
+            let steps = map(&candidate.spacing(c, start), |s| 0.5 * s);
+            let top = refine::climbed(start, steps, reached);
+            (reached(&top), top)
+        });
+        let (_, top) = tops.max_by(|a, b| a.0.total_cmp(&b.0))?;
         let (bias, _) = self.bias_beside(model, candidate, &top);
         Some((top, Some(bias)))
     }

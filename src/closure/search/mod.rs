@@ -24,6 +24,7 @@ mod memo;
 mod model;
 mod once;
 mod otherwise;
+mod proven;
 mod reading;
 pub mod refine;
 mod reported;
@@ -88,6 +89,8 @@ pub struct Term {
     pub point: Point,
     /// Probability at its step.
     pub p_value: f64,
+    /// The shape that it had there.
+    pub found_at: Point,
     /// What does as well, best first.
     pub rivals: Vec<String>,
     /// Gain in log-likelihood with all other terms in.
@@ -103,6 +106,7 @@ impl Term {
     pub fn new(candidate: Arc<dyn Candidate>, point: Point) -> Self {
         Term {
             candidate,
+            found_at: point.clone(),
             point,
             p_value: 0.0,
             rivals: Vec::new(),
@@ -378,7 +382,6 @@ impl<'a> Search<'a> {
             free.push(clipped);
         }
         let fit = reml::fit(&c.time_s, &y, &free, used, options)?;
-        let off_dps = fit.beta.last().copied().filter(|_| clips).unwrap_or(0.0);
         let mut given = fit.beta.iter();
         let mut beta: Vec<f64> = kinds
             .iter()
@@ -414,7 +417,6 @@ impl<'a> Search<'a> {
             beta,
             columns,
             clipped: held,
-            off_dps,
         })
     }
 

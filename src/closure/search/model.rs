@@ -25,8 +25,6 @@ pub struct Model {
     pub columns: Vec<Vec<f64>>,
     /// Rows at a clip's level, where no other term shows; empty: none is.
     pub clipped: Vec<bool>,
-    /// How far the clipped rows lie from the levels of the clip, deg/s.
-    pub off_dps: f64,
     /// Log-likelihood of all training rows, spikes included: for models of the same rows.
     pub value: f64,
 }

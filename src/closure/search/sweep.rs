@@ -3,7 +3,7 @@
 use super::judge::{EQUAL, Judged, PRICE, WHITE, price};
 use super::refine::{self, Bench};
 use super::reported::WANDER;
-use super::{LEVEL, MOST_RIVALS, Model, Search, Term, stairs};
+use super::{MOST_RIVALS, Model, Search, Term, stairs};
 use crate::closure::effects::{Bias, Point, map};
 use crate::closure::likelihood::Unusable;
 use crate::closure::likelihood::linear::add_scaled;
@@ -104,7 +104,7 @@ impl Search<'_> {
 
     /// How far the fitted rows that a clip holds at its upper and at its lower level lie from there on average, deg/s;
     /// 0 where none does.
-    fn off_levels(&self, model: &Model, term: &Term) -> [f64; 2] {
+    pub(super) fn off_levels(&self, model: &Model, term: &Term) -> [f64; 2] {
         let c = self.channels;
         let columns = term.candidate.columns(c, &model.acting, &term.point);
         let residual = model.residual(c);
@@ -378,7 +378,9 @@ impl Search<'_> {
             let mut term = Term::of(j, round.rivals(j));
             term.p_value = own.p_value;
             term.beside.clone_from(&own.beside);
-            if term.id() != own.id() {
+            if term.id() == own.id() {
+                term.found_at.clone_from(&own.found_at);
+            } else {
                 // The probability is that of another name.
                 term.beside.push(own.id());
             }
@@ -419,47 +421,6 @@ impl Search<'_> {
             return Ok(Some(term));
         }
         Ok(None)
-    }
-
-    /// Tests again, with surrogates, every name whose probability was found beside terms that are no longer in:
-    /// two shapes that cancel each other out can both be beyond chance, and neither alone.
-    ///
-    /// # Errors
-    /// Too few rows.
-    pub fn proven(&self, mut model: Model) -> Result<Model, Unusable> {
-        let mut k = 0;
-        while k < model.terms.len() {
-            let mut others = model.terms.clone();
-            let mut own = others.remove(k);
-            let ids: Vec<String> = others.iter().map(Term::id).collect();
-            let holds = own.beside.iter().all(|id| ids.contains(id));
-            if holds || !own.candidate.named() {
-                k += 1;
-                continue;
-            }
-            let without = self.model(&others)?;
-            if self.spikes(&without.fit) > self.spikes(&model.fit) + 1 {
-                // Rows that only it explains are out beside the others.
-                k += 1;
-                continue;
-            }
-            let round = self.round(&without, self.effort.surrogates);
-            let again = round.judged.iter().find(|j| j.candidate.id() == own.id());
-            match again.filter(|j| j.p_value <= LEVEL) {
-                Some(j) => {
-                    own.p_value = j.p_value;
-                    own.beside = ids;
-                    model.terms[k] = own;
-                    k += 1;
-                }
-                None => {
-                    self.bar(own.id());
-                    model = without;
-                    k = 0;
-                }
-            }
-        }
-        Ok(model)
     }
 
     /// Log-likelihood with one term more, at its place among the others: that model is known, or needed next.

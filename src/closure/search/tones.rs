@@ -1,8 +1,10 @@
 //! A search for sinusoids of its own: thousands of frequencies would drown every other candidate in
 //! multiplicity, and their null distribution is known without surrogates.
 
+use super::refine::Bench;
 use super::{Model, Search};
 use crate::closure::channels::Channels;
+use crate::closure::effects::map;
 use crate::closure::effects::tone::{self, Pickup};
 use crate::closure::likelihood::Unusable;
 use crate::closure::likelihood::candidates::Grid;
@@ -199,7 +201,39 @@ pub(super) fn power(time_s: &[f64], y: &[f64], weights: &[f64], hz: f64) -> f64 
     s * s + c * c
 }
 
+/// Most harmonics that are looked at, and the probability that the strongest of them is noise's up to which what repeats is
+/// no sinusoid.
+const HARMONICS: i32 = 9;
+const OVERTONES: f64 = 1e-3;
+
 impl Search<'_> {
+    /// Whether what a model with a tone leaves repeats with it: a cause that comes and goes by a schedule (positions, loads) has
+    /// a fundamental too.
+    pub(super) fn has_overtones(&self, model: &Model, frequency_hz: f64) -> bool {
+        let c = self.channels;
+        let bench = Bench::new(model, model.fit.at.shape);
+        let fastest_hz = 0.5 * model.fit.problem.y.len() as f64 / c.span_s();
+        let orders = (2..=HARMONICS).map(|k| frequency_hz * f64::from(k));
+        let within: Vec<f64> = orders.filter(|hz| *hz < fastest_hz).collect();
+        let further = model.terms.iter().filter(|t| t.id() == tone::FURTHER);
+        let mut further = further.map(|t| t.point.theta[0]);
+        let is_one = |of_hz: f64| {
+            within
+                .iter()
+                .any(|hz| (hz - of_hz).abs() < 0.5 / c.span_s())
+        };
+        if further.any(is_one) {
+            return true;
+        }
+        let gains = within.iter().map(|hz| {
+            let wave = |f: fn(f64) -> f64| map(&c.time_s, |t| f(TAU * hz * t));
+            bench.gain(&[wave(f64::sin), wave(f64::cos)])
+        });
+        // Half of a chi square of two degrees of freedom.
+        let due = (within.len() as f64 / OVERTONES).ln();
+        gains.into_iter().any(|gain| gain > due)
+    }
+
     /// A further tone, which has no name, has that of a first one where that is no longer in: the first may have been a
     /// mixture of this one and causes that came later.
     ///

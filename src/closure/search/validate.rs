@@ -141,16 +141,17 @@ impl Search<'_> {
         held <= UNSEEN * (held + square(&self.used))
     }
 
-    /// Tones of too few periods keep their shape and lose their name, as do those of a channel's own frequency: what follows
-    /// the rate late, where the rate is a sinusoid, is one as well.
+    /// Tones of too few periods keep their shape and lose their name, as do those of a channel's own frequency (what follows
+    /// the rate late, where the rate is a sinusoid, is one as well) and what repeats, but not as a sinusoid.
     fn without_waves(&self, model: Model, found: &mut Found) -> Result<Model, Unusable> {
         let c = self.channels;
         let mut terms = model.terms.clone();
         let mut waves = None;
         for term in terms.iter_mut().filter(|t| t.id() == "periodic_pickup") {
             let frequency_hz = term.point.theta.first().copied().unwrap_or(0.0);
-            let few = (!tone::returns(c, frequency_hz)).then(|| "time_s".to_owned());
-            if let Some(channel) = few.or_else(|| waving(c, frequency_hz)) {
+            let other = !tone::returns(c, frequency_hz) || self.has_overtones(&model, frequency_hz);
+            let other = other.then(|| "time_s".to_owned());
+            if let Some(channel) = other.or_else(|| waving(c, frequency_hz)) {
                 waves = Some(channel);
                 term.candidate = Arc::new(Pickup {
                     frequency_hz,
@@ -300,7 +301,7 @@ impl Search<'_> {
         };
         let against = round.judged.iter().filter(counts);
         let often = self.selection_frequency(model, own, &without, against);
-        let certain = || model.terms[own].p_value <= CERTAIN && self.is_clean(model);
+        let certain = || model.terms[own].p_value <= BEYOND && self.is_clean(model);
         Ok(often >= if local { STABLE } else { EVER } || local && often >= HALF && certain())
     }
 

@@ -122,6 +122,31 @@ fn a_tone_of_a_channels_own_frequency_is_that_channels() {
 }
 
 #[test]
+fn what_repeats_but_has_overtones_is_no_sinusoid() {
+    // In units of the noise: an overtone that is seen beside the tone, and one that chance may make.
+    let wave = |of_third: f64| {
+        move |k: usize, _: f64| {
+            let angle = TAU * k as f64 / 42.0;
+            6.0 * angle.sin() + of_third * (3.0 * angle + 1.0).sin()
+        }
+    };
+    for seed in 0..3 {
+        for (of_third, names, left) in [
+            (1.0, vec![], Some("time_s")),
+            (0.45, vec![], Some("time_s")),
+            (0.0, vec!["periodic_pickup"], None),
+        ] {
+            let (found, rest) = closed(seed, &[], wave(of_third));
+            assert_eq!(
+                (found, rest.as_deref()),
+                (names.iter().map(|n: &&str| (*n).to_owned()).collect(), left),
+                "{seed}, {of_third}"
+            );
+        }
+    }
+}
+
+#[test]
 fn a_clip_that_no_held_out_row_shows_stands() {
     for seed in 0..3 {
         let (names, _) = limited(seed, &[], |_, _| 0.0, f64::INFINITY);
