@@ -156,10 +156,11 @@ impl Search<'_> {
         let Some(leader) = leader else {
             return Ok(Next::Stop);
         };
-        let name = significant.iter().find(|j| j.candidate.named());
-        if let Some(name) = name
-            && name.net > leader.net - STRANGER
-        {
+        // A tone that is another channel's will have no name: it is one to the other names.
+        let near = |j: &&&Judged| j.candidate.named() && j.net > leader.net - STRANGER;
+        let own = |j: &&&Judged| near(j) && !self.is_another_channels(&j.candidate.id(), &j.point);
+        let mut names = significant.iter();
+        if let Some(name) = names.clone().find(own).or_else(|| names.find(near)) {
             return Ok(decided(Term::of(name, round.rivals(name))));
         }
         if let Some(first) = self.name_instead(model, &significant, leader)? {
@@ -339,3 +340,7 @@ fn decided(term: Term) -> Next {
         Next::Add(term)
     }
 }
+
+#[cfg(test)]
+#[path = "forward_tests.rs"]
+mod tests;

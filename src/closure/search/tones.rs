@@ -4,11 +4,11 @@
 use super::refine::Bench;
 use super::{Model, Search};
 use crate::closure::channels::Channels;
-use crate::closure::effects::map;
 use crate::closure::effects::tone::{self, Pickup};
+use crate::closure::effects::{Point, map};
 use crate::closure::likelihood::Unusable;
 use crate::closure::likelihood::candidates::Grid;
-use crate::closure::likelihood::linear::{dot, dots};
+use crate::closure::likelihood::linear::{Basis, dot, dots};
 use crate::closure::likelihood::null::bartlett;
 use crate::closure::likelihood::reml::Fit;
 use crate::closure::likelihood::tail::chi_square_surprise;
@@ -201,12 +201,31 @@ pub(super) fn power(time_s: &[f64], y: &[f64], weights: &[f64], hz: f64) -> f64 
     s * s + c * c
 }
 
+/// Share of the square about its mean of a channel, or of its square, from which on a tone of that frequency is the
+/// channel's.
+const WAVING: f64 = 0.5;
+
 /// Most harmonics that are looked at, and the probability that the strongest of them is noise's up to which what repeats is
 /// no sinusoid.
 const HARMONICS: i32 = 9;
 const OVERTONES: f64 = 1e-3;
 
 impl Search<'_> {
+    /// Whose a tone is that is no pickup: time's, where it has too few periods, or that of a channel which is a sinusoid of
+    /// that frequency for the most part, or whose square is (what follows the rate late, where the rate is a sinusoid,
+    /// is one as well).
+    pub(super) fn another_channels(&self, frequency_hz: f64) -> Option<String> {
+        let c = self.channels;
+        let few = (!tone::returns(c, frequency_hz)).then(|| "time_s".to_owned());
+        few.or_else(|| waving(c, frequency_hz))
+    }
+
+    /// Whether a shape is such a tone.
+    pub(super) fn is_another_channels(&self, id: &str, point: &Point) -> bool {
+        let of_tone = point.theta.first().filter(|_| id == tone::NAMED);
+        of_tone.is_some_and(|hz| self.another_channels(*hz).is_some())
+    }
+
     /// Whether what a model with a tone leaves repeats with it: a cause that comes and goes by a schedule (positions, loads) has
     /// a fundamental too.
     pub(super) fn has_overtones(&self, model: &Model, frequency_hz: f64) -> bool {
@@ -246,8 +265,8 @@ impl Search<'_> {
             return Ok(model);
         };
         let frequency_hz = model.terms[k].point.theta[0];
-        if barred.iter().any(|id| id == tone::NAMED) || !tone::returns(self.channels, frequency_hz)
-        {
+        let barred = barred.iter().any(|id| id == tone::NAMED);
+        if barred || self.another_channels(frequency_hz).is_some() {
             return Ok(model);
         }
         let mut terms = model.terms.clone();
@@ -257,6 +276,32 @@ impl Search<'_> {
         });
         self.model(&terms)
     }
+}
+
+/// A channel that is a sinusoid of a frequency for the most part, or whose square is.
+fn waving(c: &Channels, frequency_hz: f64) -> Option<String> {
+    let wave = |f: fn(f64) -> f64| map(&c.time_s, |t| f(TAU * frequency_hz * t));
+    let pair = [wave(f64::sin), wave(f64::cos)];
+    let constant = Basis::new(&[vec![1.0; c.len()]]);
+    let both = Basis::new(&[vec![vec![1.0; c.len()]], pair.to_vec()].concat());
+    let left = |basis: &Basis, column: &[f64]| {
+        let mut rest = column.to_vec();
+        basis.project_off(&mut rest);
+        dot(&rest, &rest)
+    };
+    let waves = |column: &[f64]| left(&both, column) < (1.0 - WAVING) * left(&constant, column);
+    // What answers to both signs alike swings twice as often.
+    let square = |column: &[f64]| {
+        let mean = column.iter().sum::<f64>() / column.len().max(1) as f64;
+        map(column, |v| (v - mean).powi(2))
+    };
+    let is_waving = |column: &[f64]| waves(column) || waves(&square(column));
+    if is_waving(&c.u) {
+        return Some(c.thermometer.clone());
+    }
+    let names = c.columns.keys().filter(|name| *name != "time_s");
+    let mut moving = names.filter(|name| c.moving(name).is_some_and(is_waving));
+    moving.next().cloned()
 }
 
 #[cfg(test)]

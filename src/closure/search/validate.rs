@@ -3,12 +3,9 @@
 use super::judge::Judged;
 use super::reported::BEYOND;
 use super::{Found, LEVEL, Model, Search, Term, declared};
-use crate::closure::channels::Channels;
-use crate::closure::effects::map;
 use crate::closure::effects::tone::{self, Pickup};
 use crate::closure::likelihood::Unusable;
-use crate::closure::likelihood::linear::{Basis, dot};
-use std::f64::consts::TAU;
+use crate::closure::likelihood::linear::Basis;
 use std::sync::Arc;
 
 /// Slow noise, in units of white noise over the record, from which on a single step is no evidence.
@@ -27,10 +24,6 @@ const WITHIN: f64 = 1.03;
 /// A sinusoid beside which another one of this share of its gain is needed is none: a drifting tone, or
 /// something else that repeats.
 const OVERTONE: f64 = 0.1;
-
-/// Share of the square about its mean of a channel, or of its square, from which on a tone of that frequency is the
-/// channel's.
-const WAVING: f64 = 0.5;
 
 /// Share of a shape's square that a single row may hold: what shows in one row, anything may have made.
 const ONE_ROW: f64 = 0.8;
@@ -141,17 +134,21 @@ impl Search<'_> {
         held <= UNSEEN * (held + square(&self.used))
     }
 
-    /// Tones of too few periods keep their shape and lose their name, as do those of a channel's own frequency (what follows
-    /// the rate late, where the rate is a sinusoid, is one as well) and what repeats, but not as a sinusoid.
+    /// Tones that are another channel's keep their shape and lose their name, as does what repeats, but not as a sinusoid.
     fn without_waves(&self, model: Model, found: &mut Found) -> Result<Model, Unusable> {
-        let c = self.channels;
         let mut terms = model.terms.clone();
         let mut waves = None;
-        for term in terms.iter_mut().filter(|t| t.id() == "periodic_pickup") {
+        // What has no name as it is, is another channel's all the same.
+        let nameless = terms.iter().filter(|t| t.id() == tone::FURTHER);
+        let channels = nameless.filter_map(|t| self.another_channels(*t.point.theta.first()?));
+        found.left = found.left.take().or_else(|| channels.last());
+        for term in terms.iter_mut().filter(|t| t.id() == tone::NAMED) {
             let frequency_hz = term.point.theta.first().copied().unwrap_or(0.0);
-            let other = !tone::returns(c, frequency_hz) || self.has_overtones(&model, frequency_hz);
-            let other = other.then(|| "time_s".to_owned());
-            if let Some(channel) = other.or_else(|| waving(c, frequency_hz)) {
+            let overtones = || {
+                let has = self.has_overtones(&model, frequency_hz);
+                has.then(|| "time_s".to_owned())
+            };
+            if let Some(channel) = self.another_channels(frequency_hz).or_else(overtones) {
                 waves = Some(channel);
                 term.candidate = Arc::new(Pickup {
                     frequency_hz,
@@ -362,32 +359,6 @@ impl Search<'_> {
         };
         columns.iter().map(count).max().unwrap_or(0)
     }
-}
-
-/// A channel that is a sinusoid of a frequency for the most part, or whose square is.
-fn waving(c: &Channels, frequency_hz: f64) -> Option<String> {
-    let wave = |f: fn(f64) -> f64| map(&c.time_s, |t| f(TAU * frequency_hz * t));
-    let pair = [wave(f64::sin), wave(f64::cos)];
-    let constant = Basis::new(&[vec![1.0; c.len()]]);
-    let both = Basis::new(&[vec![vec![1.0; c.len()]], pair.to_vec()].concat());
-    let left = |basis: &Basis, column: &[f64]| {
-        let mut rest = column.to_vec();
-        basis.project_off(&mut rest);
-        dot(&rest, &rest)
-    };
-    let waves = |column: &[f64]| left(&both, column) < (1.0 - WAVING) * left(&constant, column);
-    // What answers to both signs alike swings twice as often.
-    let square = |column: &[f64]| {
-        let mean = column.iter().sum::<f64>() / column.len().max(1) as f64;
-        map(column, |v| (v - mean).powi(2))
-    };
-    let is_waving = |column: &[f64]| waves(column) || waves(&square(column));
-    if is_waving(&c.u) {
-        return Some(c.thermometer.clone());
-    }
-    let names = c.columns.keys().filter(|name| *name != "time_s");
-    let mut moving = names.filter(|name| c.moving(name).is_some_and(is_waving));
-    moving.next().cloned()
 }
 
 #[cfg(test)]

@@ -1,11 +1,13 @@
 //! Records whose residual only resembles an effect, and the effect itself beside each.
 
 use super::*;
+use crate::closure::channels::Channels;
 use crate::closure::effects::{Candidate, Point};
 use crate::closure::likelihood::blocks::Split;
 use crate::closure::search::Effort;
 use crate::closure::synthetic::{Random, triangle};
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 
 const ROWS: usize = 300;
 

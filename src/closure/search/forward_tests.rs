@@ -1,0 +1,64 @@
+//! Which of the names that a round found is taken.
+
+use super::*;
+use crate::closure::channels::Channels;
+use crate::closure::effects::tone::Pickup;
+use crate::closure::effects::{Candidate, Point};
+use crate::closure::search::Effort;
+use crate::closure::synthetic::Random;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// What is taken of a tone of so many periods and of the temperature's rate, which is worth `behind` less, where the
+/// temperature is a sinusoid of six periods.
+fn taken(periods: f64, behind: f64) -> String {
+    let rows = 300;
+    let mut random = Random::new(3);
+    let angle = |k: usize| std::f64::consts::TAU * 6.0 * k as f64 / rows as f64;
+    let degc: Vec<f64> = (0..rows).map(|k| 20.0 + 35.0 * angle(k).sin()).collect();
+    let output = degc
+        .iter()
+        .map(|degc| 0.3 - 0.002 * degc + 0.01 * random.normal());
+    let columns = BTreeMap::from([
+        ("rate_out_dps".to_owned(), output.collect()),
+        ("die_degc".to_owned(), degc.clone()),
+    ]);
+    let time_s: Vec<f64> = (0..rows).map(|k| 10.0 * k as f64).collect();
+    let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+    let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+    let judged = |candidate: Arc<dyn Candidate>, point: Point, net: f64| Judged {
+        candidate,
+        point,
+        gain: net + 2.0,
+        net,
+        odds_against: 0.0,
+        p_value: 1e-9,
+    };
+    let frequency_hz = periods / c.span_s();
+    let tone = Pickup {
+        frequency_hz,
+        further: false,
+    };
+    let mut all = search.candidates().iter();
+    let rate = all.find(|c| c.id() == "temperature_rate").unwrap().clone();
+    let round = Round {
+        judged: vec![
+            judged(Arc::new(tone), Point::at(0, &[frequency_hz]), 40.0),
+            judged(rate, Point::form(0), 40.0 - behind),
+        ],
+        equal: 4.0,
+        missing: Vec::new(),
+    };
+    match search.next(&search.model(&[]).unwrap(), &round).unwrap() {
+        Next::Add(term) => term.id(),
+        Next::Undecided(_) | Next::Stop => "nothing".to_owned(),
+    }
+}
+
+#[test]
+fn a_tone_that_is_the_temperatures_has_to_be_better_than_a_name_by_what_a_stranger_has() {
+    assert_eq!(taken(6.0, 3.0), "temperature_rate");
+    assert_eq!(taken(6.0, 9.0), "periodic_pickup");
+    // Its own frequency: as any other name.
+    assert_eq!(taken(17.0, 3.0), "periodic_pickup");
+}
