@@ -32,7 +32,7 @@ const ONE_ROW: f64 = 0.8;
 pub(super) const UNSTEADY: f64 = 1e-3;
 const UNSTEADY_SHARE: f64 = 0.05;
 
-/// Least selection frequency of a local shape (Meinshausen & Buhlmann 2010 take 0.6 to 0.9), of one that is certain and
+/// Least selection frequency of a local shape (Meinshausen & Buhlmann 2010 take 0.6 to 0.9), of one that is beyond chance and
 /// leaves nothing, and of any other shape.
 const STABLE: f64 = 0.7;
 const HALF: f64 = 0.5;
