@@ -390,7 +390,11 @@ impl Search<'_> {
             term
         };
         let needed = |j: &Judged| j.net > PRICE;
-        let best_name = round.judged.iter().find(|j| j.candidate.named());
+        // A tone that is another channel's will have no name: it takes no name's place.
+        let stays = |j: &&Judged| {
+            j.candidate.named() && !self.is_another_channels(&j.candidate.id(), &j.point)
+        };
+        let best_name = round.judged.iter().find(stays);
         let explains_spikes = self.spikes(&without.fit) > own_spikes + 1;
         let Some(same) = same else {
             if explains_spikes {

@@ -1,9 +1,11 @@
 //! Names that another one's shape called for when it was off.
 
 use super::*;
+use crate::closure::channels::Channels;
 use crate::closure::effects::Candidate;
 use crate::closure::search::{Effort, Search};
-use crate::closure::synthetic::Pull;
+use crate::closure::synthetic::{Pull, Random, triangle};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// What stays of a large pull whose shape is a fifth too small and of two names beside it: a supply that is there (or not),
@@ -41,5 +43,44 @@ fn a_name_that_mended_anothers_shape_is_taken_back_and_a_cause_is_not() {
     assert_eq!(
         stay(0.1),
         ["amplitude_phase_coupling", "supply_sensitivity"]
+    );
+}
+
+/// What a sweep leaves of an acceleration's effect and a supply's, where the acceleration is a sinusoid that is read with noise:
+/// a tone of its frequency fits better.
+fn swept_beside_a_wave() -> Vec<String> {
+    let (rows, mut random) = (300, Random::new(2));
+    let degc = [triangle(rows / 2), triangle(rows / 2)].concat();
+    let wave = |k: usize| (std::f64::consts::TAU * 12.0 * k as f64 / rows as f64).sin();
+    let supply = |k: usize| f64::from(u8::from(k / 11 % 3 == 1));
+    let output = (0..rows).map(|k| {
+        0.3 - 0.002 * degc[k] + 0.01 * (8.0 * wave(k) + 3.0 * supply(k) + random.normal())
+    });
+    let output = output.collect();
+    let read = (0..rows).map(|k| wave(k) + 0.1 * random.normal());
+    let columns = BTreeMap::from([
+        ("rate_out_dps".to_owned(), output),
+        ("accel_g".to_owned(), read.collect()),
+        ("supply_v".to_owned(), (0..rows).map(supply).collect()),
+        ("die_degc".to_owned(), degc.clone()),
+    ]);
+    let time_s: Vec<f64> = (0..rows).map(|k| 10.0 * k as f64).collect();
+    let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+    let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+    let term = |id: &str| {
+        let mut all = search.candidates().iter();
+        let candidate = all.find(|c| c.id() == id).unwrap().clone();
+        Term::new(candidate, Point::form(0))
+    };
+    let terms = [term("g_sensitivity"), term("supply_sensitivity")];
+    let swept = search.swept(search.model(&terms).unwrap()).unwrap();
+    swept.terms.iter().map(Term::id).collect()
+}
+
+#[test]
+fn a_tone_takes_no_names_place_whose_channel_has_its_frequency() {
+    assert_eq!(
+        swept_beside_a_wave(),
+        ["g_sensitivity", "supply_sensitivity"]
     );
 }
