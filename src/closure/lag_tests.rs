@@ -179,3 +179,34 @@ fn without_restarts_nothing_has_to_be_kept() {
     let mut said = closed.closure.warnings.iter();
     assert!(said.all(|w| w.code != "firmware_needs_clock"));
 }
+
+/// Two heatings whose slope is an error, seen by a thermometer with noise.
+fn closed_rate(thermometer_noise_degc: f64) -> Closed {
+    let mut random = Random::new(3);
+    let degc: Vec<f64> = triangle(150).repeat(4);
+    let slope = |k: usize| (degc[k.min(598) + 1] - degc[k.max(1) - 1]) / 2.0;
+    let output: Vec<f64> = (0..ROWS)
+        .map(|k| at(BIAS, degc[k]) + 0.2 * slope(k) + 0.01 * random.normal())
+        .collect();
+    let read: Vec<f64> = degc
+        .iter()
+        .map(|t| t + thermometer_noise_degc * random.normal())
+        .collect();
+    let record = synthetic::record("die_degc", &read, &output);
+    let design = reader::read(None).unwrap();
+    close(&record, Vec::new(), &design, "test", Effort::default()).unwrap()
+}
+
+#[test]
+fn firmware_that_leaves_more_than_the_model_says_so() {
+    let said = |closed: &Closed| {
+        let mut warnings = closed.closure.warnings.iter();
+        warnings.any(|w| w.code == "firmware_behind")
+    };
+    let late = closed_rate(0.05);
+    assert_eq!(late.closure.steps[0].effect, "temperature_rate");
+    let ratio = firmware_over_float(&late);
+    assert!(ratio > 1.05 && said(&late), "{ratio}");
+    let lag = closed([0.0, -2.0, 0.0], &[]);
+    assert!(firmware_over_float(&lag) < 1.02 && !said(&lag));
+}

@@ -251,6 +251,8 @@ pub struct Judged {
     pub errors: FirmwareErrors,
     /// What it leaves of each row, bit for bit, deg/s; NaN without a reading.
     pub residual_dps: Vec<f64>,
+    /// What the same block without quantisation leaves of the rows that are judged, deg/s.
+    pub unrounded_rms_dps: f64,
 }
 
 /// The correction of a plan, its words chosen for the record's noise, and its errors, bit for bit.
@@ -268,19 +270,23 @@ pub fn judged(
     let formats = Formats::choose(plan, noise_dps)?;
     let correction = Correction::new(plan, &formats)?;
     let (all, places) = stream(plan, record, c)?;
-    let corrected = correction.run(&all);
-    let corrected: Vec<f64> = places.iter().map(|place| corrected[*place]).collect();
+    let rows = |corrected: Vec<f64>| -> Vec<f64> { places.iter().map(|p| corrected[*p]).collect() };
     let applied = record.column("rate_dps");
     let of_row = |(i, r): (usize, &f64)| {
         let rate = applied.map_or(0.0, |a| if a[i].is_nan() { 0.0 } else { a[i] });
         r - rate
     };
-    let residual_dps: Vec<f64> = corrected.iter().enumerate().map(of_row).collect();
-    let rows = residual_dps.iter().zip(heldout);
-    let errors: Vec<f64> = rows
-        .filter(|(r, h)| **h && r.is_finite())
-        .map(|(r, _)| *r)
-        .collect();
+    let left = |corrected: Vec<f64>| -> Vec<f64> {
+        rows(corrected).iter().enumerate().map(of_row).collect()
+    };
+    let judged = |residual: &[f64]| -> Vec<f64> {
+        let rows = residual.iter().zip(heldout);
+        let rows = rows.filter(|(r, h)| **h && r.is_finite());
+        rows.map(|(r, _)| *r).collect()
+    };
+    let residual_dps = left(correction.run(&all));
+    let errors = judged(&residual_dps);
+    let unrounded_rms_dps = stats::rms(&judged(&left(correction.run_float(&all))));
     Ok(Judged {
         correction,
         errors: FirmwareErrors {
@@ -289,5 +295,6 @@ pub fn judged(
             heldout_max_abs: Some(errors.iter().fold(0.0, |m: f64, e| m.max(e.abs()))),
         },
         residual_dps,
+        unrounded_rms_dps,
     })
 }

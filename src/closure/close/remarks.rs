@@ -1,0 +1,95 @@
+//! What is said beside a closed record's figures.
+
+use super::Told;
+use crate::closure::search::LEVEL;
+use crate::record::Warning;
+
+impl Told<'_> {
+    pub(super) fn warn(&self, warnings: &mut Vec<Warning>) {
+        warnings.extend(self.accidents());
+        if !self.found.within_rounding.is_empty() {
+            let each = self.found.within_rounding.iter();
+            let names: Vec<String> = each.map(|(id, rms)| format!("{id} ({rms:.2e})")).collect();
+            warnings.push(Warning::general(
+                "within_adc_rounding",
+                format!(
+                    "not named, as the whole contribution (deg/s rms) is below twice the {:.2e} deg/s that the ADC's \
+                     rounding makes: {}",
+                    self.search.channels.rounding_dps,
+                    names.join(", ")
+                ),
+            ));
+        }
+        for id in &self.found.once {
+            warnings.push(Warning::general(
+                "happens_once",
+                format!(
+                    "{id}: the record shows its step once, so that it may as well be a change at that moment (no effect \
+                     of the catalogue); a second passage of that temperature separates the two"
+                ),
+            ));
+        }
+        if !self.found.undecided.is_empty() {
+            warnings.push(Warning::general(
+                "undecided",
+                format!(
+                    "the record decides nothing between {}: each explains it as well",
+                    self.found.undecided.join(", ")
+                ),
+            ));
+        }
+        let hidden: Vec<String> = self.goes_with_temperature();
+        if !hidden.is_empty() {
+            warnings.push(Warning::general(
+                "goes_with_temperature",
+                format!(
+                    "the declared bias in temperature may be that of {}: in this record these go with the thermometer; \
+                     `evidence` says which experiment separates them",
+                    hidden.join(", ")
+                ),
+            ));
+        }
+    }
+
+    /// What is said of rows that no figure has in it.
+    fn accidents(&self) -> Option<Warning> {
+        let search = self.search;
+        let residual = self.after.residual(search.channels);
+        let accidents = self.judged.accidents.iter().enumerate();
+        let rows: Vec<usize> = accidents.filter(|(_, a)| **a).map(|(row, _)| row).collect();
+        let held = rows.iter().filter(|row| search.heldout[**row]).count();
+        let farthest = rows
+            .iter()
+            .copied()
+            .max_by(|a, b| residual[*a].abs().total_cmp(&residual[*b].abs()))?;
+        Some(Warning::on(
+            "outliers",
+            "rate_out_dps",
+            format!(
+                "{} of {} rows ({} held out) stand out alone by more than six deviations, whatever the model: they are not in \
+                 the errors; the farthest, at {} s, is off by {:.3e} deg/s",
+                rows.len(),
+                residual.len(),
+                held,
+                search.channels.time_s[farthest],
+                residual[farthest]
+            ),
+        ))
+    }
+
+    /// Names of other channels' effects that the declared bias has in it.
+    fn goes_with_temperature(&self) -> Vec<String> {
+        let search = self.search;
+        let named = self.found.first.iter().filter(|j| j.candidate.named());
+        let others = named.filter(|j| {
+            let channels = j.candidate.channels_at(search.channels, &j.point);
+            let first = channels.first();
+            first.is_some_and(|c| *c != search.channels.thermometer && c != "time_s")
+        });
+        // As in `evidence`: what is beyond chance beside the declared model is not in it.
+        let hidden = others.filter(|j| j.p_value > LEVEL && search.is_declared(j));
+        let taken = |id: &String| self.found.terms.iter().any(|t| t.id() == *id);
+        let ids = hidden.map(|j| j.candidate.id());
+        ids.filter(|id| !taken(id)).collect()
+    }
+}
