@@ -26,9 +26,13 @@ pub fn scale(values: impl Iterator<Item = f64>) -> f64 {
     *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 / 0.674_489_75
 }
 
+/// White variance, in units of a row's own, by which a row of no weight says nothing of the others.
+const SILENT: f64 = 1e8;
+
 /// The weights of the rows under a fitted shape. `plain` is the problem with every used row at full
-/// weight, `weighted` the one that was fitted: coefficients come from the latter, so that spikes do
-/// not bend them, and tests from the former.
+/// weight, `weighted` the one that was fitted: its coefficients are taken, so that spikes do not bend them. Each row is
+/// tested against what the weighted others predict for it: beside a spike at full weight, where the noise has a memory, its
+/// neighbours would be spikes as well.
 pub fn weights(plain: &Problem, weighted: &Problem, at: &Evaluated) -> Vec<f64> {
     let (y, basis) = weighted.whiten(&Whitener::new(&weighted.line, at.shape));
     let z: Vec<f64> = basis.q.iter().map(|q| super::linear::dot(q, &y)).collect();
@@ -37,11 +41,22 @@ pub fn weights(plain: &Problem, weighted: &Problem, at: &Evaluated) -> Vec<f64> 
     for (column, b) in plain.columns.iter().zip(&beta) {
         super::linear::add_scaled(&mut residual, -b, column);
     }
-    let whitener = Whitener::new(&plain.line, at.shape);
-    let tests: Vec<f64> = whitener
-        .auxiliary(&whitener.apply(&residual))
-        .into_iter()
-        .map(|(u, d)| if d > 0.0 { u / d.sqrt() } else { f64::NAN })
+    let own = &plain.line.white_factor;
+    let given = own.iter().zip(&weighted.line.white_factor);
+    let given: Vec<f64> = given.map(|(own, w)| w.min(SILENT * own)).collect();
+    let whitener = Whitener::new(&plain.line.with_white_factor(given.clone()), at.shape);
+    let auxiliary = whitener.auxiliary(&whitener.apply(&residual));
+    let pairs = auxiliary.iter().zip(own.iter().zip(&given));
+    let tests: Vec<f64> = pairs
+        .map(|((u, d), (own, given))| {
+            // Off by u / d from what the others say, with the variance 1 / d, of which the row has its own as it is.
+            let variance = 1.0 / d - (given - own);
+            if *d > 0.0 && variance > 0.0 {
+                u / d / variance.sqrt()
+            } else {
+                f64::NAN
+            }
+        })
         .collect();
     let unit = scale(tests.iter().copied().filter(|t| t.is_finite()));
     tests

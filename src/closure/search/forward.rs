@@ -4,6 +4,7 @@ use super::judge::{Judged, PRICE, Round};
 use super::memo::Memo;
 use super::{Found, LEVEL, MOST_RIVALS, Model, Search, Term};
 use crate::closure::likelihood::{Unusable, reml};
+use std::sync::Arc;
 
 /// By how much net gain a shape without a name has to be better than the best name.
 pub(super) const STRANGER: f64 = 6.0;
@@ -183,14 +184,17 @@ impl Search<'_> {
         let plain = self.model_with(&model.terms, &plainly)?;
         // The thorough look meets the names of the quick one again.
         let known = Memo::default();
-        let value = |j: &Judged| -> Result<f64, Unusable> {
+        let with = |j: &Judged| -> Result<Arc<Model>, Unusable> {
             let mut terms = model.terms.clone();
             terms.push(Term::of(j, Vec::new()));
-            if known.get(&terms).is_none() {
-                known.keep(&terms, self.model_with(&terms, &self.near(model))?.value);
+            if let Some(with) = known.get(&terms) {
+                return Ok(with);
             }
-            Ok(known.get(&terms).unwrap_or(f64::NEG_INFINITY) - j.gain + j.net)
+            let with = Arc::new(self.model_with(&terms, &self.near(model))?);
+            known.keep(&terms, with.clone());
+            Ok(with)
         };
+        let value = |j: &Judged| Ok(with(j)?.value - j.gain + j.net);
         let worth = |j: &Judged| match j.candidate.is_whole() {
             true => WORTH_WHOLE,
             false => WORTH,
@@ -230,7 +234,11 @@ impl Search<'_> {
         let Some((best, reached)) = best else {
             return Ok(None);
         };
-        if reached < model.value + worth(best) {
+        // Which rows are spikes and how the noise is coloured depend on each other: without the name there may be as good a
+        // fit next to the one with it.
+        let next_to = self.model_with(&model.terms, &self.near(&*with(best)?))?;
+        let without = model.value.max(next_to.value);
+        if reached < without + worth(best) {
             return Ok(None);
         }
         for j in found.iter().take(2) {
@@ -242,9 +250,7 @@ impl Search<'_> {
         let rivals = others.into_iter().map(|(id, _)| id).collect();
         let mut term = Term::of(best, rivals);
         if is_sure(best) {
-            term.p_value = term
-                .p_value
-                .min((model.value + worth(best) - reached).exp());
+            term.p_value = term.p_value.min((without + worth(best) - reached).exp());
         }
         Ok(Some(term))
     }
