@@ -100,6 +100,16 @@ fn without_firmware_there_is_nothing_to_compare_and_that_is_said() {
         talk.contains("[nothing_to_verify]") && !said.contains("compared"),
         "{said}{talk}"
     );
+    assert!(
+        talk.contains("does not see chamber_degc") && talk.contains("[not_compensable]"),
+        "{talk}"
+    );
+    // What an earlier record left is not taken for this one's.
+    assert!(!talk.contains("an earlier record"), "{talk}");
+    std::fs::create_dir(folder.path().join("o/firmware")).expect("a folder");
+    let (status, [_, talk]) = close(folder.path(), &[], &[]);
+    assert_eq!(status, Some(0), "{talk}");
+    assert!(talk.contains("an earlier record"), "{talk}");
 }
 
 #[test]

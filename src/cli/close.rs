@@ -89,9 +89,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let command = called("record", path);
         let (record, warnings) = crate::record::read_any(path, &design.record)?;
         let mut closed = close::close(&record, warnings, &design, &command, Effort::default())?;
-        let sources = sources(&closed)?;
+        let sources = sources(&closed, &design.name)?;
         let compared = if arguments.verify {
-            compared(&mut closed, &record, &sources)?
+            compared(&mut closed, &record, &sources, &design.name)?
         } else {
             None
         };
@@ -155,16 +155,13 @@ fn file_name(path: &Path) -> std::borrow::Cow<'_, str> {
         .to_string_lossy()
 }
 
-/// Prefix of every name in the sources.
-const PREFIX: &str = "gyro";
-
 /// The correction in C and in Rust, where there is one.
-fn sources(closed: &Closed) -> Result<Option<[Vec<EmittedFile>; 2]>> {
+fn sources(closed: &Closed, prefix: &str) -> Result<Option<[Vec<EmittedFile>; 2]>> {
     let Some(correction) = &closed.correction else {
         return Ok(None);
     };
     let origin = Origin {
-        prefix: PREFIX,
+        prefix,
         sha256: &closed.closure.design_sha256,
         command: &closed.closure.command,
     };
@@ -177,9 +174,10 @@ fn compared(
     closed: &mut Closed,
     record: &ThermalRecord,
     sources: &Option<[Vec<EmittedFile>; 2]>,
+    prefix: &str,
 ) -> Result<Option<Emitted>> {
     if let Some(sources) = sources {
-        return emitted::check(closed, record, PREFIX, sources.clone());
+        return emitted::check(closed, record, prefix, sources.clone());
     }
     closed.closure.warnings.push(Warning::general(
         "nothing_to_verify",
@@ -211,6 +209,12 @@ fn write(
     };
     let page = crate::report::closure::html_beside(closed, &beside, &file_name(path))?;
     super::make_folder(out)?;
+    if augmented.is_none() && out.join("firmware").exists() {
+        eprintln!(
+            "warning: design.toml, design.diff and firmware/ in {} are of an earlier record: this one has no firmware",
+            out.display()
+        );
+    }
     if let Some((diff, text)) = &augmented {
         crate::output::write_whole(&out.join("design.toml"), text.as_bytes())?;
         crate::output::write_whole(&out.join("design.diff"), diff.unified.as_bytes())?;
@@ -241,11 +245,7 @@ fn print(c: &Closure, compared: Option<&Emitted>, controls: Option<&Controls>, o
                 .iter()
                 .map(|(name, v)| {
                     let std = s.parameter_std.get(name).copied().unwrap_or(0.0);
-                    if std > 0.0 {
-                        format!("{name} = {v:.4} +- {std:.2}")
-                    } else {
-                        format!("{name} = {v:.4}")
-                    }
+                    format!("{name} = {}", with_deviation(*v, std))
                 })
                 .collect();
             table.add_row([
@@ -269,7 +269,7 @@ fn print(c: &Closure, compared: Option<&Emitted>, controls: Option<&Controls>, o
     if let Some(rms) = c.firmware.heldout_rms {
         say!("firmware, bit for bit: held-out rms {rms:.5} {}", c.unit);
     } else if c.unit == "deg/s" {
-        say!("firmware cannot carry this: it does not see all that is needed");
+        say!("firmware cannot carry this: the warnings say why");
     }
     if let Some(compared) = compared {
         say!("{}", super::comparison_table(&compared.functions));
@@ -279,6 +279,15 @@ fn print(c: &Closure, compared: Option<&Emitted>, controls: Option<&Controls>, o
         super::controls::print(controls);
     }
     say!("wrote {} ({:.1} s)", out.display(), c.seconds);
+}
+
+/// A number with as many places as its standard deviation has at two digits.
+fn with_deviation(value: f64, std: f64) -> String {
+    if !(std > 0.0 && std.is_finite()) {
+        return format!("{value:.4}");
+    }
+    let places = (1.0 - std.log10().floor()).clamp(0.0, 12.0) as usize;
+    format!("{value:.places$} +- {std:.places$}")
 }
 
 /// The verdict in a sentence.
@@ -298,5 +307,21 @@ fn sentence(c: &Closure) -> String {
         Verdict::Unexplained => {
             format!("unexplained: structure is left that no candidate earns{channel}")
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::with_deviation;
+
+    #[test]
+    fn a_number_has_the_places_that_its_deviation_has() {
+        assert_eq!(with_deviation(-0.486_91, 0.004_26), "-0.4869 +- 0.0043");
+        assert_eq!(with_deviation(11_062.14, 222.5), "11062 +- 222");
+        assert_eq!(
+            with_deviation(0.001_942_3, 1.3e-6),
+            "0.0019423 +- 0.0000013"
+        );
+        assert_eq!(with_deviation(2.5, 0.0), "2.5000");
     }
 }

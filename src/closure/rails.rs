@@ -83,6 +83,11 @@ pub fn of(c: &Channels, rows: &[bool]) -> Option<Rails> {
         .reduce(f64::max)?;
     let level = |rail: Option<(f64, f64)>| rail.map(|r| r.0);
     let (upper_dps, lower_dps) = (level(upper), level(lower));
+    if let (Some(upper), Some(lower)) = (upper_dps, lower_dps)
+        && upper <= lower
+    {
+        return None;
+    }
     let at = |level: Option<f64>, v: f64| level.is_some_and(|l| (v - l).abs() <= same);
     let stands = |v: &f64| at(upper_dps, *v) || at(lower_dps, *v);
     let stand: Vec<bool> = output.iter().map(stands).collect();
@@ -173,6 +178,10 @@ fn rail(readings: &[Reading], resolution: f64) -> Option<(f64, f64)> {
         within >= NEIGHBOURS
     });
     let width = (neighbour.or(readings.last())?.0 - level).abs();
+    if width <= 0.0 {
+        // Nothing lies within.
+        return None;
+    }
     let expected = within as f64 * resolution / width;
     let p_value = (2.0 * places as f64 * at_least(count - 1, expected)).min(1.0);
     (p_value <= LEVEL).then_some((level, p_value))

@@ -425,3 +425,10 @@ fn a_level_opposite_to_a_rail_is_where_its_rows_are_whatever_wanders_beside_it()
         assert!((levels[1] + 120.0).abs() < 0.02, "{seed}: {levels:?}");
     }
 }
+
+#[test]
+fn an_output_that_is_stuck_but_for_two_rows_has_no_rails() {
+    let mut output = vec![0.5; 202];
+    (output[3], output[9]) = (0.4, 0.7);
+    assert_eq!(of_all(&channels(&output, None)), None);
+}

@@ -25,9 +25,12 @@ impl Told<'_> {
         let widest = 1.25 * most("rate_out_dps").max(most("rate_dps")).max(1e-3);
         let estimates = self.search.estimates(self.after);
         let Some(plan) = firmware::plan(c, self.after, &estimates, widest) else {
-            let terms = self.after.terms.iter();
-            let obstacles = terms.filter_map(|t| t.candidate.obstacle(c, &t.point));
-            warnings.extend(obstacles.map(|why| Warning::general("not_compensable", why)));
+            let obstacles = firmware::obstacles(c, self.after, &estimates);
+            warnings.extend(
+                obstacles
+                    .into_iter()
+                    .map(|why| Warning::general("not_compensable", why)),
+            );
             return None;
         };
         let noise = self.after.fit.noise.white_rms_dps;

@@ -24,7 +24,7 @@ const COVARIATE: Sheet = Sheet {
     equation: "f(c), a natural cubic spline of one to seven degrees of freedom; at once or after a \
                first-order delay",
     parameters: &[],
-    compensable: true,
+    compensable: false,
     confounders: &[],
     experiment: "move this quantity alone, everything else held",
     reference: "general additive models; Wood 2017",
@@ -64,11 +64,18 @@ impl Candidate for Covariate {
         let Some(values) = c.column(&self.name) else {
             return Vec::new();
         };
-        let felt = match point.theta.first() {
-            Some(tau) => lag(&c.time_s, values, tau.exp()),
-            None => values.to_vec(),
-        };
-        spline(&scaled(&felt).0, DEGREES[point.form % DEGREES.len()])
+        spline(
+            &scaled(&felt(c, values, point)).0,
+            DEGREES[point.form % DEGREES.len()],
+        )
+    }
+
+    fn obstacle(&self, _c: &Channels, _point: &Point) -> Option<String> {
+        let name = &self.name;
+        Some(format!(
+            "firmware does not see {name} by itself; if it does in your gyro, give the curve as an [[effects]] formula in \
+             {name} with compensable = true"
+        ))
     }
 
     fn spacing(&self, _c: &Channels, point: &Point) -> Vec<f64> {
@@ -76,7 +83,8 @@ impl Candidate for Covariate {
     }
 
     fn report(&self, c: &Channels, e: &Estimate) -> Reported {
-        let (_, middle, half) = scaled(c.column(&self.name).unwrap_or(&[]));
+        let values = c.column(&self.name).unwrap_or(&[]);
+        let (_, middle, half) = scaled(&felt(c, values, &e.point));
         let mut out: Reported = [entry("middle", middle, 0.0), entry("half_range", half, 0.0)]
             .into_iter()
             .collect();
@@ -88,6 +96,14 @@ impl Candidate for Covariate {
             out.insert("delay_s".to_owned(), (tau.exp(), tau.exp() * std));
         }
         out
+    }
+}
+
+/// A column as it acts at a point: at once, or behind by the point's delay.
+fn felt(c: &Channels, values: &[f64], point: &Point) -> Vec<f64> {
+    match point.theta.first() {
+        Some(tau) => lag(&c.time_s, values, tau.exp()),
+        None => values.to_vec(),
     }
 }
 

@@ -82,6 +82,14 @@ impl Candidate for Damping {
         Ok(vec!["agc".to_owned()])
     }
 
+    fn channels_at(&self, c: &Channels, point: &Point) -> Vec<String> {
+        let mut out = vec!["agc".to_owned()];
+        if point.form > 0 {
+            out.push(c.thermometer.clone());
+        }
+        out
+    }
+
     fn points(&self, c: &Channels) -> Vec<Point> {
         if c.thermometer != "phase_rad" {
             return vec![Point::form(0)];

@@ -2,8 +2,8 @@
 
 use super::past::{LagTerm, past_lags, past_slopes};
 use super::{
-    Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, UNUSUAL, from_log, gain,
-    heated, map, spaced,
+    Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, UNUSUAL, entry,
+    from_log, gain, heated, map, spaced,
 };
 use crate::closure::channels::{Channels, lag};
 use crate::closure::firmware::{Trial, Words, knots};
@@ -146,9 +146,13 @@ impl Candidate for ThermalLag {
 
     fn report(&self, c: &Channels, e: &Estimate) -> Reported {
         let per_k = 1.0 / c.history(e.point.form % c.histories()).2;
-        let mut out: Reported = [gain("gain_dps_per_k", e, 0, per_k), from_log("tau_s", e, 0)]
-            .into_iter()
-            .collect();
+        let (_, std) = from_log("tau_s", e, 0).1;
+        let mut out: Reported = [
+            gain("gain_dps_per_k", e, 0, per_k),
+            entry("tau_s", tau_s(c, &e.point), std),
+        ]
+        .into_iter()
+        .collect();
         if Lagging::of(c, &e.point) == Lagging::Curved {
             out.extend([gain("curvature_dps_per_k2", e, 1, per_k * per_k)]);
         }

@@ -202,6 +202,35 @@ pub fn plan(
     })
 }
 
+/// Why firmware cannot carry a model: a reason for each term that it cannot, or for the thermometer.
+pub fn obstacles(c: &Channels, model: &Model, estimates: &[Estimate]) -> Vec<String> {
+    let mut words = Words::new(c, &model.acting, model.fit.noise.white_rms_dps);
+    let mut out = Vec::new();
+    if model.bias.coefficients_dps.len() > 1 && words.thermometer().is_none() {
+        let name = &c.thermometer;
+        out.push(format!(
+            "firmware does not see {name}, which the declared bias is a function of"
+        ));
+    }
+    for (term, estimate) in model.terms.iter().zip(estimates) {
+        if term.candidate.correction(c, estimate, &mut words).is_some() {
+            continue;
+        }
+        let own = term.candidate.obstacle(c, &term.point);
+        out.push(own.unwrap_or_else(|| {
+            let id = term.id();
+            match term.candidate.sheet().compensable {
+                false => format!("firmware cannot know what {id} adds to a reading"),
+                true => format!(
+                    "{id}, as this record has it, needs a column that firmware does not see, or no polynomial that its words \
+                     hold comes near to it"
+                ),
+            }
+        }));
+    }
+    out
+}
+
 /// The record with the gaps of the plan's inputs filled as the model sees them: what the logger missed, the
 /// firmware in the gyro has read.
 fn logged(record: &ThermalRecord, c: &Channels, plan: &Plan) -> ThermalRecord {

@@ -73,7 +73,7 @@ impl Search<'_> {
         basis.project_off(&mut rest);
         let free = dot(&rest, &rest);
         let degrees = basis.rank() - rank;
-        let contrasts = fit.problem.y.len().saturating_sub(basis.rank());
+        let contrasts = whitener.used.saturating_sub(basis.rank());
         if degrees == 0 || contrasts < 10 || without <= with {
             return None;
         }
@@ -159,14 +159,14 @@ mod tests {
 
     #[test]
     fn a_law_passes_as_often_as_its_probability_says() {
-        let found: Vec<Constancy> = (0..60)
+        let found: Vec<Constancy> = (0..240)
             .filter_map(|seed| constancy(&channels(seed, 1.0, |_| 5.0), SUPPLY))
             .collect();
-        assert_eq!(found.len(), 60);
+        assert_eq!(found.len(), 240);
         let below = |p: f64| found.iter().filter(|f| f.p_value < p).count();
-        // 60 draws of a uniform number: 3 +- 1.7, 30 +- 3.9.
-        assert!(below(0.05) <= 9, "{} below 0.05", below(0.05));
-        assert!((18..=42).contains(&below(0.5)), "{} below 0.5", below(0.5));
+        // 240 draws of a uniform number: 12 +- 3.4, 120 +- 7.7.
+        assert!(below(0.05) <= 22, "{} below 0.05", below(0.05));
+        assert!((97..=143).contains(&below(0.5)), "{} below 0.5", below(0.5));
         assert!(below(1e-4) == 0 && found.iter().all(|f| (0.0..0.05).contains(&f.share)));
     }
 
@@ -180,7 +180,7 @@ mod tests {
         for (k, course) in courses.into_iter().enumerate() {
             for seed in 0..6 {
                 let found = constancy(&channels(seed, 1.0, course), SUPPLY).unwrap();
-                assert!(found.p_value < 1e-8, "course {k}, {seed}: {found:?}");
+                assert!(found.p_value < 1e-7, "course {k}, {seed}: {found:?}");
                 assert!(found.share > 0.2, "course {k}, {seed}: {found:?}");
             }
         }

@@ -9,6 +9,10 @@ use std::sync::Arc;
 /// Log-likelihood that a level opposite to a rail has to bring: other effects are not in yet.
 const WORTH: f64 = 20.0;
 
+/// The same of a level that explains so many rows which are spikes without it: accidents do not agree on a level.
+const WORTH_OF_SPIKES: f64 = 10.0;
+const SPIKES: usize = 3;
+
 /// Steps of a level towards the mean of its rows.
 const STEPS: usize = 3;
 
@@ -62,7 +66,11 @@ impl Search<'_> {
                 best = Some(model);
             }
         }
-        let Some(mut best) = best.filter(|b| b.value > one.value + WORTH + PRICE) else {
+        let worth = |b: &Model| match self.spikes(&one.fit) >= self.spikes(&b.fit) + SPIKES {
+            true => WORTH_OF_SPIKES,
+            false => WORTH,
+        };
+        let Some(mut best) = best.filter(|b| b.value > one.value + worth(b) + PRICE) else {
             return Ok(None);
         };
         for _ in 0..STEPS {
