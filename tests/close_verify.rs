@@ -110,6 +110,15 @@ fn without_firmware_there_is_nothing_to_compare_and_that_is_said() {
     let (status, [_, talk]) = close(folder.path(), &[], &[]);
     assert_eq!(status, Some(0), "{talk}");
     assert!(talk.contains("an earlier record"), "{talk}");
+    // Nor is a record that has a result's name written over.
+    let rows = std::fs::read(folder.path().join("r.csv")).expect("the record");
+    std::fs::write(folder.path().join("o/residuals.csv"), &rows).expect("written");
+    std::fs::remove_file(folder.path().join("r.csv")).expect("removed");
+    std::os::unix::fs::symlink("o/residuals.csv", folder.path().join("r.csv")).expect("a link");
+    let (status, [_, talk]) = close(folder.path(), &[], &[]);
+    assert_eq!(status, Some(2), "{talk}");
+    let kept = std::fs::read(folder.path().join("o/residuals.csv")).expect("the record");
+    assert!(talk.contains("written over") && kept == rows, "{talk}");
 }
 
 #[test]

@@ -11,7 +11,7 @@ use crate::correction::firmware::{self, Origin};
 use crate::design::Design;
 use crate::emit::files::EmittedFile;
 use crate::emit::views::Language;
-use crate::error::{Error, Result};
+use crate::error::{Error, InputError, Result};
 use crate::record::{ThermalRecord, Warning};
 use crate::report::closure::Beside;
 use crate::report::design_diff::DesignDiff;
@@ -79,6 +79,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         command
     };
     let out = arguments.out.as_deref().unwrap_or(Path::new(FOLDER));
+    for given in [&arguments.record, &arguments.capture, &arguments.design] {
+        kept(given.as_deref(), out)?;
+    }
     let (closure, compared, controls) = if let Some(path) = &arguments.capture {
         let closed = capture::close(path, &design, &called("capture", path))?;
         let page = crate::report::capture::html(&closed, &file_name(path))?;
@@ -138,6 +141,31 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         return Ok(());
     }
     Err(Error::Check(failures.join("; ")))
+}
+
+/// Refuses an input that has the name of a result in the folder of the results.
+fn kept(given: Option<&Path>, out: &Path) -> Result<()> {
+    const RESULTS: [&str; 5] = [
+        "closure.json",
+        "design.toml",
+        "design.diff",
+        "residuals.csv",
+        "report.html",
+    ];
+    let Some(own) = given.and_then(|given| std::fs::canonicalize(given).ok()) else {
+        return Ok(());
+    };
+    for name in RESULTS {
+        if std::fs::canonicalize(out.join(name)).is_ok_and(|result| result == own) {
+            return Err(
+                InputError::new(format!("{name} would be written over this input"))
+                    .in_file(&own)
+                    .help("give another folder with --out")
+                    .into(),
+            );
+        }
+    }
+    Ok(())
 }
 
 /// `closure.json` with what was asked for beside it.

@@ -366,7 +366,7 @@ fn usable_rows(
 }
 
 /// "line 3, 17, 40 and 5 more".
-fn lines_of(record: &ThermalRecord, rows: &[usize]) -> String {
+pub(super) fn lines_of(record: &ThermalRecord, rows: &[usize]) -> String {
     let shown: Vec<String> = rows
         .iter()
         .take(8)

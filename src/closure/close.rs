@@ -7,7 +7,7 @@ mod remarks;
 use super::channels::Channels;
 use super::effects::{Candidate, user};
 pub use super::intake::channels_of;
-use super::intake::refused;
+use super::intake::{refused, without_glitches};
 use super::likelihood::blocks::Split;
 use super::search::{Effort, Found, Model, Search};
 use super::verdict::{Closure, Errors, FirmwareErrors, SCHEMA, Step, Structure, Verdict};
@@ -69,6 +69,8 @@ pub fn names(record: &ThermalRecord, design: &Design, effort: Effort) -> Result<
     let mut warnings = Vec::new();
     let condensed = condensed(record);
     let record = condensed.as_ref().map_or(record, |(short, _)| short);
+    let cleaned = without_glitches(record);
+    let record = cleaned.as_ref().map_or(record, |(cleaned, _)| cleaned);
     let channels = channels_of(record, design, &mut warnings)?;
     let unusable = |e: super::likelihood::Unusable| refused(record, e.to_string());
     let split = channels.split().map_err(unusable)?;
@@ -100,12 +102,23 @@ pub fn close(
         warnings.push(warning.clone());
         short
     });
+    let cleaned = without_glitches(record);
+    let record = cleaned.as_ref().map_or(record, |(cleaned, said)| {
+        warnings.extend(said.iter().cloned());
+        cleaned
+    });
     let channels = channels_of(record, design, &mut warnings)?;
     let refuse = |why: String| refused(record, why);
     let split = channels.split().map_err(|e| refuse(e.to_string()))?;
     let (closure, before, after, accidents, firmware) = {
         let own = own_candidates(design, &channels, &mut warnings);
         let search = Search::new(&channels, &split, effort, own);
+        if !search.heldout.contains(&true) {
+            let rows = record.len();
+            return Err(refuse(format!(
+                "no stretch of its {rows} rows can be held out, so that no error could be told"
+            )));
+        }
         let unusable = |e: super::likelihood::Unusable| refuse(e.to_string());
         let found = search.run().map_err(unusable)?;
         let before = search.model(&[]).map_err(unusable)?;

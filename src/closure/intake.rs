@@ -1,9 +1,11 @@
 //! A record as candidates see it: which column is the thermometer, and what its readings are in degC.
 
 use super::adc_rows;
+use super::baseline;
 use super::channels::Channels;
 use super::holes;
 use super::quantised::{self, Course};
+use super::weights;
 use crate::design::{Design, Gyro, RecordMapping};
 use crate::error::{InputError, Result};
 use crate::record::columns::THERMOMETERS;
@@ -76,6 +78,49 @@ pub fn refused(record: &ThermalRecord, why: String) -> crate::error::Error {
         .in_file(&record.source)
         .help("record longer, or average less")
         .into()
+}
+
+/// The record without readings of a thermometer that are glitches, with what is said of them; `None`: it has none. One such
+/// reading sets the range that the declared bias is scaled to, and looks like whatever is narrow in temperature.
+pub fn without_glitches(record: &ThermalRecord) -> Option<(ThermalRecord, Vec<Warning>)> {
+    let mut out: Option<(ThermalRecord, Vec<Warning>)> = None;
+    for name in THERMOMETERS {
+        let Some(column) = record.column(name) else {
+            continue;
+        };
+        let measured: Vec<usize> = (0..column.len())
+            .filter(|i| column[*i].is_finite())
+            .collect();
+        let readings: Vec<f64> = measured.iter().map(|i| column[*i]).collect();
+        let marks = weights::thermometer_glitches(&readings);
+        let marked = measured.iter().zip(marks).filter(|(_, glitch)| *glitch);
+        let rows: Vec<usize> = marked.map(|(row, _)| *row).collect();
+        if rows.is_empty() {
+            continue;
+        }
+        let (cleaned, said) = out.get_or_insert_with(|| (record.clone(), Vec::new()));
+        for (row, value) in cleaned
+            .columns
+            .entry(name.to_owned())
+            .or_default()
+            .iter_mut()
+            .enumerate()
+        {
+            if rows.contains(&row) {
+                *value = f64::NAN;
+            }
+        }
+        said.push(Warning::on(
+            "thermometer_glitch",
+            name,
+            format!(
+                "{} readings of {name} lie apart from their neighbours by more than half of the range and are left out ({})",
+                rows.len(),
+                baseline::lines_of(record, &rows)
+            ),
+        ));
+    }
+    out
 }
 
 /// A record as candidates see it.

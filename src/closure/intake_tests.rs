@@ -1,8 +1,10 @@
 //! The temperature behind a thermometer that is none.
 
 use super::channels::Channels;
+use super::close::close;
 use super::intake::channels_of;
-use super::synthetic::record;
+use super::search::Effort;
+use super::synthetic::{Random, record, triangle};
 use crate::design::{Design, reader};
 
 fn design() -> Design {
@@ -68,5 +70,49 @@ fn a_column_in_degc_says_what_a_foreign_frequency_cannot() {
         let (c, warnings) = taken(5e4, Some(name));
         assert!(warnings.is_empty(), "{warnings:?}");
         assert!((c.middle_degc - 26.85).abs() < 1e-6 && (c.kelvin_per_u + 30.0).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn one_reading_of_the_thermometer_that_is_a_glitch_names_nothing() {
+    for (seed, glitch_degc) in [(0, -400.0), (1, 300.0), (2, 1e6)] {
+        let mut random = Random::new(seed);
+        let degc = triangle(400);
+        let output: Vec<f64> = degc
+            .iter()
+            .map(|t| 0.3 - 0.01 * t + 1e-4 * t * t + 0.01 * random.normal())
+            .collect();
+        let mut read = degc.clone();
+        read[133] = glitch_degc;
+        let record = record("die_degc", &read, &output);
+        let closed = close(&record, Vec::new(), &design(), "test", Effort::default()).unwrap();
+        let names: Vec<&str> = closed
+            .closure
+            .steps
+            .iter()
+            .map(|s| s.effect.as_str())
+            .collect();
+        assert!(names.is_empty(), "{glitch_degc}: {names:?}");
+        assert!(closed.closure.after.heldout_rms < 0.012);
+        let mut said = closed.closure.warnings.iter();
+        assert!(said.any(|w| w.code == "thermometer_glitch"));
+    }
+}
+
+#[test]
+fn a_record_of_which_no_row_can_be_held_out_is_refused() {
+    for rows in [15, 16, 17] {
+        let mut random = Random::new(rows as u64);
+        let degc: Vec<f64> = (0..rows).map(|k| 4.0 * k as f64).collect();
+        let output: Vec<f64> = degc
+            .iter()
+            .map(|t| 0.3 - 0.01 * t + 0.01 * random.normal())
+            .collect();
+        let record = record("die_degc", &degc, &output);
+        let closed = close(&record, Vec::new(), &design(), "test", Effort::default());
+        match closed {
+            Err(e) => assert!(e.to_string().contains("held out"), "{e}"),
+            Ok(closed) => assert!(closed.closure.after.heldout_rms > 0.0, "{rows}"),
+        }
     }
 }

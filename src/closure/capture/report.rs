@@ -111,6 +111,10 @@ pub fn findings(capture: &Capture, known: &Known, plain: &Model, fitted: &Fitted
             }
         };
         step.heldout_rms = judged.errors.heldout_rms;
+        for name in step.parameters.keys() {
+            // Counts, codes and numbers of knots are exact.
+            step.parameter_std.entry(name.clone()).or_insert(0.0);
+        }
         steps.push(step);
     }
     let mut last = fitted.model.clone();
@@ -284,6 +288,8 @@ fn linear_step(
                 Some(fs) => (format!("{prefix}frequency_hz"), turns * fs),
                 None => (format!("{prefix}frequency_per_sample"), *turns),
             };
+            let std = frequency_std(&step, &prefix, capture.rows()) * (value / turns);
+            step.parameter_std.insert(name.clone(), std);
             step.parameters.insert(name, value);
         }
     }
@@ -293,6 +299,29 @@ fn linear_step(
         step.separating_experiment = Some(variant.effect.experiment().to_owned());
     }
     step
+}
+
+/// Deviation of a line's frequency, cycles per sample, as the deviation of its largest amplitude tells it (the Cramer-Rao
+/// bound of one sinusoid in white noise: sqrt(12) / (2 pi rows) of the amplitude's relative one; Rife & Boorstyn 1974).
+fn frequency_std(step: &Step, prefix: &str, rows: usize) -> f64 {
+    let amplitudes = step
+        .parameters
+        .iter()
+        .filter(|(name, _)| name.starts_with(prefix));
+    let relative = amplitudes.filter_map(|(name, v)| {
+        let std = step
+            .parameter_std
+            .get(name)
+            .filter(|_| name.contains("amplitude"))?;
+        (*v > 0.0).then(|| std / v)
+    });
+    let least = relative.fold(f64::INFINITY, f64::min);
+    let cycles = 12f64.sqrt() / (std::f64::consts::TAU * rows.max(1) as f64);
+    if least.is_finite() {
+        cycles * least
+    } else {
+        0.0
+    }
 }
 
 /// The places of a member's combos in the solution of a set.

@@ -64,7 +64,8 @@ impl Histogram {
         let variance = model.variance.base[channel] - 1.0 / 12.0;
         let cell = self.width as f64 / FINE as f64;
         let sigma = variance.max(0.0025).sqrt() / cell;
-        let reach = (4.0 * sigma).ceil() as usize + 1;
+        // Noise that is wider than all bars reaches all of them.
+        let reach = ((4.0 * sigma).ceil() as usize).min(self.fine.len()) + 1;
         let share: Vec<f64> = (0..=reach)
             .map(|k| {
                 let k = k as f64;
