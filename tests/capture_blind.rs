@@ -34,6 +34,14 @@ fn analysed(bench: &Bench, faults: &Faults) -> Findings {
 }
 
 fn answer(found: &Findings) -> Answer {
+    for step in &found.steps {
+        let told = step.parameters.keys().eq(step.parameter_std.keys());
+        let finite = step
+            .parameter_std
+            .values()
+            .all(|std| std.is_finite() && *std >= 0.0);
+        assert!(told && finite, "{step:?}");
+    }
     let steps = found.steps.iter();
     Answer {
         steps: steps

@@ -37,6 +37,7 @@ pub mod normal;
 pub mod offset;
 pub mod own_steps;
 pub mod report;
+mod reported_steps;
 pub mod rivals;
 pub mod search;
 pub mod spectrum;

@@ -6,12 +6,12 @@ use super::errors::{Judged, judge};
 use super::fit::Fitted;
 use super::gram::{Combo, Solved, spread};
 use super::input::Capture;
+use super::reported_steps::{clipping_step, jitter_step, linear_step, missing_step, own_combos};
 use super::search::Search;
 use super::{bend, firmware, jitter, rivals, structure};
 use crate::closure::likelihood::tail::chi_square_surprise;
 use crate::closure::verdict::{Errors, Evidence, FirmwareErrors, Step, Structure};
 use crate::record::Warning;
-use std::collections::BTreeMap;
 
 /// What the report of a capture is made of.
 #[derive(Debug, Clone)]
@@ -112,7 +112,7 @@ pub fn findings(capture: &Capture, known: &Known, plain: &Model, fitted: &Fitted
         };
         step.heldout_rms = judged.errors.heldout_rms;
         for name in step.parameters.keys() {
-            // Counts, codes and numbers of knots are exact.
+            // Counts, codes and numbers of knots: nothing of them is estimated.
             step.parameter_std.entry(name.clone()).or_insert(0.0);
         }
         steps.push(step);
@@ -164,7 +164,12 @@ fn unsure(fitted: &Fitted, search: &mut Search, set: &[usize]) -> Option<usize> 
 
 /// The chance that a member of a set gains what it does beyond the others, the search among variants and
 /// frequencies counted.
-fn p_value(fitted: &Fitted, search: &mut Search, set: &[usize], member: usize) -> Option<f64> {
+pub(super) fn p_value(
+    fitted: &Fitted,
+    search: &mut Search,
+    set: &[usize],
+    member: usize,
+) -> Option<f64> {
     let variant = fitted.variants.get(member)?;
     let fewer: Vec<usize> = set.iter().copied().filter(|k| *k != member).collect();
     let gain = search.gain(set) - search.gain(&fewer);
@@ -262,76 +267,6 @@ fn jitter_holds(capture: &Capture, fitted: &Fitted) -> bool {
     held.likelihood(variance.base, variance.jitter) > held.likelihood(fitted.noise, 0.0)
 }
 
-#[allow(clippy::too_many_arguments)]
-fn linear_step(
-    capture: &Capture,
-    known: &Known,
-    fitted: &Fitted,
-    search: &mut Search,
-    set: &[usize],
-    member: usize,
-    (combos, solved): (&[&Combo], &Solved),
-) -> Step {
-    let Some(variant) = fitted.variants.get(member) else {
-        return empty(Effect::Offset);
-    };
-    let mut step = empty(variant.effect);
-    let fewer: Vec<usize> = set.iter().copied().filter(|k| *k != member).collect();
-    step.p_value = p_value(fitted, search, set, member).unwrap_or(1.0);
-    let own = own_combos(fitted, set, member);
-    parameters(&mut step, combos, solved, own);
-    let names: Vec<String> = step.parameters.keys().cloned().collect();
-    for (i, turns) in fitted.model.lines.iter().enumerate() {
-        let prefix = format!("line{}_", i + 1);
-        if names.iter().any(|n| n.starts_with(&prefix)) {
-            let (name, value) = match known.fs_hz {
-                Some(fs) => (format!("{prefix}frequency_hz"), turns * fs),
-                None => (format!("{prefix}frequency_per_sample"), *turns),
-            };
-            let std = frequency_std(&step, &prefix, capture.rows()) * (value / turns);
-            step.parameter_std.insert(name.clone(), std);
-            step.parameters.insert(name, value);
-        }
-    }
-    step.selection_frequency = rivals::selection_frequency(fitted, &fewer, member);
-    step.indistinguishable_from = rivals::alike(capture, known, fitted, search, set, member);
-    if !step.indistinguishable_from.is_empty() {
-        step.separating_experiment = Some(variant.effect.experiment().to_owned());
-    }
-    step
-}
-
-/// Deviation of a line's frequency, cycles per sample, as the deviation of its largest amplitude tells it (the Cramer-Rao
-/// bound of one sinusoid in white noise: sqrt(12) / (2 pi rows) of the amplitude's relative one; Rife & Boorstyn 1974).
-fn frequency_std(step: &Step, prefix: &str, rows: usize) -> f64 {
-    let amplitudes = step
-        .parameters
-        .iter()
-        .filter(|(name, _)| name.starts_with(prefix));
-    let relative = amplitudes.filter_map(|(name, v)| {
-        let std = step
-            .parameter_std
-            .get(name)
-            .filter(|_| name.contains("amplitude"))?;
-        (*v > 0.0).then(|| std / v)
-    });
-    let least = relative.fold(f64::INFINITY, f64::min);
-    let cycles = 12f64.sqrt() / (std::f64::consts::TAU * rows.max(1) as f64);
-    if least.is_finite() {
-        cycles * least
-    } else {
-        0.0
-    }
-}
-
-/// The places of a member's combos in the solution of a set.
-fn own_combos(fitted: &Fitted, set: &[usize], member: usize) -> std::ops::Range<usize> {
-    let count = |k: &usize| fitted.variants.get(*k).map_or(0, |v| v.combos.len());
-    let before: usize = set.iter().take_while(|k| **k != member).map(count).sum();
-    let start = fitted.base.len() + fitted.nuisance.len() + before;
-    start..start + count(&member)
-}
-
 /// The bend that a member of the set fits, if one does.
 fn bends(
     fitted: &Fitted,
@@ -359,115 +294,6 @@ fn taken_lines(fitted: &Fitted, set: &[usize]) -> Vec<(f64, Effect)> {
     };
     let lines = fitted.model.lines.iter().enumerate();
     lines.filter_map(of).collect()
-}
-
-/// Values and deviations; of sine and cosine of the same name also the amplitude; of a table its extremes.
-fn parameters(step: &mut Step, combos: &[&Combo], solved: &Solved, own: std::ops::Range<usize>) {
-    let value = |k: usize| solved.coefficients.get(k).copied().unwrap_or(0.0);
-    let deviation = |k: usize| solved.stds.get(k).copied().unwrap_or(0.0);
-    if own.len() > 12 {
-        let extreme = |sign: f64| own.clone().map(|k| sign * value(k)).fold(0.0, f64::max) * sign;
-        let worst = own.clone().map(deviation).fold(0.0, f64::max);
-        for (name, v) in [
-            ("largest_codes", extreme(1.0)),
-            ("smallest_codes", extreme(-1.0)),
-        ] {
-            step.parameters.insert(name.to_owned(), v);
-            step.parameter_std.insert(name.to_owned(), worst);
-        }
-        step.parameters.insert("knots".to_owned(), own.len() as f64);
-        return;
-    }
-    let mut pairs: BTreeMap<String, [f64; 2]> = BTreeMap::new();
-    for k in own {
-        let Some(combo) = combos.get(k) else { continue };
-        let (v, s) = (value(k) * combo.unit, deviation(k) * combo.unit);
-        step.parameters.insert(combo.name.clone(), v);
-        step.parameter_std.insert(combo.name.clone(), s);
-        for part in ["_sin_", "_cos_"] {
-            if combo.name.contains(part) {
-                let name = combo.name.replace(part, "_amplitude_");
-                let pair = pairs.entry(name).or_default();
-                pair[0] += v * v;
-                pair[1] = s.max(pair[1]);
-            }
-        }
-    }
-    for (name, [square, std]) in pairs {
-        step.parameters.insert(name.clone(), square.sqrt());
-        step.parameter_std.insert(name, std);
-    }
-}
-
-fn empty(effect: Effect) -> Step {
-    Step {
-        effect: effect.id().to_owned(),
-        channels: vec!["drive_code".to_owned(), "sense_code".to_owned()],
-        parameters: BTreeMap::new(),
-        parameter_std: BTreeMap::new(),
-        heldout_rms: 0.0,
-        p_value: 0.0,
-        selection_frequency: 1.0,
-        indistinguishable_from: Vec::new(),
-        separating_experiment: None,
-    }
-}
-
-fn clipping_step(capture: &Capture, fitted: &Fitted) -> Step {
-    let mut step = empty(Effect::Clipping);
-    let rows = capture.training_rows() as f64;
-    for (channel, name) in ["drive", "sense"].iter().enumerate() {
-        let limits = fitted.model.limits[channel];
-        let std = (fitted.noise[channel] / rows).sqrt().max(0.01);
-        for (side, level) in [("low", limits.low), ("high", limits.high)] {
-            if level.is_finite() {
-                let key = format!("{name}_{side}_codes");
-                step.parameters.insert(key.clone(), level);
-                step.parameter_std.insert(key, std);
-            }
-        }
-    }
-    step.p_value = (13.0 - fitted.clipping.unwrap_or(0.0)).exp().min(1.0);
-    step
-}
-
-fn missing_step(fitted: &Fitted) -> Step {
-    let mut step = empty(Effect::MissingCodes);
-    if let Some(found) = &fitted.missing {
-        let count = found.missing.iter().map(|m| m.codes.len()).sum::<usize>();
-        step.parameters.insert("count".to_owned(), count as f64);
-        step.parameters
-            .insert("expected_rows".to_owned(), found.expected_rows);
-        if let Some((spacing, first)) = found.spacing {
-            step.parameters
-                .insert("spacing_codes".to_owned(), spacing as f64);
-            step.parameters
-                .insert("first_code".to_owned(), first as f64);
-        } else if let Some(first) = found.missing.iter().flat_map(|m| &m.codes).min() {
-            step.parameters
-                .insert("first_code".to_owned(), f64::from(*first));
-        }
-        step.p_value = (-found.gain).exp().min(1.0);
-    }
-    step
-}
-
-fn jitter_step(known: &Known, fitted: &Fitted) -> Step {
-    let mut step = empty(Effect::Jitter);
-    if let Some(found) = fitted.jitter {
-        let samples = found.jitter.sqrt();
-        let std = found.std / (2.0 * samples.max(1e-12));
-        let (name, unit) = match known.fs_hz {
-            Some(fs) => ("jitter_rms_s", 1.0 / fs),
-            None => ("jitter_rms_samples", 1.0),
-        };
-        step.parameters.insert(name.to_owned(), samples * unit);
-        step.parameter_std.insert(name.to_owned(), std * unit);
-        step.p_value = (3.0 - chi_square_surprise(1, 2.0 * found.gain).min(1e6))
-            .exp()
-            .min(1.0);
-    }
-    step
 }
 
 /// The same error with corrected codes, where arithmetic on code and phase can do it.
