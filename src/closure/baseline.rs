@@ -350,23 +350,28 @@ fn usable_rows(
         .map(|(i, _)| *i)
         .collect();
     if !found.is_empty() {
-        warnings.push(Warning::on(
-            "thermometer_glitch",
-            name,
-            format!(
-                "{} readings of {name} lie apart from their neighbours by more than half of the \
-                 range and are left out ({})",
-                found.len(),
-                lines_of(record, &found)
-            ),
-        ));
+        warnings.push(glitches(record, name, &found));
     }
     let rows = measured.into_iter().zip(glitch);
     rows.filter(|(_, g)| !g).map(|(i, _)| i).collect()
 }
 
+/// What is said of a thermometer's readings that [`weights::thermometer_glitches`] marks.
+pub(super) fn glitches(record: &ThermalRecord, name: &str, rows: &[usize]) -> Warning {
+    Warning::on(
+        "thermometer_glitch",
+        name,
+        format!(
+            "{} readings of {name} lie apart from their neighbours by more than half of the \
+             range and are left out ({})",
+            rows.len(),
+            lines_of(record, rows)
+        ),
+    )
+}
+
 /// "line 3, 17, 40 and 5 more".
-pub(super) fn lines_of(record: &ThermalRecord, rows: &[usize]) -> String {
+fn lines_of(record: &ThermalRecord, rows: &[usize]) -> String {
     let shown: Vec<String> = rows
         .iter()
         .take(8)

@@ -99,26 +99,10 @@ pub fn without_glitches(record: &ThermalRecord) -> Option<(ThermalRecord, Vec<Wa
             continue;
         }
         let (cleaned, said) = out.get_or_insert_with(|| (record.clone(), Vec::new()));
-        for (row, value) in cleaned
-            .columns
-            .entry(name.to_owned())
-            .or_default()
-            .iter_mut()
-            .enumerate()
-        {
-            if rows.contains(&row) {
-                *value = f64::NAN;
-            }
+        if let Some(column) = cleaned.columns.get_mut(name) {
+            rows.iter().for_each(|row| column[*row] = f64::NAN);
         }
-        said.push(Warning::on(
-            "thermometer_glitch",
-            name,
-            format!(
-                "{} readings of {name} lie apart from their neighbours by more than half of the range and are left out ({})",
-                rows.len(),
-                baseline::lines_of(record, &rows)
-            ),
-        ));
+        said.push(baseline::glitches(record, name, &rows));
     }
     out
 }
