@@ -431,4 +431,8 @@ fn an_output_that_is_stuck_but_for_two_rows_has_no_rails() {
     let mut output = vec![0.5; 202];
     (output[3], output[9]) = (0.4, 0.7);
     assert_eq!(of_all(&channels(&output, None)), None);
+    // Both glitches below: nothing lies within a lower level.
+    output[9] = 0.45;
+    let lower_dps = of_all(&channels(&output, None)).and_then(|rails| rails.lower_dps);
+    assert_eq!(lower_dps, None);
 }

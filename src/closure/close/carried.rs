@@ -5,8 +5,8 @@ use crate::closure::firmware;
 use crate::correction::Term;
 use crate::record::{ThermalRecord, Warning, stats};
 
-/// Held-out error of firmware over the model's from which that is said.
-const BEHIND: f64 = 1.02;
+/// A held-out error that is so many times another one is more: that of firmware beside the model's, or the declared one's.
+const MORE: f64 = 1.02;
 
 impl Told<'_> {
     /// The correction and its errors; none where firmware cannot carry it.
@@ -55,7 +55,7 @@ impl Told<'_> {
         let declared = declared.and_then(|plan| judged(&plan).ok()?.errors.heldout_rms);
         if let (Some(with), Some(without)) = (carried.errors.heldout_rms, declared)
             && !self.after.terms.is_empty()
-            && with > 1.02 * without
+            && with > MORE * without
         {
             let said = format!(
                 "the steps' coefficients cancel each other: in firmware's words they leave {with:.3e} deg/s of \
@@ -83,10 +83,10 @@ impl Told<'_> {
             );
         }
         let without_rounding = carried.unrounded_rms_dps / model;
-        if reasons.is_empty() || without_rounding < BEHIND {
+        if reasons.is_empty() || without_rounding < MORE {
             reasons.push("its words are too short for this correction");
         }
-        (firmware > BEHIND * model).then(|| {
+        (firmware > MORE * model).then(|| {
             let said = format!(
                 "firmware leaves {:.3} times what the model leaves of held-out rows, {without_rounding:.3} times without \
                  rounding: {}",

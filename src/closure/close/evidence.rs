@@ -1,7 +1,7 @@
 //! What became of every effect of the catalogue, and why.
 
 use super::Told;
-use crate::closure::effects::{Candidate, Missing};
+use crate::closure::effects::{Candidate, Missing, tone};
 use crate::closure::search::LEVEL;
 use crate::closure::search::judge::Judged;
 use crate::closure::verdict::{Evidence, Fate, Step};
@@ -57,6 +57,7 @@ impl Told<'_> {
         }
     }
 
+    /// What became of it, and why.
     fn fate(&self, j: &Judged, id: &String, steps: &[Step]) -> (Fate, String) {
         if steps.iter().any(|s| s.effect == *id) {
             return (Fate::Taken, "a step".to_owned());
@@ -92,14 +93,13 @@ impl Told<'_> {
 
     /// What is said of `periodic_pickup` where the strongest sinusoid comes back too seldom for its name.
     fn wave(&self, listed: &[Evidence]) -> Option<Evidence> {
-        const NAME: &str = "periodic_pickup";
         let mut judged = self.found.first.iter();
-        let wave = judged.find(|j| j.candidate.id() == "outside:tone")?;
-        let absent = listed.iter().all(|e| e.effect != NAME);
+        let wave = judged.find(|j| j.candidate.id() == tone::FURTHER)?;
+        let absent = listed.iter().all(|e| e.effect != tone::NAMED);
         let remark =
             "the strongest sinusoid has fewer than four periods in this record, as a wander has";
         absent.then(|| Evidence {
-            effect: NAME.to_owned(),
+            effect: tone::NAMED.to_owned(),
             fate: Fate::Rejected,
             p_value: Some(wave.p_value),
             gain: Some(wave.gain),

@@ -5,6 +5,7 @@ use crate::closure::search::LEVEL;
 use crate::record::Warning;
 
 impl Told<'_> {
+    /// All of it but what firmware has to say.
     pub(super) fn warn(&self, warnings: &mut Vec<Warning>) {
         warnings.extend(self.accidents());
         if !self.found.within_rounding.is_empty() {

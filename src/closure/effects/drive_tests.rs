@@ -29,6 +29,15 @@ fn less_q_does_not_bend_the_phase_back() {
     }
 }
 
+#[test]
+fn the_phase_is_a_channel_of_a_damping_that_bends_it() {
+    let pulled = Pull::default().made();
+    let c = &pulled.channels;
+    assert_eq!(Damping.channels_at(c, &Point::form(0)), ["agc"]);
+    let both = ["agc", "phase_rad"];
+    assert_eq!(Damping.channels_at(c, &Point::form(2)), both);
+}
+
 /// A phase that bends as the damping does, read behind a delay of 0.25 rad: the only name, with its share and the delay.
 #[test]
 fn damping_behind_a_demodulators_delay_is_the_only_name() {
