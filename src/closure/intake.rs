@@ -4,6 +4,7 @@ use super::adc_rows;
 use super::baseline;
 use super::channels::Channels;
 use super::holes;
+use super::quadrature;
 use super::quantised::{self, Course};
 use super::weights;
 use crate::design::{Design, Gyro, RecordMapping};
@@ -153,13 +154,19 @@ pub fn channels_of(
         columns.insert(name.clone(), course.reading);
         channels = seen(&columns)?;
     }
-    let Some(undithered) = adc_rows::found(&columns, &channels, design, seen)? else {
-        return Ok(channels);
-    };
-    warnings.push(undithered.warning(design));
-    let rounding_dps = undithered.left_dps();
-    if let Some((columns, _)) = &undithered.removed {
-        channels = seen(columns)?;
+    let mut rounding_dps = 0.0;
+    if let Some(undithered) = adc_rows::found(&columns, &channels, design, seen)? {
+        warnings.push(undithered.warning(design));
+        rounding_dps = undithered.left_dps();
+        if let Some((cleaned, _)) = undithered.removed {
+            channels = seen(&cleaned)?;
+            columns = cleaned;
+        }
+    }
+    if let Some(said) = quadrature::contains_output(&channels) {
+        warnings.push(said);
+        columns.remove(quadrature::NAME);
+        channels = seen(&columns)?;
     }
     Ok(Channels {
         rounding_dps,

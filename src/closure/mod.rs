@@ -5,7 +5,7 @@
 //! correlation, and the coefficients' covariance), [`folds`] (held-out blocks), [`order`] (its
 //! choice), [`sweep`] (heating against cooling) and [`checks`] (what a user should know of before
 //! believing the fit). [`likelihood`] is what tells an effect from noise with a memory. [`capture`] does the
-//! same for ADC codes. [`close`] answers for a thermal record: [`intake`] ([`quantised`], [`staircase`]: coarse thermometers; [`adc_rows`], [`adc_rounding`]: coarse ADCs), [`channels`],
+//! same for ADC codes. [`close`] answers for a thermal record: [`intake`] ([`quantised`], [`staircase`]: coarse thermometers; [`adc_rows`], [`adc_rounding`]: coarse ADCs; [`quadrature`]: one that contains the output), [`channels`],
 //! candidate [`effects`] and their [`search`], [`firmware`]; [`verdict`] is the form of the answer. Nothing here knows the plant
 //! (law 4).
 
@@ -26,6 +26,7 @@ pub mod likelihood;
 pub mod noise;
 pub mod order;
 pub mod polynomial;
+pub mod quadrature;
 pub mod quantised;
 pub mod rails;
 pub mod residuals;

@@ -1,0 +1,76 @@
+//! Whether a record's quadrature contains the output.
+//!
+//! A demodulator of fixed frequency turns against the gyro as the drive's phase moves, so that part of the rate's signal and noise
+//! stands in the quadrature. What is in the output then is in the quadrature as well, and any cause looks like a leakage: the
+//! channel is no cause but a second, worse output. From row to row it shows: the slope of the output's noise over the quadrature's is then
+//! more than the sine of any phase error.
+
+use super::channels::Channels;
+use super::search::declared_by;
+use crate::record::{Warning, stats};
+
+/// The channel.
+pub const NAME: &str = "quad_dps";
+
+/// Sine of a phase error that no demodulator has which is in use, 17 degrees: the contract's leakages are a few
+/// hundredths of a radian.
+const NO_PHASE_ERROR: f64 = 0.3;
+
+/// Standard deviations that a slope has to be beyond it.
+const SURELY: f64 = 4.0;
+
+/// Second differences beyond so many robust deviations are not noise (spikes, steps, a course that bends).
+const OUTLYING: f64 = 4.0;
+
+/// Fewest second differences that a slope is trusted from.
+const FEWEST: usize = 30;
+
+/// Factor of a product's variance that its neighbours' correlation makes, for second differences of white noise: 1 + 2 (2/3)^2 + 2 (1/6)^2.
+const NEIGHBOURS: f64 = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0);
+
+/// Slope of the output's noise over the quadrature's, with its standard deviation; `None` where either has too little.
+fn slope(error_dps: &[f64], quad_dps: &[f64]) -> Option<(f64, f64)> {
+    let bend = |w: &[f64]| w[2] - 2.0 * w[1] + w[0];
+    let bends = |v: &[f64]| v.windows(3).map(bend).collect::<Vec<f64>>();
+    let (x, y) = (bends(quad_dps), bends(error_dps));
+    let (most_x, most_y) = (OUTLYING * stats::mad_std(&x), OUTLYING * stats::mad_std(&y));
+    let pairs = x.iter().zip(&y);
+    let kept: Vec<(f64, f64)> = pairs
+        .filter(|(x, y)| x.abs() < most_x && y.abs() < most_y)
+        .map(|(x, y)| (*x, *y))
+        .collect();
+    let xx: f64 = kept.iter().map(|(x, _)| x * x).sum();
+    if kept.len() < FEWEST || xx <= 0.0 {
+        return None;
+    }
+    let slope = kept.iter().map(|(x, y)| x * y).sum::<f64>() / xx;
+    let rest: f64 = kept.iter().map(|(x, y)| (y - slope * x).powi(2)).sum();
+    let variance = NEIGHBOURS * rest / kept.len() as f64 / xx;
+    Some((slope, variance.sqrt()))
+}
+
+/// What is said of a quadrature that contains the output; `None`: it does not, or is not there.
+pub fn contains_output(c: &Channels) -> Option<Warning> {
+    let (_, rest) = declared_by(&c.u, &c.error_dps);
+    let measured = c.error_dps.iter().zip(c.moving(NAME)?);
+    let quad_dps: Vec<f64> = measured
+        .filter(|(e, _)| e.is_finite())
+        .map(|(_, q)| *q)
+        .collect();
+    let (slope, std) = slope(&rest, &quad_dps)?;
+    (slope.abs() - SURELY * std > NO_PHASE_ERROR).then(|| {
+        Warning::on(
+            "quadrature_contains_output",
+            NAME,
+            format!(
+                "from row to row the output follows {NAME} with a slope of {slope:.2} +- {std:.2}, which is the sine of no \
+                 phase error: the quadrature contains part of the output (a demodulator that the drive's phase has turned). It is \
+                 left out, so that a leakage cannot be seen: align the demodulator, or let it follow the drive's phase"
+            ),
+        )
+    })
+}
+
+#[cfg(test)]
+#[path = "quadrature_tests.rs"]
+mod tests;

@@ -1,0 +1,84 @@
+//! A quadrature that contains the output is told from one that leaks into it.
+
+use super::*;
+use crate::closure::close::close;
+use crate::closure::intake::channels_of;
+use crate::closure::search::Effort;
+use crate::closure::synthetic::{Random, record, triangle};
+use crate::design::reader;
+use crate::record::ThermalRecord;
+
+const ROWS: usize = 240;
+const NOISE_DPS: f64 = 0.02;
+
+/// A record whose quadrature drifts with the temperature, swings once in a while and has a noise of its own; `leaks` of it, rad, are in the output
+/// and `turned`, rad, of the output's noise and warm-up in it.
+fn made(seed: u64, leaks: f64, turned: f64) -> ThermalRecord {
+    let mut random = Random::new(seed);
+    let degc = triangle(ROWS);
+    let mut out = Vec::new();
+    let mut quad = Vec::new();
+    for (k, t) in degc.iter().enumerate() {
+        let swing = (k as f64 / 17.0).sin();
+        let q = 600.0 - 0.02 * t + 0.1 * swing + 0.5 * NOISE_DPS * random.normal();
+        let warm = 0.4 * (-(k as f64) / 40.0).exp() + NOISE_DPS * random.normal();
+        out.push(3.0 + 0.05 * t - 4e-4 * t * t + warm + leaks * (q - 600.0));
+        quad.push(q + turned * warm);
+    }
+    let mut record = record("die_degc", &degc, &out);
+    record.columns.insert(NAME.to_owned(), quad);
+    record
+}
+
+fn said_of(record: &ThermalRecord) -> (bool, bool) {
+    let mut warnings = Vec::new();
+    let design = reader::parse("", None).unwrap();
+    let channels = channels_of(record, &design, &mut warnings).unwrap();
+    let said = warnings
+        .iter()
+        .any(|w| w.code == "quadrature_contains_output");
+    (said, channels.column(NAME).is_none())
+}
+
+#[test]
+fn a_leakage_of_any_plausible_angle_keeps_the_channel() {
+    for seed in 0..20 {
+        for leaks in [0.0, 0.01, 0.1, -0.3] {
+            assert_eq!(
+                said_of(&made(seed, leaks, 0.0)),
+                (false, false),
+                "{seed} {leaks}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_quadrature_with_the_outputs_noise_is_left_out_and_said() {
+    for seed in 0..20 {
+        for turned in [0.5, -0.6, 0.9] {
+            assert_eq!(
+                said_of(&made(seed, 0.0, turned)),
+                (true, true),
+                "{seed} {turned}"
+            );
+        }
+    }
+}
+
+#[test]
+fn what_the_output_shares_with_its_quadrature_is_no_leakage() {
+    let design = reader::parse("", None).unwrap();
+    for seed in 0..4 {
+        let effort = Effort::default();
+        let record = made(seed, 0.0, 0.5);
+        let closed = close(&record, Vec::new(), &design, "test", effort).unwrap();
+        let names: Vec<&str> = closed
+            .closure
+            .steps
+            .iter()
+            .map(|s| s.effect.as_str())
+            .collect();
+        assert_eq!(names, ["warmup_transient"], "{seed}");
+    }
+}
