@@ -41,6 +41,8 @@ pub struct Channels {
     pub die: Option<Other>,
     /// rms of the error that the circuit's own rounding leaves in the output, deg/s; 0 where it does not matter.
     pub rounding_dps: f64,
+    /// One step of a thermometer that is read in coarse steps, in u; 0 for others.
+    pub step_u: f64,
     /// All other columns but the output, by name.
     pub columns: BTreeMap<String, Vec<f64>>,
 }
@@ -120,6 +122,7 @@ impl Channels {
             tangent: None,
             die: None,
             rounding_dps: 0.0,
+            step_u: 0.0,
             columns: others,
         };
         out.tangent = out.tangent_of_phase();

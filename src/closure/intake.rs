@@ -3,6 +3,7 @@
 use super::adc_rows;
 use super::baseline;
 use super::channels::Channels;
+use super::held;
 use super::holes;
 use super::quadrature;
 use super::quantised::{self, Course};
@@ -13,7 +14,8 @@ use crate::record::columns::THERMOMETERS;
 use crate::record::{ThermalRecord, Warning, stats};
 use std::collections::BTreeMap;
 
-/// The bias model's thermometer in a record, if it has one.
+/// The bias model's thermometer in a record, if it has one: the first in the contract's order that has at least half as many
+/// readings as any other (a column that is nearly empty is none).
 ///
 /// # Errors
 /// The design names one that is not there.
@@ -34,10 +36,14 @@ fn thermometer(record: &ThermalRecord, mapping: &RecordMapping) -> Result<Option
         ))
         .into()),
         Some(name) => Ok(Some(name.clone())),
-        None => Ok(THERMOMETERS
-            .into_iter()
-            .find(|t| record.measured(t) > 0)
-            .map(str::to_owned)),
+        None => {
+            let most = THERMOMETERS.map(|t| record.measured(t)).into_iter().max();
+            let enough = |t: &&str| {
+                let measured = record.measured(t);
+                measured > 0 && 2 * measured >= most.unwrap_or(0)
+            };
+            Ok(THERMOMETERS.into_iter().find(enough).map(str::to_owned))
+        }
     }
 }
 
@@ -149,7 +155,12 @@ pub fn channels_of(
         made.map_err(|missing| refused(record, format!("column {missing} holds no measured value")))
     };
     let mut channels = seen(&columns)?;
-    if let Some(course) = quantised::course(&channels, design) {
+    let step_u = quantised::step_u(&channels);
+    if let Some(course) = held::course(&channels) {
+        warnings.push(behind(&name, &course));
+        columns.insert(name.clone(), course.reading);
+        channels = seen(&columns)?;
+    } else if let Some(course) = quantised::course(&channels, design) {
         warnings.push(rounding(design, &name, &course));
         columns.insert(name.clone(), course.reading);
         channels = seen(&columns)?;
@@ -170,8 +181,20 @@ pub fn channels_of(
     }
     Ok(Channels {
         rounding_dps,
+        step_u,
         ..channels
     })
+}
+
+/// What is said of a thermometer that is read less often than the output.
+fn behind(thermometer: &str, course: &held::Course) -> Warning {
+    let said = format!(
+        "{thermometer} has a new reading every {:.1} rows and repeats it in between: what the repeated ones are behind by \
+         makes {:.3e} deg/s rms of the declared bias. It is taken out before and after (causes are sought along straight lines \
+         between new readings); the firmware's error contains it: read the thermometer as often as the output",
+        course.rows, course.artefact_rms_dps
+    );
+    Warning::on("thermometer_held", thermometer, said)
 }
 
 /// What is said of a thermometer that is read in coarse steps.

@@ -109,3 +109,24 @@ fn a_record_of_which_no_row_can_be_held_out_is_refused() {
         assert!(refused.is_some_and(|e| e.contains("held out")), "{rows}");
     }
 }
+
+#[test]
+fn a_column_that_is_nearly_empty_is_no_thermometer() {
+    let degc = triangle(200);
+    let mut record = record("die_degc", &degc, &vec![0.0; 200]);
+    for (every, expected) in [
+        (50, "die_degc"),
+        (3, "die_degc"),
+        (2, "phase_rad"),
+        (1, "phase_rad"),
+    ] {
+        let phase = |k: usize| match k % every {
+            0 => -1.5 - 1e-3 * degc[k],
+            _ => f64::NAN,
+        };
+        let phase = (0..200).map(phase).collect();
+        record.columns.insert("phase_rad".to_owned(), phase);
+        let channels = channels_of(&record, &design(), &mut Vec::new()).unwrap();
+        assert_eq!(channels.thermometer, expected, "{every}");
+    }
+}

@@ -43,7 +43,7 @@ const TURNS: usize = 150;
 
 /// The course of a record's thermometer, if rounding matters there.
 pub fn course(c: &Channels, design: &Design) -> Option<Course> {
-    let raw: Vec<f64> = c.u.iter().map(|u| c.centre + c.half * u).collect();
+    let raw = raw(c);
     let step = step_of(&raw)?;
     let reading = smoothest(&raw, &cells(c, design, &raw, step));
     let u: Vec<f64> = reading.iter().map(|r| (r - c.centre) / c.half).collect();
@@ -63,6 +63,16 @@ pub fn course(c: &Channels, design: &Design) -> Option<Course> {
         reading,
         artefact_rms_dps,
     })
+}
+
+/// The thermometer's readings, in its unit.
+fn raw(c: &Channels) -> Vec<f64> {
+    c.u.iter().map(|u| c.centre + c.half * u).collect()
+}
+
+/// One step of a thermometer that is read in coarse steps, in u; 0 for others.
+pub fn step_u(c: &Channels) -> f64 {
+    step_of(&raw(c)).map_or(0.0, |step| step / c.half)
 }
 
 /// The step that a design's circuit predicts for a thermometer that it reads itself, in the reading's unit: the phase

@@ -7,7 +7,7 @@ use crate::record::Warning;
 impl Told<'_> {
     /// All of it but what firmware has to say.
     pub(super) fn warn(&self, warnings: &mut Vec<Warning>) {
-        warnings.extend(self.accidents());
+        warnings.extend(self.accidents().or_else(|| self.riddled()));
         if !self.found.within_rounding.is_empty() {
             let each = self.found.within_rounding.iter();
             let names: Vec<String> = each.map(|(id, rms)| format!("{id} ({rms:.2e})")).collect();
@@ -74,6 +74,25 @@ impl Told<'_> {
                 held,
                 search.channels.time_s[farthest],
                 residual[farthest]
+            ),
+        ))
+    }
+
+    /// What is said of rows that are far off and too many for accidents.
+    fn riddled(&self) -> Option<Warning> {
+        let search = self.search;
+        let rows = search.riddled(self.after)?;
+        let held = rows.iter().filter(|row| search.heldout[**row]).count();
+        let first = rows.first().map(|row| search.channels.time_s[*row])?;
+        Some(Warning::on(
+            "many_outliers",
+            "rate_out_dps",
+            format!(
+                "{} of {} rows ({held} held out) are more than six deviations off the others, the first at {first} s: too many \
+                 for accidents, so they are in the errors, and no candidate makes them. Do the output and the applied \
+                 rate of a row belong to one time (a rate table that moves within rows, an output that comes late)?",
+                rows.len(),
+                search.channels.len()
             ),
         ))
     }

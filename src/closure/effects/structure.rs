@@ -117,10 +117,15 @@ fn shapes(form: usize) -> &'static [fn(f64) -> f64] {
     }
 }
 
-/// Centre and half width of a crossing, in u: within the record.
-fn crossing(point: &Point) -> (f64, f64) {
+/// The narrowest crossing in steps of a coarse thermometer: within a step nothing is known of the temperature, least where it
+/// turns.
+const STEPS: f64 = 2.0;
+
+/// Centre and half width of a crossing, in u: within the record, and such that its thermometer shows it.
+fn crossing(c: &Channels, point: &Point) -> (f64, f64) {
     let (centre, width) = (point.theta[0], point.theta[1].exp());
-    (centre.clamp(-1.0, 1.0), width.min(WIDEST))
+    let narrowest = (STEPS * c.step_u).min(WIDEST);
+    (centre.clamp(-1.0, 1.0), width.clamp(narrowest, WIDEST))
 }
 
 impl Candidate for ModeCrossing {
@@ -145,15 +150,15 @@ impl Candidate for ModeCrossing {
     }
 
     fn columns(&self, c: &Channels, _bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
-        let (centre, width) = crossing(point);
+        let (centre, width) = crossing(c, point);
         let shapes = shapes(point.form).iter();
         shapes
             .map(|shape| map(&c.u, |u| shape((u - centre) / width)))
             .collect()
     }
 
-    fn spacing(&self, _c: &Channels, point: &Point) -> Vec<f64> {
-        vec![crossing(point).1, 0.5]
+    fn spacing(&self, c: &Channels, point: &Point) -> Vec<f64> {
+        vec![crossing(c, point).1, 0.5]
     }
 
     fn is_local(&self) -> bool {
@@ -172,8 +177,8 @@ impl Candidate for ModeCrossing {
         out
     }
 
-    fn correction(&self, _c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
-        let (centre, width) = crossing(&e.point);
+    fn correction(&self, c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
+        let (centre, width) = crossing(c, &e.point);
         let shape = |u: f64| -> f64 {
             let x = (u - centre) / width;
             let pairs = shapes(e.point.form).iter().zip(&e.beta);
@@ -190,7 +195,7 @@ impl Candidate for ModeCrossing {
     fn report(&self, c: &Channels, e: &Estimate) -> Reported {
         let k = c.kelvin_per_u;
         let std = |i: usize| e.theta_std.get(i).copied().unwrap_or(0.0);
-        let (centre, width) = crossing(&e.point);
+        let (centre, width) = crossing(c, &e.point);
         let mut out: Reported = [
             entry(
                 "centre_degc",
@@ -217,11 +222,20 @@ mod tests {
     use std::collections::BTreeMap;
     #[test]
     fn a_crossing_lies_within_the_record() {
-        for (theta, expected) in [
-            ([0.3, f64::ln(0.1)], (0.3, 0.1)),
-            ([-7.0, f64::ln(40.0)], (-1.0, WIDEST)),
+        let degc = triangle(100);
+        let columns = BTreeMap::from([
+            ("rate_out_dps".to_owned(), vec![0.0; 100]),
+            ("die_degc".to_owned(), degc.clone()),
+        ]);
+        let mut c = Channels::new(&degc, &columns, "die_degc", |t| t).unwrap();
+        for (theta, step_u, expected) in [
+            ([0.3, f64::ln(0.1)], 0.0, (0.3, 0.1)),
+            ([-7.0, f64::ln(40.0)], 0.0, (-1.0, WIDEST)),
+            ([0.3, f64::ln(0.1)], 0.07, (0.3, 0.14)),
+            ([0.3, f64::ln(0.1)], 2.0, (0.3, WIDEST)),
         ] {
-            let (centre, width) = crossing(&Point::at(0, &theta));
+            c.step_u = step_u;
+            let (centre, width) = crossing(&c, &Point::at(0, &theta));
             assert!((centre - expected.0).abs() < 1e-12 && (width - expected.1).abs() < 1e-12);
         }
     }

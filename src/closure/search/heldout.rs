@@ -15,6 +15,12 @@ const ACCIDENT: f64 = 6.0;
 const FEW: f64 = 0.05;
 const LEAST: usize = 60;
 
+/// Whether so many of the rows are far off that they are no accidents.
+fn is_riddled(far: &[bool]) -> bool {
+    let count = far.iter().filter(|f| **f).count();
+    count as f64 > FEW * far.len() as f64
+}
+
 /// Rows by which a step's place may be off.
 const ASTRAY: usize = 3;
 
@@ -31,32 +37,52 @@ impl Search<'_> {
     }
 
     /// Rows, fitted or held out, that are accidents to all models that are compared: few, each by itself, and far off. One
-    /// of them may outweigh whatever the models differ by, so that errors are of the other rows. A row next to a step, on
-    /// whose other side it would be none, is an error of the model.
+    /// of them may outweigh whatever the models differ by, so that errors are of the other rows.
     pub fn accidents<const N: usize>(&self, models: [&Model; N]) -> Vec<bool> {
+        let far = self.far(models);
+        let rows: Vec<usize> = self.judged_rows().collect();
+        let in_order: Vec<bool> = rows.iter().map(|row| far[*row]).collect();
+        let few = rows.len() >= LEAST && !is_riddled(&in_order);
+        if few && !stand_together(&in_order) {
+            return far;
+        }
+        vec![false; far.len()]
+    }
+
+    /// Rows that a model leaves far off, where they are too many for accidents.
+    pub fn riddled(&self, model: &Model) -> Option<Vec<usize>> {
+        let far = self.far([model]);
+        let in_order: Vec<bool> = self.judged_rows().map(|row| far[row]).collect();
+        let rows = || (0..far.len()).filter(|row| far[*row]).collect();
+        (in_order.len() >= LEAST && is_riddled(&in_order)).then(rows)
+    }
+
+    /// Rows that errors are of, fitted or held out.
+    fn judged_rows(&self) -> impl Iterator<Item = usize> {
+        let rows = self.train.iter().zip(&self.heldout).enumerate();
+        rows.filter(|(_, (train, held))| **train || **held)
+            .map(|(row, _)| row)
+    }
+
+    /// Rows that are far off of all models that are compared. A row next to a step, on whose other side it would be none, is
+    /// an error of the model.
+    fn far<const N: usize>(&self, models: [&Model; N]) -> Vec<bool> {
         let residuals = models.map(|m| m.residual(self.channels));
         let switched = models.map(|m| self.across_steps(m));
-        let judged = |row: usize| self.train[row] || self.heldout[row];
         let least = |row: usize| {
             let of_model = residuals.iter().zip(&switched);
             let of_row = of_model.map(|(r, by)| (r[row] + by[row]).abs().min(r[row].abs()));
             of_row.fold(f64::INFINITY, f64::min)
         };
-        let rows: Vec<usize> = (0..self.train.len()).filter(|row| judged(*row)).collect();
         let deviation_dps = residuals.iter().map(|r| {
-            let sizes: Vec<f64> = rows.iter().map(|row| r[*row].abs()).collect();
+            let sizes: Vec<f64> = self.judged_rows().map(|row| r[row].abs()).collect();
             stats::MAD_TO_STD * stats::median(&sizes)
         });
         let far_dps = ACCIDENT * deviation_dps.fold(f64::INFINITY, f64::min);
         let far_dps = far_dps.max(self.nothing_dps());
-        let far: Vec<bool> = rows.iter().map(|row| least(*row) > far_dps).collect();
-        let count = far.iter().filter(|f| **f).count();
         let mut out = vec![false; self.train.len()];
-        let few = rows.len() >= LEAST && count as f64 <= FEW * rows.len() as f64;
-        if few && !stand_together(&far) {
-            for (row, far) in rows.iter().zip(far) {
-                out[*row] = far;
-            }
+        for row in self.judged_rows() {
+            out[row] = least(row) > far_dps;
         }
         out
     }

@@ -12,6 +12,11 @@ const NOISE_DPS: f64 = 0.01;
 /// Two heatings with a supply of two levels, which the output follows by three times the noise, and rows that are off by
 /// thirty times.
 fn channels(rows: usize, off: impl Fn(usize) -> bool) -> Channels {
+    supplied(rows, 3.0, off)
+}
+
+/// The same where the output follows the supply by `gain` times the noise.
+fn supplied(rows: usize, gain: f64, off: impl Fn(usize) -> bool) -> Channels {
     let mut random = Random::new(8);
     let degc = [triangle(rows / 2), triangle(rows - rows / 2)].concat();
     let supply: Vec<f64> = (0..rows)
@@ -19,7 +24,7 @@ fn channels(rows: usize, off: impl Fn(usize) -> bool) -> Channels {
         .collect();
     let output = (0..rows).map(|k| {
         let accident = if off(k) { 30.0 } else { 0.0 };
-        0.3 - 0.002 * degc[k] + NOISE_DPS * (3.0 * supply[k] + accident + random.normal())
+        0.3 - 0.002 * degc[k] + NOISE_DPS * (gain * supply[k] + accident + random.normal())
     });
     let columns = BTreeMap::from([
         ("rate_out_dps".to_owned(), output.collect()),
@@ -53,6 +58,24 @@ fn few_rows_that_stand_alone_are_accidents_and_the_rest_is_what_is_judged() {
     assert_eq!(rows, [13, 54, 95, 136, 177, 218, 259]);
     assert!((0.85..1.15).contains(&after), "{after}");
     assert!((1.6..2.1).contains(&before), "{before}");
+}
+
+#[test]
+fn rows_that_are_off_too_often_for_accidents_are_left() {
+    let left = |every: usize| {
+        let c = supplied(300, 0.0, |k| k % every == 3);
+        let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+        let found = search.run().unwrap();
+        let riddled = search.riddled(&search.model(&found.terms).unwrap());
+        (
+            found.terms.len(),
+            found.left,
+            riddled.map(|rows| rows.len()),
+        )
+    };
+    assert_eq!(left(8), (0, Some("time_s".to_owned()), Some(38)));
+    assert_eq!(left(12), (0, Some("time_s".to_owned()), Some(25)));
+    assert!(left(40).2.is_none());
 }
 
 #[test]

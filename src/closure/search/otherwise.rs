@@ -79,7 +79,8 @@ impl Search<'_> {
         let used = self.used.iter().filter(|u| **u).count();
         let rough = || self.roughly(&model) > ROUGH.max(rough_by_chance(used)) && !filtered();
         let wanders = || self.wander(&model) > MUCH || rough();
-        if found.left.is_none() && (self.missed(&model) || wanders()) {
+        let riddled = || self.riddled(&model).is_some();
+        if found.left.is_none() && (self.missed(&model) || wanders() || riddled()) {
             found.left = Some("time_s".to_owned());
             self.kept_stable(&mut found)?;
         }
