@@ -25,7 +25,7 @@ pub(super) fn check(record: &ThermalRecord) -> Option<Warning> {
 
 /// What a slope that is not near 1 means.
 fn meaning(slope: f64) -> Option<(&'static str, &'static str)> {
-    Some(if (0.5..=2.0).contains(&slope) {
+    Some(if (0.7..=1.4).contains(&slope) {
         return None;
     } else if (-2.0..=-0.5).contains(&slope) {
         ("rate_sign_reversed", "one of the two has the opposite sign")

@@ -71,7 +71,7 @@ pub struct Decimated {
 }
 
 /// Blocks of `rows` rows (fewer where used rows are), and spikes by their distance from their
-/// block's median, or, where a block has none, from those of their neighbours.
+/// block's median, or, where a block has none, from those of their neighbours; `robust`: whether spikes lose weight.
 ///
 /// # Errors
 /// Times that do not advance from block to block.
@@ -80,6 +80,7 @@ pub fn decimate(
     plain: &Problem,
     used: &[bool],
     rows: usize,
+    robust: bool,
 ) -> Result<Decimated, Unusable> {
     let n = times_s.len();
     let rows = rows.max(2);
@@ -102,7 +103,7 @@ pub fn decimate(
     };
     let marked = usual.iter().zip(used).filter(|(_, u)| **u);
     let unit = robust::scale(marked.map(|(d, _)| *d));
-    if unit > 0.0 {
+    if robust && unit > 0.0 {
         for (w, d) in blocks.weights.iter_mut().zip(&deviations) {
             *w *= robust::weight(d.abs() / unit);
         }
@@ -267,7 +268,7 @@ mod tests {
             columns: vec![vec![1.0; n]],
         };
         let used: Vec<bool> = (0..n).map(|k| !lost(&k)).collect();
-        let decimated = decimate(&times_s, &plain, &used, 3).unwrap();
+        let decimated = decimate(&times_s, &plain, &used, 3, true).unwrap();
         let out = |k: &usize| decimated.blocks.weights[*k] < 0.5;
         assert!((0..n).filter(|k| lost(k) || spike(k)).all(|k| out(&k)));
         // A median of three has one of them on it, so that a few more are far.
@@ -295,12 +296,15 @@ mod tests {
             y,
             columns: vec![vec![1.0; n]],
         };
-        let decimated = decimate(&times_s, &plain, &vec![true; n], 2).unwrap();
+        let decimated = decimate(&times_s, &plain, &vec![true; n], 2, true).unwrap();
         let lost = |k: &usize| decimated.blocks.weights[*k] < 0.5;
         assert_eq!(
             (0..n).filter(lost).collect::<Vec<_>>(),
             (0..n).filter(spike).collect::<Vec<_>>()
         );
         assert!((decimated.within.sqrt() - 1.0).abs() < 0.1);
+        // Not asked for, every row keeps its weight.
+        let plainly = decimate(&times_s, &plain, &vec![true; n], 2, false).unwrap();
+        assert!(plainly.blocks.weights.iter().all(|w| *w == 1.0));
     }
 }

@@ -134,7 +134,7 @@ pub fn fit(
     let rows = plain.line.used();
     if rows > options.rows.max(16) {
         let size = rows.div_ceil(options.rows.max(16));
-        let decimated = decimate::decimate(times_s, &plain, used, size)?;
+        let decimated = decimate::decimate(times_s, &plain, used, size, options.robust)?;
         return Ok(fit_long(&plain.line, decimated, options));
     }
     let (problem, lattice, at, row_weights) = fit_rows(&plain, options);
