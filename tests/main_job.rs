@@ -244,6 +244,39 @@ fn a_phase_loop_in_the_file_of_init_takes_the_tuning_word() {
     );
 }
 
+/// A phase in degrees fits no phase word: said, with the factor. Beside another thermometer it is only unlikely.
+#[test]
+fn a_phase_in_degrees_stops_only_a_fit_over_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (record, design) = (
+        folder.path().join("record.csv"),
+        folder.path().join("by_die.toml"),
+    );
+    let mut csv = String::from("time_s,die_degc,phase_rad,rate_out_dps\n");
+    for k in 0..60 {
+        let t = 20.0 + 0.5 * f64::from(k);
+        let noise = 0.01 * f64::from(k * 7919 % 13 - 6);
+        csv += &format!("{k},{t},{},{}\n", -90.0 - 0.5 * t, 0.3 + 0.02 * t + noise);
+    }
+    std::fs::write(&record, csv).expect("a record");
+    let out = folder.path().join("out");
+    let refused = gyrogen(&["run", "--record", text(&record), "--out", text(&out)]);
+    let talk = String::from_utf8_lossy(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(2), "{talk}");
+    assert!(
+        talk.contains("phase_rad") && talk.contains("57.29578"),
+        "{talk}"
+    );
+
+    std::fs::write(&design, "[record]\nthermometer = \"die_degc\"\n").expect("a design");
+    let summary = run(Some(&design), Some(&record), &out);
+    let codes = summary["warnings"].as_array().expect("warnings");
+    assert!(
+        codes.iter().any(|w| w["code"] == "phase_in_degrees"),
+        "{codes:?}"
+    );
+}
+
 /// A rate that was not measured in some rows counts as none, and the fitted design reproduces the
 /// firmware.
 #[test]
