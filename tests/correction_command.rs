@@ -138,3 +138,18 @@ fn an_unfitted_compensation_is_said() {
         "{said}"
     );
 }
+
+/// `tables` means the tables in both languages: no function beside them.
+#[test]
+fn a_bundle_of_tables_holds_nothing_else() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let part = ["emit", "--part", "tables", "--lang", "rust", "--out", "t"];
+    assert_eq!(gyrogen(&part, folder.path()).status.code(), Some(0));
+    let lib = std::fs::read_to_string(folder.path().join("t/src/lib.rs")).expect("Rust");
+    assert!(lib.contains("pub static SINE_0") && lib.contains("pub fn selftest"));
+    for absent in ["pub fn bias", "pub fn cordic", "struct", "CIC"] {
+        assert!(!lib.contains(absent), "{absent}");
+    }
+    let verified = gyrogen(&["verify", "t"], folder.path());
+    assert_eq!(verified.status.code(), Some(0));
+}
