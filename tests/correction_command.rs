@@ -1,4 +1,4 @@
-//! `gyrogen emit --part correction` and `gyrogen verify` from a design file.
+//! `gyrogen emit` of a design with a correction and `gyrogen verify` from a design file.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -76,4 +76,80 @@ fn without_a_correction_there_is_nothing_to_emit() {
     let emitted = gyrogen(&part, folder.path());
     assert_eq!(emitted.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&emitted.stderr).contains("[correction]"));
+}
+
+/// Exit status and talk of an `emit` to C.
+fn emitted(design: &[&str], part: &[&str], folder: &Path) -> (Option<i32>, String) {
+    let fixed = ["--lang", "c", "--out", "c"];
+    let output = gyrogen(&[&["emit"], design, part, &fixed[..]].concat(), folder);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    (output.status.code(), said)
+}
+
+fn part_of(folder: &Path) -> String {
+    let text = std::fs::read_to_string(folder.join("c/manifest.json")).expect("a manifest");
+    let manifest: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    manifest["part"].as_str().expect("a part").to_owned()
+}
+
+/// Somebody who closed the loop gets the correction, or is told that it is not there.
+#[test]
+fn a_design_with_a_correction_emits_it_or_says_that_it_is_missing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    std::fs::write(at.join("design.toml"), DESIGN).expect("written");
+    let (status, said) = emitted(&["design.toml"], &[], at);
+    assert_eq!((status, part_of(at).as_str()), (Some(0), "correction"));
+    assert!(
+        said.contains("part: correction") && !said.contains("warning"),
+        "{said}"
+    );
+
+    for part in ["chain", "compensation"] {
+        let (status, said) = emitted(&["design.toml"], &["--part", part], at);
+        assert_eq!((status, part_of(at).as_str()), (Some(0), part));
+        assert!(
+            said.contains("warning: the design has a [correction]"),
+            "{said}"
+        );
+        assert!(said.contains("--part correction"), "{said}");
+    }
+    let (status, said) = emitted(&["design.toml"], &["--part", "correction"], at);
+    assert_eq!((status, said.as_str()), (Some(0), "wrote 10 files to c\n"));
+}
+
+/// A polynomial that no record was fitted for is said to be one; a fitted one goes without a word.
+#[test]
+fn an_unfitted_compensation_is_said() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let (status, said) = emitted(&[], &[], at);
+    assert_eq!((status, part_of(at).as_str()), (Some(0), "chain"));
+    assert!(said.contains("not fitted to a record"), "{said}");
+    let (_, said) = emitted(&[], &["--part", "tables"], at);
+    assert!(!said.contains("not fitted"), "{said}");
+
+    let ran = gyrogen(&["run", "--out", "out"], at);
+    assert_eq!(ran.status.code(), Some(0));
+    let (status, said) = emitted(&["out/design.toml"], &[], at);
+    assert_eq!(status, Some(0));
+    assert!(
+        !said.contains("not fitted") && !said.contains("warning"),
+        "{said}"
+    );
+}
+
+/// `tables` means the tables in both languages: no function beside them.
+#[test]
+fn a_bundle_of_tables_holds_nothing_else() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let part = ["emit", "--part", "tables", "--lang", "rust", "--out", "t"];
+    assert_eq!(gyrogen(&part, folder.path()).status.code(), Some(0));
+    let lib = std::fs::read_to_string(folder.path().join("t/src/lib.rs")).expect("Rust");
+    assert!(lib.contains("pub static SINE_0") && lib.contains("pub fn selftest"));
+    for absent in ["pub fn bias", "pub fn cordic", "struct", "CIC"] {
+        assert!(!lib.contains(absent), "{absent}");
+    }
+    let verified = gyrogen(&["verify", "t"], folder.path());
+    assert_eq!(verified.status.code(), Some(0));
 }

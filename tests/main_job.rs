@@ -177,6 +177,106 @@ fn init_writes_a_design_that_runs_and_never_overwrites() {
     assert_eq!(gyrogen(&emit).status.code(), Some(0));
 }
 
+/// What `init` writes is the embedded default, also where a record calls for other formats than its own
+/// `[compensation]` has.
+#[test]
+fn the_file_of_init_runs_on_a_record_as_the_embedded_default() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (design, record) = (
+        folder.path().join("my.toml"),
+        folder.path().join("record.csv"),
+    );
+    assert_eq!(gyrogen(&["init", text(&design)]).status.code(), Some(0));
+    let mut csv = String::from("time_s,phase_rad,rate_out_dps\n");
+    for k in 0..80 {
+        let phase = -1.5 - 0.005 * f64::from(k);
+        let noise = 0.01 * f64::from(k * 7919 % 13 - 6);
+        csv += &format!("{k},{phase},{}\n", 2000.0 * (phase + 1.7).powi(3) + noise);
+    }
+    std::fs::write(&record, csv).expect("a record");
+    let (mine, own) = (folder.path().join("mine"), folder.path().join("own"));
+    let from_file = run(Some(&design), Some(&record), &mine);
+    let embedded = run(None, Some(&record), &own);
+    // An order 1 coefficient of some 54 000 deg/s, which the default's Q12.20 does not hold.
+    assert!(!embedded["chosen"].as_array().expect("chosen").is_empty());
+    for key in ["fit", "chosen", "before", "after", "budget", "warnings"] {
+        assert_eq!(from_file[key], embedded[key], "{key}");
+    }
+    let body = |out: &Path| {
+        let text = std::fs::read_to_string(out.join("firmware/c/gyro.c")).expect("C");
+        text.lines().skip(1).map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert_eq!(body(&mine), body(&own));
+}
+
+/// A phase loop that is turned on in the file of `init` makes its compensation by the phase useless: that is said.
+#[test]
+fn a_phase_loop_in_the_file_of_init_takes_the_tuning_word() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let design = folder.path().join("my.toml");
+    let made = gyrogen(&["init"]);
+    let lines = String::from_utf8(made.stdout).expect("UTF-8");
+    let on = |line: &str| match line.strip_prefix('#') {
+        Some(setting)
+            if [
+                "[circuit.phase_loop]",
+                "setpoint_raw",
+                "proportional",
+                "integral = ",
+            ]
+            .iter()
+            .any(|key| setting.starts_with(key)) =>
+        {
+            setting.to_owned()
+        }
+        _ => line.to_owned(),
+    };
+    let lines: Vec<String> = lines.lines().map(on).collect();
+    let text_on = lines
+        .join("\n")
+        .replace("#integrator_bits", "integrator_bits");
+    std::fs::write(&design, text_on).expect("a design");
+    let summary = run(Some(&design), None, &folder.path().join("out"));
+    let codes = summary["warnings"].as_array().expect("warnings");
+    assert!(
+        codes.iter().any(|w| w["code"] == "phase_is_held"),
+        "{codes:?}"
+    );
+}
+
+/// A phase in degrees fits no phase word: said, with the factor. Beside another thermometer it is only unlikely.
+#[test]
+fn a_phase_in_degrees_stops_only_a_fit_over_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (record, design) = (
+        folder.path().join("record.csv"),
+        folder.path().join("by_die.toml"),
+    );
+    let mut csv = String::from("time_s,die_degc,phase_rad,rate_out_dps\n");
+    for k in 0..60 {
+        let t = 20.0 + 0.5 * f64::from(k);
+        let noise = 0.01 * f64::from(k * 7919 % 13 - 6);
+        csv += &format!("{k},{t},{},{}\n", -90.0 - 0.5 * t, 0.3 + 0.02 * t + noise);
+    }
+    std::fs::write(&record, csv).expect("a record");
+    let out = folder.path().join("out");
+    let refused = gyrogen(&["run", "--record", text(&record), "--out", text(&out)]);
+    let talk = String::from_utf8_lossy(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(2), "{talk}");
+    assert!(
+        talk.contains("phase_rad") && talk.contains("57.29578"),
+        "{talk}"
+    );
+
+    std::fs::write(&design, "[record]\nthermometer = \"die_degc\"\n").expect("a design");
+    let summary = run(Some(&design), Some(&record), &out);
+    let codes = summary["warnings"].as_array().expect("warnings");
+    assert!(
+        codes.iter().any(|w| w["code"] == "phase_in_degrees"),
+        "{codes:?}"
+    );
+}
+
 /// A rate that was not measured in some rows counts as none, and the fitted design reproduces the
 /// firmware.
 #[test]

@@ -116,7 +116,7 @@ gyro_cordic_out_t gyro_cordic(int32_t in_phase, int32_t quadrature);
 /* bias
  *   in  thermometer: -8388608 .. 8388607; phase in units of 2^-24 turn
  *   out bias: -8208678 .. 8388607; bias in deg/s, Q12.12 half_up saturate
- *   error: see the budget in the report; each step one rounding to the accumulator's LSB
+ *   error: each step one rounding to the accumulator's LSB
  */
 int32_t gyro_bias(int32_t thermometer);
 

@@ -16,69 +16,70 @@ use std::path::PathBuf;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-/// A function in fixed point: polynomial, table or piecewise, with proved error, in C and Rust.
+/// Approximate a function in fixed point by a polynomial, table or segments with a proved error, in C and Rust.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// The function of x: numbers, + - * / ^, pi, sin cos tan asin acos atan sqrt exp log abs.
+    /// The function of x, as a formula: numbers, + - * / ^, pi, sin cos tan asin acos atan sqrt exp log abs.
     #[arg(long)]
     function: String,
-    /// Where it is wanted: two numbers or constants (`0,pi/4`).
+    /// Where it is wanted: least and greatest x, numbers or constants (`0,pi/4`).
     #[arg(long, value_name = "A,B", allow_hyphen_values = true)]
     domain: String,
-    /// Degree of the polynomial or of the segments; of a table 0 plain, 1 linear, 2 quadratic.
-    #[arg(long)]
+    /// Degree of the polynomial or of the segments; of a table 0 plain, 1 linear, 2
+    /// quadratic. This or --bound is needed.
+    #[arg(long, value_name = "N")]
     degree: Option<usize>,
-    /// Which monomials; all if left out, and with `--bound` whatever is cheapest.
+    /// Which powers of x the polynomial has; all if left out, and with --bound whatever is cheapest.
     #[arg(long, value_enum)]
     monomials: Option<Monomials>,
-    /// Format of the input, Qm.n or UQm.n.
-    #[arg(long)]
+    /// Format of the input: Qm.n, signed with m + n bits, n of them fractional, or UQm.n, unsigned.
+    #[arg(long, value_name = "FORMAT")]
     input: Format,
-    /// Format of the output.
-    #[arg(long)]
+    /// Format of the output, as that of the input.
+    #[arg(long, value_name = "FORMAT")]
     output: Format,
     /// Format of the coefficients, or one for each of a polynomial's, lowest order first (`Q1.15,Q1.17`); with
-    /// `--bound` chosen if left out.
-    #[arg(long, value_delimiter = ',')]
+    /// --bound chosen if left out.
+    #[arg(long, value_name = "FORMAT", value_delimiter = ',')]
     coefficients: Vec<Format>,
-    /// Format of the cast after each Horner step; wide if left out.
-    #[arg(long)]
+    /// Format that each step of a polynomial is rounded to; so wide that nothing is lost if left out.
+    #[arg(long, value_name = "FORMAT")]
     intermediate: Option<Format>,
-    /// The order of a polynomial's steps.
+    /// The order of a polynomial's multiplications and additions.
     #[arg(long, value_enum, default_value = "horner")]
     evaluation: Scheme,
-    /// The form.
+    /// What stands for the function.
     #[arg(long, value_enum, default_value = "polynomial")]
     form: Asked,
-    /// The most that the certified error may be, in the function's unit.
-    #[arg(long, allow_negative_numbers = true)]
+    /// The most that the proved error may be, in the function's unit.
+    #[arg(long, value_name = "X", allow_negative_numbers = true)]
     bound: Option<f64>,
-    /// What the coefficients' error is weighed with.
+    /// Which error the coefficients keep small.
     #[arg(long, value_enum, default_value = "absolute")]
     weight: Weight,
-    /// A named value in the function.
+    /// A value for a name in the function; may be given more than once.
     #[arg(
         long = "parameter",
         value_name = "NAME=VALUE",
         allow_hyphen_values = true
     )]
     parameters: Vec<String>,
-    /// Run every input code up to 2^32 of them, not only up to 2^24.
+    /// Run every input code where there are up to 2^32 of them; without it, up to 2^24.
     #[arg(long)]
     exhaustive: bool,
-    /// The processor whose cycles are estimated.
+    /// The processor whose cycles decide which form is cheapest (an estimate).
     #[arg(long, value_enum, default_value = "host")]
     target: Target,
-    /// Prefix of the emitted names.
+    /// Prefix of the emitted names: a C identifier.
     #[arg(long, default_value = "approx")]
     name: String,
-    /// Threads; as many as the machine has if left out. The result does not depend on it.
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=256))]
+    /// Threads, 1 to 256; as many as the machine has if left out. The result does not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
     /// Folder for the results; made if it does not exist.
-    #[arg(long)]
+    #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// How the result is printed.
+    /// How the result is printed on stdout.
     #[arg(long, value_enum, default_value = "text")]
     format: OutputFormat,
 }

@@ -19,35 +19,35 @@ use crate::selftest::controls::Controls;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
-/// From measured data to a named cause, or an honest refusal, and new firmware.
+/// Find what a measured record holds beyond the declared bias: a named cause or an honest refusal, and new firmware.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// A measured thermal record: CSV, PX4 ULog or ArduPilot DataFlash.
-    #[arg(long, required_unless_present_any = ["capture", "self_test"])]
+    /// A measured thermal record (CSV, PX4 ULog, ArduPilot DataFlash).
+    #[arg(long, value_name = "FILE", required_unless_present_any = ["capture", "self_test"])]
     pub(super) record: Option<PathBuf>,
-    /// Captured ADC codes instead: CSV, or NPY with its keys in a TOML file beside it.
-    #[arg(long, conflicts_with = "record")]
+    /// Captured ADC codes in place of a record: CSV, or NPY with its keys in a TOML file beside it.
+    #[arg(long, value_name = "FILE", conflicts_with = "record")]
     capture: Option<PathBuf>,
-    /// Plants effects of several sizes and says which of them are found; with --record, in the
+    /// Plant effects of several sizes and say which of them are found; with --record, in the
     /// experiment and the noise of that record.
     #[arg(long, conflicts_with = "capture")]
     self_test: bool,
-    /// Builds the emitted C and Rust with this machine's compilers, runs the whole record through them and
-    /// compares every word with the model.
+    /// Build the emitted C and Rust with this machine's compilers, run the whole record through them and
+    /// compare every word with the model.
     #[arg(long, conflicts_with_all = ["capture", "self_test"])]
     verify: bool,
-    /// Closes the record again with columns that mean nothing, and with effects planted in what is left: which of
+    /// Close the record again with columns that mean nothing, and with effects planted in what is left, and say which of
     /// them get a name.
     #[arg(long, conflicts_with_all = ["capture", "self_test"])]
     controls: bool,
-    /// Design file; the embedded default if left out.
-    #[arg(long)]
+    /// Design file (TOML); the embedded default if left out.
+    #[arg(long, value_name = "FILE")]
     pub(super) design: Option<PathBuf>,
-    /// Folder for the results; made if it does not exist. gyrogen-close if left out; a self-test writes
-    /// none then.
-    #[arg(long)]
+    /// Folder for the results; made if it does not exist. If left out, gyrogen-close; a self-test then
+    /// writes no files.
+    #[arg(long, value_name = "DIR")]
     pub(super) out: Option<PathBuf>,
-    /// How the result is printed.
+    /// How the result is printed on stdout.
     #[arg(long, value_enum, default_value = "text")]
     pub(super) format: OutputFormat,
     #[command(flatten)]

@@ -1,26 +1,29 @@
 //! `gyrogen emit`: a firmware bundle in one language.
+//!
+//! A design that carries a `[correction]` is there for its correction: that is the part which is emitted unless
+//! another one is asked for, and then it is said what is missing.
 
 use crate::correction::firmware::{self, Origin};
-use crate::design::Design;
+use crate::design::{Compensation, Design};
 use crate::emit::bundle::Part;
 use crate::emit::files::{self, EmittedFile};
 use crate::emit::views::Language;
 use crate::error::{InputError, Result};
 use std::path::PathBuf;
 
-/// Write firmware sources with their self-test, vectors and manifest.
+/// Write a firmware bundle: sources, self-test, test vectors and a manifest of its files.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Design file; the embedded default if left out.
+    /// Design file (TOML); the embedded default if left out.
     design: Option<PathBuf>,
-    /// The language.
+    /// Language of the sources.
     #[arg(long, value_enum)]
     lang: Language,
-    /// Which part of the firmware.
-    #[arg(long, value_enum, default_value = "chain")]
-    part: Part,
+    /// Which part of the firmware; if left out, `correction` for a design that has a `[correction]`, else `chain`.
+    #[arg(long, value_enum)]
+    part: Option<Part>,
     /// Folder for the bundle; made if it does not exist.
-    #[arg(long)]
+    #[arg(long, value_name = "DIR")]
     out: PathBuf,
 }
 
@@ -34,16 +37,23 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Some(path) => format!("{} ", path.display()),
         None => String::new(),
     };
+    let part = arguments.part.unwrap_or(match design.correction {
+        Some(_) => Part::Correction,
+        None => Part::Chain,
+    });
     let command = format!(
         "gyrogen emit {named}--lang {} --part {}",
         format!("{:?}", arguments.lang).to_lowercase(),
-        format!("{:?}", arguments.part).to_lowercase()
+        part_name(part)
     );
-    let bundle = match arguments.part {
+    let bundle = match part {
         Part::Correction => correction(&design, arguments.lang, &command)?,
         part => files::emit(&design, part, arguments.lang, &command)?,
     };
     files::write(&bundle, &arguments.out)?;
+    for remark in remarks(&design, part, arguments.part.is_some()) {
+        eprintln!("{remark}");
+    }
     eprintln!(
         "wrote {} files to {}",
         bundle.len(),
@@ -52,11 +62,50 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
+/// A part as the command line names it.
+fn part_name(part: Part) -> String {
+    format!("{part:?}").to_lowercase()
+}
+
+/// What somebody who ships the part has to know of it: what was chosen, what it lacks, what was not fitted.
+fn remarks(design: &Design, part: Part, asked: bool) -> Vec<String> {
+    let mut remarks = Vec::new();
+    let compensates = matches!(part, Part::Chain | Part::Compensation);
+    match &design.correction {
+        Some(_) if compensates => remarks.push(lacks_correction(&part_name(part))),
+        Some(_) if part == Part::Correction && !asked => remarks.push(
+            "part: correction, since the design has a [correction]; `--part chain` emits the circuit without it"
+                .to_owned(),
+        ),
+        _ => {}
+    }
+    let unfitted = |c: &&Compensation| compensates && c.fitted.is_none();
+    if design.compensation.as_ref().filter(unfitted).is_some() {
+        let whose = match design.compensation_is_own {
+            true => "those that the design states",
+            false => "the embedded default's, published for its simulated gyro",
+        };
+        remarks.push(format!(
+            "note: the coefficients of [compensation] are {whose}, not fitted to a record: `gyrogen run` fits them and \
+             writes a design.toml to emit from"
+        ));
+    }
+    remarks
+}
+
+/// The warning that a firmware has not what the design's `[correction]` corrects.
+pub(super) fn lacks_correction(what: &str) -> String {
+    format!(
+        "warning: the design has a [correction], which the firmware written here ({what}) does not contain: \
+         `gyrogen emit --part correction` emits it"
+    )
+}
+
 /// The bundle of the design's `[correction]`.
 fn correction(design: &Design, language: Language, command: &str) -> Result<Vec<EmittedFile>> {
     let planned = design.correction.as_ref().ok_or_else(|| {
         InputError::new("the design has no [correction] to emit")
-            .help("add a [correction] table to the design")
+            .help("take the design.toml that `gyrogen close` writes, or emit another part")
     })?;
     let origin = Origin {
         prefix: &design.name,

@@ -10,37 +10,37 @@ use crate::error::{Error, Result};
 use crate::record::capture::CaptureReader;
 use std::path::{Path, PathBuf};
 
-/// Compare fixed with float node by node, with bounds, and emitted code with the model.
+/// Compare the fixed-point circuit with its float twin, every word within a bound, and the emitted code with the model.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Design file; the embedded default if left out.
+    /// Design file (TOML); the embedded default if left out.
     design: Option<PathBuf>,
-    /// Captured codes, CSV or NPY; the design's own gyro if left out.
-    #[arg(long)]
+    /// Captured ADC codes, drive and sense (CSV or NPY); codes made by `--stimulus` if left out.
+    #[arg(long, value_name = "FILE")]
     capture: Option<PathBuf>,
-    /// ADC samples of the design's own stimulus; of a capture, at most so many.
-    #[arg(long, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
+    /// ADC samples, 1 to 1000000000; if left out, 10000000, or the whole capture.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
     samples: Option<u64>,
-    /// What is made where no capture is given.
+    /// Which codes are made where no capture is given.
     #[arg(long, value_enum, default_value = "operating")]
     stimulus: Kind,
-    /// A second design: its chain runs on the same codes, and the first word that differs is reported.
-    #[arg(long, value_name = "OTHER")]
+    /// A second design file: its circuit runs on the same codes, and the first word that differs is reported.
+    #[arg(long, value_name = "DESIGN")]
     against: Option<PathBuf>,
-    /// Threads; the results do not depend on it. Default: as many as the machine has.
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    /// Threads, 1 to 1024; as many as the machine has if left out. The result does not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// Folder for the results; made if it does not exist.
-    #[arg(long, default_value = "gyrogen-out")]
+    #[arg(long, value_name = "DIR", default_value = "gyrogen-out")]
     out: PathBuf,
-    /// How the result is printed.
+    /// How the result is printed on stdout.
     #[arg(long, value_enum, default_value = "text")]
     format: OutputFormat,
 }
 
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
 enum Kind {
-    /// The design's gyro, through its thermal run.
+    /// Those of the design's simulated gyro through its thermal run.
     Operating,
     /// Tones beside the oscillator, full-scale squares, constants, steps, noise.
     Adversarial,

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 /// Write a commented design file: the embedded default, every key explained.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// The file; stdout if left out. Never over an existing one.
+    /// File to write (TOML); stdout if left out. A file that exists is never overwritten.
     file: Option<PathBuf>,
 }
 

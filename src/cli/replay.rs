@@ -8,18 +8,18 @@ use crate::record::rows::{Kind, RowWriter};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-/// Run captured ADC codes through the circuit; one row a decimated sample.
+/// Run captured ADC codes through the circuit: one row of its words for each decimated sample.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Design file; the embedded default if left out.
+    /// Design file (TOML); the embedded default if left out.
     design: Option<PathBuf>,
-    /// Captured codes, CSV or NPY.
-    #[arg(long)]
+    /// Captured ADC codes, drive and sense (CSV or NPY).
+    #[arg(long, value_name = "FILE")]
     capture: PathBuf,
-    /// Where the rows go: CSV, or an int64 (float64) array if it ends in .npy.
-    #[arg(long)]
+    /// File for the rows: CSV, or NPY if the name ends in .npy (int64; float64 with --arith float).
+    #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Bit-accurate, or without any quantisation.
+    /// Whose words are written: the bit-accurate circuit, or its float twin.
     #[arg(long, value_enum, default_value = "fixed")]
     arith: Arith,
 }
@@ -27,9 +27,9 @@ pub struct Arguments {
 /// Which arithmetic's words are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Arith {
-    /// Bit-accurate, raw words.
+    /// Bit-accurate: raw integers.
     Fixed,
-    /// Without quantisation.
+    /// Without quantisation: real values.
     Float,
 }
 

@@ -8,18 +8,19 @@ use crate::job::outcome::{Drift, Outcome};
 use std::io::IsTerminal;
 use std::path::PathBuf;
 
-/// Fit, co-simulate float and fixed, emit C and Rust, build and compare them, report.
+/// Fit the bias to a thermal record, round it to fixed point, emit C and Rust, build and compare them, report.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Design file; the embedded default if left out.
+    /// Design file (TOML); the embedded default if left out.
     design: Option<PathBuf>,
-    /// A measured thermal record (CSV, PX4 ULog, ArduPilot DataFlash); the design's own thermal run if left out.
-    #[arg(long)]
+    /// A measured thermal record (CSV, PX4 ULog, ArduPilot DataFlash); the simulated thermal run of the
+    /// design if left out.
+    #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     /// Folder for the results; made if it does not exist.
-    #[arg(long, default_value = "gyrogen-out")]
+    #[arg(long, value_name = "DIR", default_value = "gyrogen-out")]
     out: PathBuf,
-    /// How the result is printed.
+    /// How the result is printed on stdout.
     #[arg(long, value_enum, default_value = "text")]
     format: OutputFormat,
 }
@@ -62,6 +63,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     for warning in &outcome.summary.warnings {
         eprintln!("warning: {} [{}]", warning.message, warning.code);
+    }
+    if design.correction.is_some() {
+        eprintln!("{}", super::emit::lacks_correction("compensation"));
     }
     if outcome.holds() {
         return Ok(());

@@ -11,39 +11,41 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-/// Plant and circuit in closed loop, float and fixed: thermal record, traces, figures.
+/// Simulate the gyro and its circuit in closed loop, in float and in fixed point: thermal record, traces, figures.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Design file; the embedded default if left out.
+    /// Design file (TOML); the embedded default if left out.
     design: Option<PathBuf>,
-    /// Simulate every ADC sample of the first so many seconds of the design's own run.
+    /// Simulate every ADC sample of the first S seconds of the design's thermal run, instead of its averaged readings.
     #[arg(long, value_name = "S", conflicts_with = "profile")]
     duration: Option<f64>,
-    /// Chamber over time (CSV: time_s, chamber_degc, and where wanted rate_dps, supply_v, accel_g).
+    /// A chamber of your own over time, in place of the design's thermal run (CSV: time_s, chamber_degc, and where wanted
+    /// rate_dps, supply_v, accel_g).
     #[arg(long, value_name = "FILE")]
     profile: Option<PathBuf>,
-    /// Readings along a profile.
-    #[arg(long, default_value_t = 500, value_parser = clap::value_parser!(u64).range(10..=1_000_000))]
+    /// Averaged readings along a profile, 10 to 1000000; only with --profile.
+    #[arg(long, value_name = "N", default_value_t = 500, value_parser = clap::value_parser!(u64).range(10..=1_000_000))]
     readings: u64,
     /// Folder for the results; made if it does not exist.
-    #[arg(long)]
+    #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Nodes to trace from power-on, by name or beginning of a name (names as in `equiv`), separated by commas. Default: all.
+    /// Nodes (words of the circuit) to trace from power-on, separated by commas: names as `equiv` prints them, or their
+    /// beginnings; all if left out.
     #[arg(long, value_name = "NODE", value_delimiter = ',')]
     trace: Vec<String>,
-    /// Decimated rows of the trace.
+    /// Length of the trace, in decimated samples, 1 to 1000000.
     #[arg(long, value_name = "N", default_value_t = TRACE_ROWS, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     trace_rows: u64,
-    /// Format of the trace's file.
+    /// Format of the trace's file, `trace.FORMAT`.
     #[arg(long, value_enum, default_value = "vcd")]
     trace_format: TraceFormat,
-    /// Raw words, or the float model's values.
+    /// What is traced: the bit-accurate circuit's raw words, or its float twin's values.
     #[arg(long, value_enum, default_value = "fixed")]
     trace_arith: Arith,
-    /// Threads; the results do not depend on it. Default: as many as the machine has.
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    /// Threads, 1 to 1024; as many as the machine has if left out. The result does not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
-    /// How the result is printed.
+    /// How the result is printed on stdout.
     #[arg(long, value_enum, default_value = "text")]
     format: OutputFormat,
 }
@@ -54,11 +56,11 @@ const TRACE_ROWS: u64 = 64;
 /// Formats of a trace; the variants' names are the file's extensions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum TraceFormat {
-    /// Table.
+    /// Table of text.
     Csv,
     /// NumPy array.
     Npy,
-    /// Wave viewer.
+    /// Value change dump, for wave viewers.
     Vcd,
 }
 

@@ -6,18 +6,18 @@ use crate::verify::bundle::{self, Verification};
 use crate::verify::target::Target;
 use std::path::PathBuf;
 
-/// Rebuild a firmware bundle from its own files, run its self-test and vectors.
+/// Build a firmware bundle anew from its own files alone, run its self-test and its test vectors.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// The bundle's folder.
+    /// Folder of the bundle, as `emit` and `run` write them (`out/firmware/c`).
     bundle: PathBuf,
-    /// Where the code runs.
+    /// The processor that the code is built for and runs on.
     #[arg(long, value_enum, default_value = "host")]
     target: Target,
-    /// Folder for verify.json; the bundle itself if left out.
-    #[arg(long)]
+    /// Folder for verify.json; made if it does not exist. The bundle's folder if left out.
+    #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// How the result is printed.
+    /// How the result is printed on stdout.
     #[arg(long, value_enum, default_value = "text")]
     format: OutputFormat,
 }

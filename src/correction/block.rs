@@ -124,12 +124,7 @@ impl Step {
                 .inputs
                 .iter()
                 .zip(&formats.inputs)
-                .map(|(i, f)| {
-                    format!(
-                        "x = ({} - ({:?})) / ({:?}), {f}",
-                        i.column, i.offset, i.scale
-                    )
-                })
+                .map(|(i, f)| format!("{}, {f}", i.formula()))
                 .collect(),
             formats: formats.clone(),
         };

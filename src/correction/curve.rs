@@ -40,7 +40,10 @@ impl Curve {
             intervals: values.len() as i128 - 1,
             table: Table {
                 name: NAMES.get(number).copied().unwrap_or("curve"),
-                note: format!("Knots of a curve in input {input}, in 2^-{fraction_bits}"),
+                note: format!(
+                    "Knots of a curve over {} from -1 to 1, in units of 2^-{fraction_bits}",
+                    super::sentences::name(input)
+                ),
                 entries: values.iter().map(entry).collect(),
                 fraction_bits,
             },

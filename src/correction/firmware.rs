@@ -1,6 +1,7 @@
 //! The correction as C and Rust: emitted, built, compared with the model on a record's readings.
 
 use super::run::{Correction, Reading};
+use super::sentences;
 use crate::emit::bundle::Bundle;
 use crate::emit::files::{self, EmittedFile};
 use crate::emit::stepped::{self, Stepped};
@@ -46,48 +47,11 @@ pub fn emit(
         program: &correction.trace(),
         model: &|calls| correction.run_words(calls),
         part: "correction",
-        facts: facts(correction),
+        facts: sentences::facts(correction),
         request_sha256: origin.sha256,
         command: origin.command,
     };
     stepped::emit(&what, language)
-}
-
-/// The plan and its words in sentences, for the head of the sources.
-pub fn facts(correction: &Correction) -> Vec<String> {
-    let (plan, formats) = (&correction.plan, &correction.formats);
-    let mut facts = vec![
-        format!(
-            "correction of averaged readings, one call each nominal {:?} s; after a gap of k periods, k calls with the new words",
-            plan.period_s
-        ),
-        format!(
-            "rate {} deg/s in and out, sum on 2^-{} deg/s, for a noise of {:e} deg/s",
-            formats.rate, formats.sum_fraction_bits, formats.noise_dps
-        ),
-    ];
-    for (k, (input, format)) in plan.inputs.iter().zip(&formats.inputs).enumerate() {
-        facts.push(format!(
-            "input {} (input_{}): ({} - ({:?})) / ({:?}), {format}, rounded and held within it",
-            k,
-            k + 1,
-            input.column,
-            input.offset,
-            input.scale
-        ));
-    }
-    facts.extend(plan.terms.iter().map(|t| {
-        let text = format!("{t:?}");
-        // A curve's knots are in its table.
-        let cut = text.find("values").filter(|_| text.len() > 160);
-        cut.and_then(|end| text.get(..end).map(|t| format!("{t}.. }}")))
-            .unwrap_or(text)
-    }));
-    facts.push(format!(
-        "at most {:.2e} deg/s from these terms in real numbers (analysis), where no word saturates and no relay switches at another reading",
-        correction.bound_dps()
-    ));
-    facts
 }
 
 impl Firmware {

@@ -12,6 +12,7 @@ mod formats;
 mod plan;
 mod rate_terms;
 mod run;
+mod sentences;
 mod states;
 mod terms;
 mod text;

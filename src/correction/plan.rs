@@ -48,6 +48,18 @@ pub struct Input {
     pub scale: f64,
 }
 
+impl Input {
+    /// x as a formula in the column, every digit: `(die_degc - 25.0) / 40.0`.
+    pub fn formula(&self) -> String {
+        let sign = if self.offset < 0.0 { '+' } else { '-' };
+        let scale = match self.scale < 0.0 {
+            true => format!("({:?})", self.scale),
+            false => format!("{:?}", self.scale),
+        };
+        format!("({} {sign} {:?}) / {scale}", self.column, self.offset.abs())
+    }
+}
+
 /// One term. Inputs are named by their position in [`Plan::inputs`].
 #[derive(Debug, Clone, PartialEq)]
 pub enum Term {

@@ -71,6 +71,9 @@ fn build(text: &str, file: Option<&Path>, base: Option<&Design>) -> Result<Desig
     } else {
         base.and_then(|b| b.compensation.clone())
     };
+    // The embedded default's formats are nobody's choice, even where a file repeats them, as that of `init` does.
+    let differs = base.is_some_and(|b| b.compensation != compensation);
+    let compensation_is_own = own.is_given() && !asked && differs;
     let section = |key| root.section(key);
     let planned = section("correction")?;
     let correction = planned
@@ -82,9 +85,8 @@ fn build(text: &str, file: Option<&Path>, base: Option<&Design>) -> Result<Desig
         circuit,
         compensation,
         correction,
-        // The embedded default's formats are nobody's choice.
         bound: bound::bound(&own)?,
-        compensation_is_own: own.is_given() && !asked && base.is_some(),
+        compensation_is_own,
         gyro: device_tables::gyro(&section("gyro")?, base.map(|b| &b.gyro))?,
         thermal_run: device_tables::thermal_run(
             &section("thermal_run")?,

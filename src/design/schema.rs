@@ -20,11 +20,11 @@ pub struct Design {
     pub circuit: Circuit,
     /// The bias compensation; absent = no `rate` column.
     pub compensation: Option<Compensation>,
-    /// A correction of averaged readings beside it; from `gyrogen close`.
+    /// A correction of averaged readings in its place, the declared bias in it; from `gyrogen close`.
     pub correction: Option<Planned>,
     /// What the compensation's error is asked to be.
     pub bound: Option<BiasBound>,
-    /// True if the file gave its own `[compensation]` (and so chose the formats itself).
+    /// True if the file gave a `[compensation]` other than the embedded default's (and so chose the formats itself).
     pub compensation_is_own: bool,
     /// The gyro: the declared model and the plant's parameters.
     pub gyro: Gyro,

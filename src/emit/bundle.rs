@@ -14,13 +14,13 @@ use crate::numeric::trace::ir::{Program, SlotKind};
 /// Which part of the firmware is emitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Part {
-    /// The bias polynomial and its subtraction.
+    /// The bias polynomial of `[compensation]` and its subtraction from the rate.
     Compensation,
-    /// The constant tables.
+    /// The constant tables alone: sine, arctangents.
     Tables,
-    /// The correction of averaged readings.
+    /// The correction of averaged readings that `gyrogen close` wrote as `[correction]`.
     Correction,
-    /// The whole chain; the compensation alone where its thermometer is not the chain's phase.
+    /// The whole detection circuit with its compensation; the compensation alone where its thermometer is not the circuit's.
     Chain,
 }
 

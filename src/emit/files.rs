@@ -117,8 +117,11 @@ pub fn emit(
     let models = model::models(design, &bundle.program);
     let banner = manifest::banner(&design.source.sha256, command);
     let facts = manifest::facts(design, &bundle);
-    let view =
-        View::new(&bundle, &models, language, banner, facts).with_chain(design, &bundle, language);
+    let view = View::new(&bundle, &models, language, banner, facts);
+    let view = match part {
+        Part::Tables => view.tables_alone(),
+        _ => view.with_chain(design, &bundle, language),
+    };
     let mut files = sources(&view, part, language)?;
     if part != Part::Tables {
         files.extend(vectors(design, &bundle, &models));
@@ -243,6 +246,18 @@ impl View {
             functions,
             tables,
         }
+    }
+
+    /// Takes away all but the tables.
+    fn tables_alone(mut self) -> Self {
+        // The name of the design.
+        self.facts.truncate(1);
+        self.states.clear();
+        self.structs.clear();
+        self.functions.clear();
+        self.checks.clear();
+        (self.chain, self.stimulated) = (false, false);
+        self
     }
 
     /// Adds what the chain's parts of the pages show.

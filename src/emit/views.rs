@@ -383,9 +383,7 @@ fn guarantee(function: &str) -> Option<&'static str> {
         "cordic" => {
             "error: residual angle at most atan(2^-(n-1)), and half a unit for each of n table angles"
         }
-        "bias" => {
-            "error: see the budget in the report; each step one rounding to the accumulator's LSB"
-        }
+        "bias" => "error: each step one rounding to the accumulator's LSB",
         "rate" => "error: one rounding of the input to the output's LSB; the difference is exact",
         _ => return None,
     })

@@ -84,9 +84,8 @@ pub fn calibrate(
 /// A compensation by the phase is of no use where a phase loop holds it: its formats are chosen anew.
 fn gives_up_held_phase(design: &mut Design) -> bool {
     let by_phase = |c: &Compensation| c.input == CompensationInput::Phase;
-    let held = design.circuit.phase_loop.is_some()
-        && design.compensation_is_own
-        && design.compensation.as_ref().is_some_and(by_phase);
+    let held =
+        design.circuit.phase_loop.is_some() && design.compensation.as_ref().is_some_and(by_phase);
     if held {
         design.compensation_is_own = false;
     }

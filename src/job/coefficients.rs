@@ -52,10 +52,13 @@ pub fn round(design: &mut Design, fit: &BaselineFit) -> Result<Rounded> {
     let p_range = (p(fit.range.0), p(fit.range.1));
     if c.input == CompensationInput::Phase && (p_range.0 < -1.0 || p_range.1 >= 1.0) {
         return Err(InputError::new(format!(
-            "the record's phase runs from {} to {} rad, beyond the half turn that a phase word holds",
+            "phase_rad of the record runs from {:.4} to {:.4} rad, and a phase word holds -pi to pi",
             fit.range.0, fit.range.1
         ))
-        .help("wrap the phase into [-pi, pi), or move the demodulation phase away from the wrap")
+        .help(
+            "divide it by 57.29578 if it is in degrees; if it is in rad, wrap it into [-pi, pi), or move the demodulation \
+             phase away from the wrap",
+        )
         .into());
     }
     let exact = fit.scaled_to(offset, scale);

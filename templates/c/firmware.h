@@ -37,8 +37,7 @@ void {{ v.p }}_init({{ v.p }}_t *g);
 /* One ADC sample of both channels; true when `row` holds a new decimated sample (every {{ v.ratio }}). */
 bool {{ v.p }}_push({{ v.p }}_t *g, int32_t drive, int32_t sense, {{ v.p }}_period_out_t *row);
 
-{% endif %}{% if let Some(t) = v.stream %}/* The state before the first reading: zeros. What a `relay` that never goes off again holds is worth keeping
- * over a power cycle. */
+{% endif %}{% if let Some(t) = v.stream %}/* The state before the first reading: zeros. */
 void {{ v.p }}_init({{ v.p }}_{{ t.state }}_t *s);
 
 {% endif %}/* Start-up check: 0 = every function gives the model's bits on the built-in stimulus; otherwise the

@@ -667,7 +667,7 @@ pub fn cordic(in_phase: i32, quadrature: i32) -> CordicOut {
 
 /// in  thermometer: -8388608 .. 8388607; phase in units of 2^-24 turn
 /// out bias: -8208678 .. 8388607; bias in deg/s, Q12.12 half_up saturate
-/// error: see the budget in the report; each step one rounding to the accumulator's LSB
+/// error: each step one rounding to the accumulator's LSB
 pub fn bias(thermometer: i32) -> i32 {
     let t0: i64 = thermometer as i64;
     let t1: i64 = 1415954326_i64.wrapping_mul(t0); // -11877885786718208 .. 11877884370763882

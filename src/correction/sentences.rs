@@ -1,0 +1,289 @@
+//! A correction in sentences: what the head of its emitted sources says.
+
+use super::plan::{Plan, Term};
+use super::run::Correction;
+
+/// The plan and its words, one line each: how it is called, its inputs, its terms, its bound.
+pub fn facts(correction: &Correction) -> Vec<String> {
+    let (plan, formats) = (&correction.plan, &correction.formats);
+    let mut facts = vec![
+        called(plan),
+        format!(
+            "rate {} deg/s in and out, sum of the terms on 2^-{} deg/s, for a noise of {:.3e} deg/s rms",
+            formats.rate, formats.sum_fraction_bits, formats.noise_dps
+        ),
+    ];
+    let inputs = plan.inputs.iter().zip(&formats.inputs);
+    facts.extend(inputs.enumerate().map(|(k, (input, format))| {
+        format!(
+            "{} = {}, {format}, rounded and held within -1 to 1",
+            name(k),
+            input.formula()
+        )
+    }));
+    let mut curves = 0;
+    facts.extend(plan.terms.iter().map(|t| sentence(t, &mut curves)));
+    facts.extend(outlasting(plan));
+    let relay = match plan.terms.iter().any(|t| matches!(t, Term::Step { .. })) {
+        true => " and no step switches at another reading",
+        false => "",
+    };
+    facts.push(format!(
+        "at most {:.2e} deg/s from these terms in real numbers (analysis), where no word saturates{relay}",
+        correction.bound_dps()
+    ));
+    facts
+}
+
+fn called(plan: &Plan) -> String {
+    let period = format!("one call a reading, every {:?} s", plan.period_s);
+    // Without a memory the number of calls changes nothing.
+    match plan.terms.iter().any(Term::remembers) {
+        true => format!(
+            "correction of averaged readings: {period}; after a gap of k periods, k calls with the new words"
+        ),
+        false => format!("correction of averaged readings: {period}"),
+    }
+}
+
+/// Which members of the state are worth keeping over a power cycle, if any.
+fn outlasting(plan: &Plan) -> Option<String> {
+    let (mut lags, mut relays, mut members) = (0, 0, Vec::new());
+    for term in &plan.terms {
+        match term {
+            Term::Step { once, .. } => {
+                relays += 1;
+                members.extend(once.then(|| format!("relay_{relays}")));
+            }
+            Term::Lag { kept, .. }
+            | Term::LagOfCurve { kept, .. }
+            | Term::CurveOfLag { kept, .. } => {
+                lags += 1;
+                members.extend(kept.then(|| format!("lag_{lags}, lag_input_{lags}")));
+            }
+            _ => {}
+        }
+    }
+    members.extend(plan.keeps().then(|| "started".to_owned()));
+    let members = (!members.is_empty()).then(|| members.join(", "))?;
+    Some(format!(
+        "worth keeping over a power cycle, of the state: {members}"
+    ))
+}
+
+/// An input's name in the emitted sources; `k` counts from 0.
+pub(super) fn name(k: usize) -> String {
+    format!("input_{}", k + 1)
+}
+
+/// A term; `curves` counts the tables so far.
+fn sentence(term: &Term, curves: &mut usize) -> String {
+    match term {
+        Term::ScaleBy { .. } | Term::Cubic { .. } | Term::Even { .. } => {
+            format!("error on the rate r: {}", on_rate(term))
+        }
+        _ => format!("subtracted: {}", on_bias(term, curves)),
+    }
+}
+
+/// What a term on the bias subtracts, deg/s.
+fn on_bias(term: &Term, curves: &mut usize) -> String {
+    match term {
+        Term::Product { gain_dps, factors } => {
+            let powers = factors.iter().map(|(input, power)| match power {
+                1 => format!(" * {}", name(*input)),
+                _ => format!(" * {}^{power}", name(*input)),
+            });
+            format!("{gain_dps:?} deg/s{}", powers.collect::<String>())
+        }
+        Term::Lag {
+            gain_dps,
+            input,
+            tau_s,
+            kept,
+        } => {
+            let x = name(*input);
+            format!(
+                "{gain_dps:?} deg/s * ({x} - y), y = {x} after {}",
+                lag(*tau_s, *kept)
+            )
+        }
+        Term::LagOfCurve {
+            gain_dps,
+            input,
+            values,
+            tau_s,
+            kept,
+        } => format!(
+            "{gain_dps:?} deg/s * (c - y), c = {}, y = c after {}",
+            curve(*input, values, curves),
+            lag(*tau_s, *kept)
+        ),
+        Term::CurveOfLag {
+            gain_dps,
+            input,
+            values,
+            tau_s,
+            kept,
+        } => {
+            let x = name(*input);
+            format!(
+                "{gain_dps:?} deg/s * (c({x}) - c(y)), c = {}, y = {x} after {}",
+                curve(*input, values, curves),
+                lag(*tau_s, *kept)
+            )
+        }
+        Term::Slope {
+            gain_dps_s,
+            input,
+            rows,
+        } => format!(
+            "{gain_dps_s:?} deg/s per 1/s * slope of {} over the last {rows} readings",
+            name(*input)
+        ),
+        Term::Decay { gain_dps, tau_s } => {
+            format!("{gain_dps:?} deg/s * exp(-t / {tau_s:?} s), t since power-on")
+        }
+        Term::Curve { input, values_dps } => {
+            format!("{}, deg/s", curve(*input, values_dps, curves))
+        }
+        Term::Step { .. } => step(term),
+        // On the rate, not on the bias.
+        Term::ScaleBy { .. } | Term::Cubic { .. } | Term::Even { .. } => on_rate(term),
+    }
+}
+
+fn step(term: &Term) -> String {
+    let Term::Step {
+        gain_dps,
+        input,
+        centre,
+        gap,
+        once,
+    } = term
+    else {
+        return String::new();
+    };
+    let (x, on, off) = (name(*input), centre + gap / 2.0, centre - gap / 2.0);
+    match once {
+        true => format!("{gain_dps:?} deg/s from the first {x} >= {on:?} on, never off again"),
+        false => format!(
+            "{gain_dps:?} deg/s while on: on from {x} >= {on:?}, off below {off:?}; at power-on, on from {centre:?}"
+        ),
+    }
+}
+
+fn lag(tau_s: f64, kept: bool) -> String {
+    let kept = if kept {
+        ", which a restart does not reset"
+    } else {
+        ""
+    };
+    format!("a first-order lag of {tau_s:?} s{kept}")
+}
+
+/// The next curve: its table holds the knots.
+fn curve(input: usize, values: &[f64], curves: &mut usize) -> String {
+    *curves += 1;
+    format!(
+        "the line through the {} knots of table curve_{curves} over {}",
+        values.len(),
+        name(input)
+    )
+}
+
+/// The error that a term has on the rate r, deg/s.
+fn on_rate(term: &Term) -> String {
+    match term {
+        Term::ScaleBy { input, s0, s1 } => match input {
+            Some(input) => format!("r * ({s0:?} + {s1:?} * {})", name(*input)),
+            None => format!("r * {s0:?}"),
+        },
+        Term::Cubic { ppm, rate_max_dps } => {
+            format!("{ppm:?} ppm * r * (r / {rate_max_dps:?} deg/s)^2")
+        }
+        Term::Even { ppm, absolute, .. } if *absolute => format!("{ppm:?} ppm * abs(r)"),
+        Term::Even {
+            ppm, rate_max_dps, ..
+        } => format!("{ppm:?} ppm * r^2 / {rate_max_dps:?} deg/s"),
+        _ => String::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::correction::sample::plan;
+
+    /// The head of a random correction is in words: no braces, brackets or `Some` of a data structure, every
+    /// input by its name in the sources, and as many curves as there are tables.
+    #[test]
+    fn the_head_is_in_words_whatever_the_terms() {
+        let mut kinds = std::collections::BTreeSet::new();
+        for seed in 0..60u64 {
+            let plan = plan(3000 + seed, 1 + seed as usize % 8, true);
+            kinds.extend(plan.terms.iter().map(Term::kind));
+            let correction = Correction::auto(&plan).unwrap();
+            let facts = facts(&correction);
+            for line in &facts {
+                for debris in [
+                    "{", "}", "[", "Some", "None", "_dps:", "- (-", "false", "true",
+                ] {
+                    assert!(!line.contains(debris), "{debris} in: {line}");
+                }
+            }
+            let head = facts.join("\n");
+            for k in 0..plan.inputs.len() {
+                assert!(head.contains(&name(k)), "{} missing in: {head}", name(k));
+            }
+            let outlast = |t: &Term| t.is_kept() || matches!(t, Term::Step { once: true, .. });
+            let told = head.contains("worth keeping over a power cycle");
+            assert_eq!(told, plan.terms.iter().any(outlast), "{head}");
+            let tables = correction.trace().tables.len();
+            let told = |n: usize| head.contains(&format!("table curve_{n} "));
+            assert!((1..=tables).all(told) && !told(tables + 1), "{head}");
+        }
+        assert_eq!(kinds.len(), 11, "{kinds:?}");
+    }
+
+    #[test]
+    fn every_term_reads_as_its_equation() {
+        let mut curves = 0;
+        let mut said = |term| sentence(&term, &mut curves);
+        let product = |gain_dps, factors| Term::Product { gain_dps, factors };
+        assert_eq!(said(product(1.5, vec![])), "subtracted: 1.5 deg/s");
+        assert_eq!(
+            said(product(-2.0, vec![(0, 1), (2, 3)])),
+            "subtracted: -2.0 deg/s * input_1 * input_3^3"
+        );
+        let values_dps = vec![0.0, 1.0, 0.5];
+        assert_eq!(
+            said(Term::Curve {
+                input: 1,
+                values_dps
+            }),
+            "subtracted: the line through the 3 knots of table curve_1 over input_2, deg/s"
+        );
+        let step = |once| Term::Step {
+            gain_dps: 0.25,
+            input: 0,
+            centre: 0.5,
+            gap: 0.5,
+            once,
+        };
+        assert_eq!(
+            said(step(false)),
+            "subtracted: 0.25 deg/s while on: on from input_1 >= 0.75, off below 0.25; at power-on, on from 0.5"
+        );
+        let scale = |input| Term::ScaleBy {
+            input,
+            s0: 1e-3,
+            s1: 0.5,
+        };
+        assert_eq!(said(scale(None)), "error on the rate r: r * 0.001");
+        assert_eq!(
+            said(scale(Some(0))),
+            "error on the rate r: r * (0.001 + 0.5 * input_1)"
+        );
+    }
+}
