@@ -133,7 +133,7 @@ pub fn close(
         };
         let mut closure = told.closure().map_err(unusable)?;
         told.warn(&mut warnings);
-        let firmware = told.firmware(record, &mut warnings);
+        let firmware = told.firmware(record, design, &mut warnings);
         closure.firmware = firmware
             .as_ref()
             .map_or_else(FirmwareErrors::default, |f| f.errors);

@@ -2,29 +2,42 @@
 
 use super::Told;
 use crate::closure::firmware;
-use crate::correction::Term;
+use crate::correction::{Formats, Plan, Term};
+use crate::design::Design;
 use crate::record::{ThermalRecord, Warning, stats};
 
 /// A held-out error that is so many times another one is more: that of firmware beside the model's, or the declared one's.
 const MORE: f64 = 1.02;
+
+/// The full scale of the rate, deg/s, that a record's own rates ask for, as they come in and as they go out; and the gyro's, which
+/// a record at rest says nothing of.
+fn full_scales_dps(record: &ThermalRecord, design: &Design) -> (f64, Option<f64>) {
+    let most = |name: &str| {
+        let (low, high) = stats::extremes(record.column(name).unwrap_or(&[])).unwrap_or_default();
+        low.abs().max(high.abs())
+    };
+    let (out, applied) = (most("rate_out_dps"), most("rate_dps"));
+    let own = 1.25 * out.max(applied).max(1e-3);
+    let gyros = design.thermal_run.sense_full_scale_dps;
+    (own, (applied == 0.0).then(|| own.max(gyros)))
+}
 
 impl Told<'_> {
     /// The correction and its errors; none where firmware cannot carry it.
     pub(super) fn firmware(
         &self,
         record: &ThermalRecord,
+        design: &Design,
         warnings: &mut Vec<Warning>,
     ) -> Option<firmware::Judged> {
         let c = self.search.channels;
-        // Rates as they come in, and as they go out.
-        let most = |name: &str| {
-            let (low, high) =
-                stats::extremes(record.column(name).unwrap_or(&[])).unwrap_or_default();
-            low.abs().max(high.abs())
-        };
-        let widest = 1.25 * most("rate_out_dps").max(most("rate_dps")).max(1e-3);
         let estimates = self.search.estimates(self.after);
-        let Some(plan) = firmware::plan(c, self.after, &estimates, widest) else {
+        let noise = self.after.fit.noise.white_rms_dps;
+        let (own, gyros) = full_scales_dps(record, design);
+        let planned = |full_scale_dps| firmware::plan(c, self.after, &estimates, full_scale_dps);
+        let fits = |plan: &Plan| Formats::choose(plan, noise).is_ok();
+        let wide = gyros.and_then(planned).filter(fits);
+        let Some(plan) = wide.or_else(|| planned(own)) else {
             let obstacles = firmware::obstacles(c, self.after, &estimates);
             warnings.extend(
                 obstacles
@@ -33,10 +46,7 @@ impl Told<'_> {
             );
             return None;
         };
-        let noise = self.after.fit.noise.white_rms_dps;
-        let judged = |plan: &crate::correction::Plan| {
-            firmware::judged(plan, record, c, &self.judged.heldout, noise)
-        };
+        let judged = |plan: &Plan| firmware::judged(plan, record, c, &self.judged.heldout, noise);
         if plan.keeps() {
             let said = "a lag goes on while the power is off: firmware keeps its state and makes up for the periods \
                         without power (the manual's \"The correction of averaged readings\"), as it did for the figures \
@@ -51,7 +61,7 @@ impl Told<'_> {
             }
         };
         // Coefficients that cancel may be a model's; in words they are worse than no step at all.
-        let declared = firmware::plan(c, self.before, &[], widest);
+        let declared = firmware::plan(c, self.before, &[], plan.full_scale_dps);
         let declared = declared.and_then(|plan| judged(&plan).ok()?.errors.heldout_rms);
         if let (Some(with), Some(without)) = (carried.errors.heldout_rms, declared)
             && !self.after.terms.is_empty()
@@ -95,5 +105,53 @@ impl Told<'_> {
             );
             Warning::general("firmware_behind", said)
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::closure::close::close;
+    use crate::closure::search::Effort;
+    use crate::closure::synthetic::{Random, record, triangle};
+    use crate::design::reader;
+
+    /// The full scale of the correction of a record with rates up to `most_dps`, and how many times the model's held-out
+    /// error its firmware leaves; in noise of `noise_dps`.
+    fn carried(most_dps: f64, noise_dps: f64) -> (f64, f64) {
+        let mut random = Random::new(5);
+        let degc = triangle(240);
+        let rate: Vec<f64> = (0..240)
+            .map(|k| most_dps * f64::from(k % 5 - 2) / 2.0)
+            .collect();
+        let pairs = degc.iter().zip(&rate);
+        let output: Vec<f64> = pairs
+            .map(|(t, rate)| 0.5 - 0.02 * t + rate + noise_dps * random.normal())
+            .collect();
+        let mut record = record("die_degc", &degc, &output);
+        record.columns.insert("rate_dps".to_owned(), rate);
+        let design = reader::parse("", None).unwrap();
+        let closed = close(&record, Vec::new(), &design, "test", Effort::default()).unwrap();
+        let full_scale_dps = closed.correction.unwrap().plan.full_scale_dps;
+        let errors = closed.closure;
+        let times = errors.firmware.heldout_rms.unwrap() / errors.after.heldout_rms;
+        (full_scale_dps, times)
+    }
+
+    #[test]
+    fn firmware_of_a_record_at_rest_holds_the_gyros_rates() {
+        let (full_scale_dps, times) = carried(0.0, 0.01);
+        assert!(
+            full_scale_dps >= 1024.0 && times < 1.02,
+            "{full_scale_dps} {times}"
+        );
+        // Rates that were applied are those that the correction is for.
+        let (full_scale_dps, times) = carried(40.0, 0.01);
+        assert!((50.0..55.0).contains(&full_scale_dps) && times < 1.02);
+        // So little noise that the gyro's range does not fit into a word beside it.
+        let (full_scale_dps, times) = carried(0.0, 1e-6);
+        assert!(
+            full_scale_dps < 2.0 && times < 1.02,
+            "{full_scale_dps} {times}"
+        );
     }
 }
