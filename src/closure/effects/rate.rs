@@ -38,14 +38,34 @@ fn rate_alone(c: &Channels) -> Result<Vec<String>, Missing> {
     Ok(vec!["rate_dps".to_owned()])
 }
 
-/// Scale factor linear in temperature.
+/// Scale factor linear in temperature, or bent.
 struct ScaleTemperature;
+
+/// What a bend costs, that the effect does not need.
+const BENT: f64 = 4.0;
+
+/// Whether a shape is the bent one: in the reading, after those that are linear in a temperature.
+fn is_bent(c: &Channels, point: &Point) -> bool {
+    point.form == c.heats()
+}
+
+/// Where b1 + b0 u + b2 u^2 passes through zero: the root next to the line's, or that one.
+fn scale_zero(slope: f64, constant: f64, bend: f64) -> f64 {
+    let line = -constant / slope;
+    let under = slope * slope - 4.0 * bend * constant;
+    if under < 0.0 || bend == 0.0 {
+        return line;
+    }
+    // Without the cancellation of nearly equal numbers (Numerical Recipes, 5.6).
+    let q = -0.5 * (slope + slope.signum() * under.sqrt());
+    constant / q
+}
 
 const SCALE_TEMPERATURE: Sheet = Sheet {
     id: "scale_factor_temperature",
     physics: "the modes' split, the gap and the references move with temperature, and the scale \
               factor with them",
-    equation: "rate s1 (T - T_0)",
+    equation: "rate s1 (T - T_0), where that does not do with s2 (T - T_0)^2",
     parameters: &[
         Parameter {
             name: "slope_ppm_per_k",
@@ -74,16 +94,24 @@ impl Candidate for ScaleTemperature {
     }
 
     fn points(&self, c: &Channels) -> Vec<Point> {
-        (0..c.heats()).map(Point::form).collect()
+        (0..=c.heats()).map(Point::form).collect()
     }
 
     fn columns(&self, c: &Channels, _bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
         let r = relative(c);
-        vec![product(&r, c.heat(point.form)), r]
+        let bent = is_bent(c, point);
+        let u = c.heat(if bent { 0 } else { point.form });
+        let linear = product(&r, u);
+        let bend = bent.then(|| product(&linear, u));
+        [vec![linear, r], bend.into_iter().collect()].concat()
+    }
+
+    fn surcharge(&self, c: &Channels, point: &Point) -> f64 {
+        if is_bent(c, point) { BENT } else { 0.0 }
     }
 
     fn correction(&self, c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
-        if e.point.form > 0 {
+        if e.point.form > 0 && !is_bent(c, &e.point) {
             return None;
         }
         Some(vec![Term::ScaleBy {
@@ -94,13 +122,22 @@ impl Candidate for ScaleTemperature {
     }
 
     fn report(&self, c: &Channels, e: &Estimate) -> Reported {
-        let (slope, constant) = (e.beta[0], e.beta.get(1).copied().unwrap_or(0.0));
+        let at = |k: usize| e.beta.get(k).copied().unwrap_or(0.0);
+        let (slope, constant, bend) = (at(0), at(1), at(2));
         let factor = 1e6 / (top(c) * c.kelvin_per_u);
         let mut out: Reported = [gain("slope_ppm_per_k", e, 0, factor)]
             .into_iter()
             .collect();
         if slope != 0.0 {
-            let zero = c.middle_degc - c.kelvin_per_u * constant / slope;
+            let zero = scale_zero(slope, constant, bend);
+            if bend != 0.0 {
+                // Where the scale is nominal, as the equation has it.
+                if let Some(at_zero) = out.get_mut("slope_ppm_per_k") {
+                    at_zero.0 = factor * (slope + 2.0 * bend * zero);
+                }
+                out.extend([gain("curvature_ppm_per_k2", e, 2, factor / c.kelvin_per_u)]);
+            }
+            let zero = c.middle_degc + c.kelvin_per_u * zero;
             let std = e.beta_std.get(1).copied().unwrap_or(0.0);
             let std = (c.kelvin_per_u * std / slope).abs();
             out.insert("zero_degc".to_owned(), (zero, std));
