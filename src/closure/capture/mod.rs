@@ -148,7 +148,7 @@ pub fn analyse(capture: &Capture) -> Result<Findings> {
         .into());
     }
     let (known, plain) = known(capture, tone);
-    let fitted = fit::fit(capture, &known, tone);
+    let fitted = fit::fit(capture, &known, tone, &plain);
     let mut plain = plain;
     plain.variance = fitted.model.variance;
     plain.variance.jitter = 0.0;

@@ -148,7 +148,7 @@ pub(super) fn clipping_step(capture: &Capture, fitted: &Fitted) -> Step {
             }
         }
     }
-    step.p_value = (13.0 - fitted.clipping.unwrap_or(0.0)).exp().min(1.0);
+    step.p_value = (-fitted.clipping.unwrap_or(0.0)).exp().min(1.0);
     step
 }
 
