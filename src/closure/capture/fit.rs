@@ -60,12 +60,8 @@ pub fn declared(capture: &Capture, known: &Known, tone: Tone) -> Model {
     let sense = known
         .in_phase
         .map_or([0.0; 2], |([s, c], codes)| [s * codes, c * codes]);
-    let largest = capture
-        .codes
-        .iter()
-        .flatten()
-        .map(|c| c.unsigned_abs())
-        .max();
+    let codes = [0, 1].into_iter().flat_map(|c| capture.used_codes(c));
+    let largest = codes.map(i32::unsigned_abs).max();
     Model {
         tone,
         phases: Phases::of(&tone, capture.rows()),
