@@ -176,3 +176,29 @@ fn near_strongest(capture: &Capture) -> Option<Tone> {
         offset_turns: offset_turns.rem_euclid(1.0),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::synthetic::Made;
+    use super::*;
+
+    #[test]
+    fn the_strongest_line_is_found_without_what_leaks_into_it() {
+        for word in [0x0734_5679, 0x0234_5679, 0x0333_3333] {
+            for rows in [1000, 2000, 3001] {
+                let made = Made {
+                    rows,
+                    word,
+                    noise: 0.05,
+                    ..Made::CLEAN
+                };
+                let tone = strongest(&made.capture()).unwrap();
+                // Turns over the whole capture: the rounding's part is some 1e-5.
+                let off = (tone.turns - f64::from(word) * WORD) * rows as f64;
+                assert!(off.abs() < 1e-4, "{word:x} {rows}: {off}");
+                let offset = (tone.offset_turns + 0.5).rem_euclid(1.0) - 0.5;
+                assert!(offset.abs() < 1e-4, "{word:x} {rows}: {offset}");
+            }
+        }
+    }
+}
