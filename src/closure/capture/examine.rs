@@ -17,7 +17,8 @@ const NAMED: usize = 4;
 /// The capture with its rows where they belong in time and the wrong codes left out, and what is said of it.
 ///
 /// # Errors
-/// Keys that cannot be true, columns without a signal, a tone that is not where `ftw` says; a break of the sample clock that no number of samples explains, with too few rows before it.
+/// Keys that cannot be true, columns without a signal, a tone that is not where `ftw` says; a break of the sample clock
+/// that no number of samples explains, with too few rows before it; more wrong codes than accidents make.
 pub fn examined(capture: Capture) -> Result<(Capture, Vec<Warning>)> {
     let mut warnings = keys::checked(&capture)?;
     let Some(tone) = Tone::of(&capture).filter(|t| periods(&capture, t) >= LEAST_PERIODS) else {

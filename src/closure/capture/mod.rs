@@ -155,8 +155,10 @@ pub fn analyse(capture: &Capture) -> Result<Findings> {
             .help("check `ftw` and `fs_hz` against the capture; capture more periods of the drive");
         capture.places.put("ftw", error)
     };
-    let tone = Tone::of(capture)
-        .ok_or_else(|| no_tone("the drive codes hold no tone, and `ftw` is not given"))?;
+    let tone = Tone::of(capture).ok_or_else(|| {
+        let error = no_tone("the drive codes hold no tone, and `ftw` is not given");
+        capture.places.put(idle::COLUMNS[0], error)
+    })?;
     if periods(capture, &tone) < LEAST_PERIODS {
         return Err(no_tone(
             "the drive tone has less than four periods to zero frequency or to half the sample rate in \

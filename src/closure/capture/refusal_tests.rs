@@ -30,7 +30,10 @@ fn a_refusal_names_line_and_column() {
     assert!(refused(text(keys, &drive)).contains("a.csv:2:9: error: `ftw` puts"));
     let keys = "# fs_hz = 2e5\n# ftw = 0\n";
     assert!(refused(text(keys, &drive)).contains("a.csv:2:9: error: the drive tone has less"));
-    assert!(refused(text("", &vec![0; ROWS])).contains("a.csv:1:12: error: drive_code has no"));
+    assert!(
+        refused(text("", &vec![0; ROWS]))
+            .contains("a.csv:1:12: error: the drive codes hold no tone")
+    );
     std::fs::remove_dir_all(&folder).unwrap();
 }
 
