@@ -252,12 +252,17 @@ fn steps_help_held_out_rows_and_are_no_chance_whatever_the_codes_are() {
                 step.p_value
             );
         }
-        let (before, after) = (found.before.heldout_rms, found.after.heldout_rms);
-        assert!(
-            after <= before,
-            "{seed}: {:?} {before} {after}",
-            names(&found)
-        );
+        let word = WORDS[seed as usize % 2];
+        let lost = lose(clean(seed, word), &[(3000 + 500 * seed as usize, 1)]);
+        let noise = analyse(&capture(lost, meta(word))).unwrap();
+        for found in [&found, &noise] {
+            let (before, after) = (found.before.heldout_rms, found.after.heldout_rms);
+            assert!(
+                after <= before,
+                "{seed}: {:?} {before} {after}",
+                names(found)
+            );
+        }
     }
 }
 

@@ -87,11 +87,11 @@ pub fn findings(capture: &Capture, known: &Known, plain: &Model, fitted: &Fitted
         .zip(judged)
         .filter(|(turn, _)| *turn != Turn::Jitter || jitter_holds(capture, fitted))
         .collect();
-    // Noise changes no mean: where it is all, the errors are those of the declared model.
-    let is_shifted = model.missing.iter().any(|m| !m.codes.is_empty());
-    let is_mean = order.iter().any(|(turn, _)| match turn {
+    // Noise changes no mean, and a histogram little of it: where they are all, the errors are those of the declared
+    // model unless they are smaller.
+    let is_mean = order.iter().any(|(turn, j)| match turn {
         Turn::Jitter => false,
-        Turn::Missing => is_shifted,
+        Turn::Missing => j.errors.heldout_rms < before.errors.heldout_rms,
         Turn::Linear(_) | Turn::Clipping => true,
     });
     let (combos, solved) = search.solution(&set);
