@@ -30,6 +30,9 @@ fn analysed(bench: &Bench, faults: &Faults) -> Findings {
             .then_some(bench.in_phase / bench.codes_per_dps),
     };
     let capture = Capture::new(bench.codes(faults).codes, meta, 16).unwrap();
+    let (capture, said) = capture::examine::examined(capture).unwrap();
+    // No effect makes wrong codes or a break of the sample clock.
+    assert!(said.is_empty(), "{} {faults:?}: {said:?}", bench.seed);
     capture::analyse(&capture).unwrap()
 }
 

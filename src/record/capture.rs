@@ -6,6 +6,7 @@
 use super::capture_csv::CsvSource;
 pub use super::capture_meta::{CaptureMeta, mismatch_warnings};
 use super::capture_npy::NpySource;
+use super::capture_places::Places;
 use super::npy_header;
 use crate::error::{Error, InputError, Result, io_error};
 use crate::numeric::format::Format;
@@ -19,6 +20,7 @@ pub(super) const COLUMNS: [&str; 2] = ["drive_code", "sense_code"];
 /// A capture file, read block by block.
 pub struct CaptureReader {
     meta: CaptureMeta,
+    places: Places,
     source: Source,
     /// What stopped the reading; told again at every further call.
     failed: Option<Error>,
@@ -64,16 +66,21 @@ impl CaptureReader {
                 .into());
         }
         let codes = Codes::of(adc);
+        let mut places = Places::default();
         let (meta, source) = if start.first() == npy_header::MAGIC.first() || is_named_npy(path) {
             let npy = NpySource::open(path, file, kind.is_file().then_some(kind.len()), codes)?;
-            (CaptureMeta::of_sidecar(path)?, Source::Npy(npy))
+            (
+                CaptureMeta::of_sidecar(path, &mut places)?,
+                Source::Npy(npy),
+            )
         } else {
             let input = std::io::Cursor::new(start).chain(file);
-            let (csv, meta) = CsvSource::open(path, Box::new(input), codes)?;
+            let (csv, meta) = CsvSource::open(path, Box::new(input), codes, &mut places)?;
             (meta, Source::Csv(csv))
         };
         Ok(CaptureReader {
             meta,
+            places,
             source,
             failed: None,
         })
@@ -82,6 +89,11 @@ impl CaptureReader {
     /// What the capture says of itself.
     pub fn meta(&self) -> &CaptureMeta {
         &self.meta
+    }
+
+    /// Where its keys and columns stand.
+    pub fn places(&self) -> &Places {
+        &self.places
     }
 
     /// The number of rows in the whole file where it is known without reading it (NPY).

@@ -3,6 +3,7 @@
 use super::capture::{COLUMNS, Codes, HEADER_HELP};
 use super::capture_lines::{Line, Lines};
 use super::capture_meta::{CaptureMeta, Value};
+use super::capture_places::Places;
 use crate::error::{Error, InputError, Result};
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -34,10 +35,10 @@ impl CsvSource {
         path: &Path,
         input: Box<dyn Read + Send>,
         codes: Codes,
+        places: &mut Places,
     ) -> Result<(Self, CaptureMeta)> {
         let mut lines = Lines::new(path, input);
         let mut meta = CaptureMeta::default();
-        let mut seen = Vec::new();
         let layout = loop {
             let number = lines.number;
             let Some(bytes) = lines.next()? else {
@@ -56,8 +57,8 @@ impl CsvSource {
             };
             match line.bytes.trim_ascii_start().first() {
                 None => {}
-                Some(b'#') => read_comment(line, &mut meta, &mut seen)?,
-                Some(_) => break read_header(line)?,
+                Some(b'#') => read_comment(line, &mut meta, places)?,
+                Some(_) => break read_header(line, places)?,
             }
         };
         let source = CsvSource {
@@ -301,11 +302,7 @@ fn shorten(text: &[u8]) -> String {
 
 /// Reads one comment line `# key = value`; any other comment, and an unknown key, is passed over.
 /// What follows a further `#` is a remark.
-fn read_comment(
-    line: Line<'_>,
-    meta: &mut CaptureMeta,
-    seen: &mut Vec<&'static str>,
-) -> Result<()> {
+fn read_comment(line: Line<'_>, meta: &mut CaptureMeta, places: &mut Places) -> Result<()> {
     let text = String::from_utf8_lossy(line.bytes);
     let help = "a comment line of a capture reads `# fs_hz = 224000.0`; correct the value, or take \
                 the line away";
@@ -323,19 +320,19 @@ fn read_comment(
             .at(line.number, text[..offset].chars().count() + 1)
             .help(help)
     };
-    if seen.contains(&key) {
+    if places.knows(key) {
         let offset = left.find(key).unwrap_or(0);
         return Err(refuse(offset, format!("`{key}` is given a second time")).into());
     }
-    seen.push(key);
     let value = right.split('#').next().unwrap_or("");
     let offset = left.len() + 1 + (value.len() - value.trim_start().len());
+    places.keep(key, refuse(offset, String::new()));
     meta.set(key, Value::of_text(value.trim()))
         .map_err(|problem| refuse(offset, problem).into())
 }
 
 /// Finds the two columns in the header line.
-fn read_header(line: Line<'_>) -> Result<Layout> {
+fn read_header(line: Line<'_>, places: &mut Places) -> Result<Layout> {
     if line.bytes.contains(&0) || line.bytes.starts_with(b"\xff\xfe") {
         let message = "this is neither a CSV file in UTF-8 nor an NPY file (it has binary bytes)";
         let e = InputError::new(message).in_file(line.path);
@@ -353,15 +350,14 @@ fn read_header(line: Line<'_>) -> Result<Layout> {
             let message = format!("the header has no column `{column}`");
             return Err(line.refuse(0, &message).help(HEADER_HELP).into());
         };
+        let before = |cell: usize| -> usize {
+            let cells = line.bytes.split(|&b| b == b',').take(cell);
+            cells.map(|cell| cell.len() + 1).sum()
+        };
+        places.keep(column, line.refuse(before(first), ""));
         if let Some(again) = names.iter().rposition(is_it).filter(|&last| last > first) {
-            let before: usize = line
-                .bytes
-                .split(|&b| b == b',')
-                .take(again)
-                .map(|cell| cell.len() + 1)
-                .sum();
             return Err(line
-                .refuse(before, &format!("the header has `{column}` twice"))
+                .refuse(before(again), &format!("the header has `{column}` twice"))
                 .help("rename one of the two columns")
                 .into());
         }

@@ -1,6 +1,7 @@
 //! What a capture says of itself: the comment lines `# key = value` of a CSV file, or the side-car
 //! TOML of an NPY file (`docs/manual.md`, "Replay and captures").
 
+use super::capture_places::Places;
 use crate::error::{InputError, Result, io_error};
 use std::io::Read;
 use std::path::Path;
@@ -139,7 +140,7 @@ impl CaptureMeta {
     /// Reads the side-car of an NPY capture: the TOML file of the same stem, keys at top level.
     /// No such file = nothing is known; other keys are ignored. A file that is no TOML, or a key
     /// with the wrong type, is refused with its line.
-    pub(super) fn of_sidecar(capture: &Path) -> Result<CaptureMeta> {
+    pub(super) fn of_sidecar(capture: &Path, places: &mut Places) -> Result<CaptureMeta> {
         let path = capture.with_extension("toml");
         let mut meta = CaptureMeta::default();
         if path == capture {
@@ -161,6 +162,7 @@ impl CaptureMeta {
             refuse(offset, format!("no valid TOML: {}", e.message()))
         })?;
         for (key, value) in table.get_ref() {
+            places.keep(key.get_ref(), refuse(value.span().start, String::new()));
             meta.set(key.get_ref(), Value::of_toml(value.get_ref()))
                 .map_err(|problem| refuse(value.span().start, problem))?;
         }

@@ -5,7 +5,7 @@
 //! and `timing`) and `frozen` look for what is readable but unlikely; `ulog` and `dataflash` read
 //! autopilots' logs, which `averager` makes rows of; `shorten` averages rows; [`read_any`] takes whatever a file is; [`stats`]
 //! holds the few robust statistics that all of them share. [`capture`] streams captured ADC codes
-//! from CSV or NPY; [`capture_meta`] is what a capture says of itself; [`rows`] writes one row a
+//! from CSV or NPY; [`capture_meta`] is what a capture says of itself, [`capture_places`] where; [`rows`] writes one row a
 //! decimated sample.
 
 mod any;
@@ -16,6 +16,7 @@ mod capture_csv;
 mod capture_lines;
 pub mod capture_meta;
 mod capture_npy;
+pub mod capture_places;
 mod cells;
 mod clock;
 pub mod columns;

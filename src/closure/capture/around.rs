@@ -146,9 +146,9 @@ pub fn add_lines(capture: &Capture, model: &mut Model, around: &Around) -> bool 
 /// the blocks' means leave four fifths of it.
 const SLOW_PERIODS_OF_A_BLOCK: f64 = 0.375;
 
-/// Multiples of the mains that are looked for together where they are slow: alone, or with the strongest overtones of
-/// a power line.
-const SLOW_MULTIPLES: [&[f64]; 3] = [&[1.0], &[1.0, 2.0], &[1.0, 3.0]];
+/// Multiples of the mains that are looked for together where they are slow: the mains alone or with the strongest
+/// overtones of a power line, or one of these alone, so that a line at 100 Hz does not come with one at 50 Hz.
+const SLOW_MULTIPLES: [&[f64]; 5] = [&[1.0], &[2.0], &[3.0], &[1.0, 2.0], &[1.0, 3.0]];
 
 /// Sine and cosine in both channels of some lines, of several sets of them: less than one in a thousand by chance.
 fn surplus(lines: usize, gain: f64) -> f64 {

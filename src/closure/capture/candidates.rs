@@ -116,7 +116,7 @@ pub struct Variant {
 }
 
 /// Gain that an effect with no free column would have to make: one in a thousand captures without it.
-const PRIOR: f64 = 7.0;
+pub const PRIOR: f64 = 7.0;
 
 /// Gain that each free column costs: the logarithm of how much narrower the rows make its coefficient than what a
 /// single one tells (Schwarz 1978).

@@ -282,9 +282,9 @@ fn near(
     let mut rows = Rows::new();
     for segment in capture.segments.iter().filter(|s| s.part != Part::HeldOut) {
         for chunk in chunks(segment.rows.clone()) {
-            let n = chunk.len();
+            let (start, n) = (chunk.start, chunk.len());
             rows.fill(capture, model, chunk);
-            for i in 0..n {
+            for i in (0..n).filter(|i| !capture.is_left_out(start + i)) {
                 let at = |k: usize| rows.dense[channel][k][i];
                 let tone = tone[0] + tone[1] * at(SIN) + tone[2] * at(COS);
                 let signal = rows.signal[channel][i];
@@ -323,6 +323,7 @@ fn inner_noise(points: &[[f64; 2]], depth: f64) -> f64 {
 fn training(capture: &Capture, channel: usize) -> impl Iterator<Item = (usize, i32)> + '_ {
     let train = capture.segments.iter().filter(|s| s.part != Part::HeldOut);
     let rows = train.flat_map(|s| s.rows.clone());
+    let rows = rows.filter(|row| !capture.is_left_out(*row));
     rows.filter_map(move |row| Some((row, *capture.codes[channel].get(row)?)))
 }
 

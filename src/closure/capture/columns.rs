@@ -114,7 +114,7 @@ pub struct Rows {
     pub signal: [Vec<f64>; 2],
     /// Its slope, codes a sample.
     pub slope: [Vec<f64>; 2],
-    /// One over the variance; 0 where the channel is limited.
+    /// One over the variance; 0 where the channel is limited or the row is left out.
     pub weight: [Vec<f64>; 2],
 }
 
@@ -314,6 +314,7 @@ impl Rows {
                 code - declared - model.missing[channel].shift(signal, base.sqrt());
             let variance = base + late;
             let free = model.limits[channel].is_free(signal, base.sqrt());
+            let free = free && !capture.is_left_out(row);
             self.weight[channel][i] = if free { 1.0 / variance } else { 0.0 };
         }
     }

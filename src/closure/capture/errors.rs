@@ -24,11 +24,11 @@ pub fn judge(capture: &Capture, model: &Model) -> Judged {
     for segment in &capture.segments {
         let held = usize::from(segment.part == Part::HeldOut);
         for chunk in chunks(segment.rows.clone()) {
-            let n = chunk.len();
+            let (start, n) = (chunk.start, chunk.len());
             rows.fill(capture, model, chunk);
             for channel in 0..2 {
                 let base = model.variance.base[channel];
-                for i in 0..n {
+                for i in (0..n).filter(|i| !capture.is_left_out(start + i)) {
                     let error = rows.error(model, channel, i);
                     sums[held][0] += 1.0;
                     sums[held][1] += error * error;

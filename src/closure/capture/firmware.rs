@@ -20,7 +20,7 @@ pub fn corrected(
     let (mut sum, mut count, mut largest) = (0.0, 0.0, 0.0f64);
     for segment in capture.segments.iter().filter(|s| s.part == Part::HeldOut) {
         for chunk in chunks(segment.rows.clone()) {
-            let n = chunk.len();
+            let (start, n) = (chunk.start, chunk.len());
             rows.fill(capture, model, chunk);
             for channel in 0..2 {
                 let effects = &effects[channel];
@@ -30,7 +30,7 @@ pub fn corrected(
                     .zip(effects)
                     .map(|(a, e)| a - e)
                     .collect();
-                for i in 0..n {
+                for i in (0..n).filter(|i| !capture.is_left_out(start + i)) {
                     let code = rows.code(channel, i);
                     let correction =
                         bend(model, effects, code) + phased(&rows, channel, i, effects);

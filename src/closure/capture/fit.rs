@@ -1,7 +1,7 @@
 //! The rounds of the fit: noise, lines and nonlinear parts around the model, then the set of effects.
 
 use super::around::{Around, LEAST_VARIANCE, add_lines, add_slow_mains, around};
-use super::candidates::{Effect, Known, Variant, base, base_ridge, per_column, variants};
+use super::candidates::{Effect, Known, PRIOR, Variant, base, base_ridge, per_column, variants};
 use super::clipping::{self, Limits};
 use super::columns::{ALL, Model, Variance};
 use super::gram::{Combo, Detail, Gram, Summed, solve, spread};
@@ -20,6 +20,9 @@ const ROUNDS: usize = 6;
 const SHARP_ROUNDS: usize = 1;
 /// Gain that jitter has to make: one free parameter.
 const JITTER_COST: f64 = 7.0;
+/// What the search for levels of clipping costs, and each level that was found.
+const LEVELS_COST: f64 = 4.0;
+const LEVEL_COST: f64 = 2.0;
 
 /// The outcome of the rounds.
 pub struct Fitted {
@@ -37,7 +40,7 @@ pub struct Fitted {
     pub set: Vec<usize>,
     /// Gain less costs of all.
     pub objective: f64,
-    /// What clipping gains, if it was taken.
+    /// What clipping gains, if it was taken, the search for its levels taken off.
     pub clipping: Option<f64>,
     /// Missing codes, if taken.
     pub missing: Option<missing::Found>,
@@ -57,12 +60,8 @@ pub fn declared(capture: &Capture, known: &Known, tone: Tone) -> Model {
     let sense = known
         .in_phase
         .map_or([0.0; 2], |([s, c], codes)| [s * codes, c * codes]);
-    let largest = capture
-        .codes
-        .iter()
-        .flatten()
-        .map(|c| c.unsigned_abs())
-        .max();
+    let codes = [0, 1].into_iter().flat_map(|c| capture.used_codes(c));
+    let largest = codes.map(i32::unsigned_abs).max();
     Model {
         tone,
         phases: Phases::of(&tone, capture.rows()),
@@ -305,10 +304,11 @@ fn is_same(last: &Fitted, next: &Fitted) -> bool {
 }
 
 /// The fit with or without limits, with or without missing codes.
-pub fn fit(capture: &Capture, known: &Known, tone: Tone) -> Fitted {
+/// `alone` is the declared model, its free carriers fitted.
+pub fn fit(capture: &Capture, known: &Known, tone: Tone, alone: &Model) -> Fitted {
     let start = declared(capture, known, tone);
     let plain = rounds(capture, known, &start);
-    let mut best = with_limits(capture, known, &start, plain);
+    let mut best = with_limits(capture, known, &start, plain, alone);
     if let Some(found) = missing::find(capture, &best.model) {
         let mut start = start.clone();
         start.limits = best.model.limits;
@@ -321,8 +321,15 @@ pub fn fit(capture: &Capture, known: &Known, tone: Tone) -> Fitted {
     best
 }
 
-/// Takes limits where they explain the codes better than what was found without them.
-fn with_limits(capture: &Capture, known: &Known, start: &Model, plain: Fitted) -> Fitted {
+/// Takes limits where they explain the codes better than what was found without them, and the held-out rows better
+/// than the declared model alone.
+fn with_limits(
+    capture: &Capture,
+    known: &Known,
+    start: &Model,
+    plain: Fitted,
+    alone: &Model,
+) -> Fitted {
     let found = [0, 1].map(|c: usize| clipping::find(capture, &plain.model, c));
     if found.iter().all(Option::is_none) {
         return plain;
@@ -345,14 +352,15 @@ fn with_limits(capture: &Capture, known: &Known, start: &Model, plain: Fitted) -
         let chosen = fit.set.iter().filter_map(|k| fit.variants.get(*k));
         chosen.map(|v| v.cost).sum()
     };
-    let chi = |fit: &Fitted| {
-        let mut model = fit.model.clone();
+    let judged = |model: &Model| {
+        let mut model = model.clone();
         model.variance = other.model.variance;
-        0.5 * super::errors::judge(capture, &model).train_chi
+        super::errors::judge(capture, &model)
     };
-    let cost = 7.0 + 2.0 * sides + 4.0;
-    let gain = chi(&plain) + costs(&plain) - chi(&other) - costs(&other) + piled;
-    if gain > cost {
+    let limited = judged(&other.model);
+    let chi = 0.5 * (judged(&plain.model).train_chi - limited.train_chi);
+    let gain = chi + costs(&plain) - costs(&other) + piled - LEVELS_COST - LEVEL_COST * sides;
+    if gain > PRIOR && limited.heldout_chi < judged(alone).heldout_chi {
         other.clipping = Some(gain);
         return other;
     }

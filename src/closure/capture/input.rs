@@ -4,6 +4,7 @@ use crate::error::{InputError, Result};
 use crate::numeric::format::Format;
 use crate::record::Warning;
 use crate::record::capture::{CaptureMeta, CaptureReader};
+use crate::record::capture_places::Places;
 use std::path::Path;
 
 /// Rows that are used at most; a longer capture says so.
@@ -46,6 +47,10 @@ pub struct Capture {
     pub segments: Vec<Segment>,
     /// 2^(adc_bits - 1), codes.
     pub full_scale_codes: f64,
+    /// By row: a wrong code, or a sample that was lost. Empty: none is.
+    pub left_out: Vec<bool>,
+    /// Where keys and columns stand.
+    pub places: Places,
 }
 
 impl Capture {
@@ -68,7 +73,46 @@ impl Capture {
             segments: segments(rows),
             full_scale_codes: f64::powi(2.0, bits as i32 - 1),
             meta,
+            left_out: Vec::new(),
+            places: Places::default(),
         })
+    }
+
+    /// The same with other codes of equal lengths and other rows left out: [`Capture::left_out`].
+    pub fn with_rows(&self, codes: [Vec<i32>; 2], left_out: Vec<bool>) -> Self {
+        let rows = codes.iter().map(Vec::len).min().unwrap_or(0);
+        Capture {
+            codes,
+            segments: segments(rows),
+            left_out,
+            meta: self.meta.clone(),
+            places: self.places.clone(),
+            full_scale_codes: self.full_scale_codes,
+        }
+    }
+
+    /// Whether a row is left out of all fits and errors.
+    #[inline]
+    pub fn is_left_out(&self, row: usize) -> bool {
+        self.left_out.get(row).copied().unwrap_or(false)
+    }
+
+    /// The codes of a channel that are not left out.
+    pub fn used_codes(&self, channel: usize) -> impl Iterator<Item = i32> + '_ {
+        let codes = self.codes[channel].iter().enumerate();
+        codes
+            .filter(|(row, _)| !self.is_left_out(*row))
+            .map(|(_, code)| *code)
+    }
+
+    /// Number of rows that are not left out.
+    pub fn used_rows(&self) -> usize {
+        self.used_of(0..self.rows())
+    }
+
+    fn used_of(&self, rows: std::ops::Range<usize>) -> usize {
+        let out = self.left_out.get(rows.clone()).unwrap_or_default();
+        rows.len() - out.iter().filter(|out| **out).count()
     }
 
     /// Number of rows.
@@ -76,14 +120,11 @@ impl Capture {
         self.segments.last().map_or(0, |s| s.rows.end)
     }
 
-    /// Number of training rows.
+    /// Number of training rows that are not left out.
     pub fn training_rows(&self) -> usize {
         let train = |s: &&Segment| s.part != Part::HeldOut;
-        self.segments
-            .iter()
-            .filter(train)
-            .map(|s| s.rows.len())
-            .sum()
+        let segments = self.segments.iter().filter(train);
+        segments.map(|s| self.used_of(s.rows.clone())).sum()
     }
 }
 
@@ -118,7 +159,7 @@ pub fn read(path: &Path, adc_bits: u32) -> Result<(Capture, Vec<Warning>)> {
         _ => widest,
     };
     let mut reader = CaptureReader::open(path, format)?;
-    let meta = reader.meta().clone();
+    let (meta, places) = (reader.meta().clone(), reader.places().clone());
     let mut codes = [Vec::new(), Vec::new()];
     let (mut drive, mut sense) = (Vec::new(), Vec::new());
     let mut warnings = Vec::new();
@@ -135,9 +176,10 @@ pub fn read(path: &Path, adc_bits: u32) -> Result<(Capture, Vec<Warning>)> {
             break;
         }
     }
-    let capture = Capture::new(codes, meta, adc_bits).map_err(|e| match e {
+    let mut capture = Capture::new(codes, meta, adc_bits).map_err(|e| match e {
         crate::error::Error::Input(e) => (*e).in_file(path).into(),
         other => other,
     })?;
+    capture.places = places;
     Ok((capture, warnings))
 }

@@ -81,8 +81,8 @@ struct Histogram {
 
 impl Histogram {
     fn of(capture: &Capture, model: &Model, channel: usize) -> Option<Self> {
-        let codes = capture.codes[channel].iter().copied();
-        let (low, high) = (codes.clone().min()?, codes.max()?);
+        let low = capture.used_codes(channel).min()?;
+        let high = capture.used_codes(channel).max()?;
         let range = i64::from(high) - i64::from(low);
         if !(8..WIDEST).contains(&range) {
             return None;
@@ -101,9 +101,9 @@ impl Histogram {
         };
         for segment in capture.segments.iter().filter(|s| s.part != Part::HeldOut) {
             for chunk in chunks(segment.rows.clone()) {
-                let n = chunk.len();
+                let (start, n) = (chunk.start, chunk.len());
                 rows.fill(capture, model, chunk);
-                for i in 0..n {
+                for i in (0..n).filter(|i| !capture.is_left_out(start + i)) {
                     let signal = rows.signal[channel][i];
                     add(&mut counts, rows.code(channel, i), 1.0);
                     if sigma >= 1.5 {

@@ -5,7 +5,8 @@
 //! known rate only the quadrature's), and how much of the quantiser's own error shows (all if noise is
 //! added after rounding, next to none if before).
 //!
-//! [`input`] reads; [`tone`] is the phase; [`columns`] are the functions of which effects are made, one
+//! [`input`] reads; [`examine`] looks whether the rows are what was sampled, with [`keys`], [`idle`], [`frequency`], [`clock`] and [`early`] (samples lost or repeated) and
+//! [`stand_out`] (wrong codes), both on [`blocks`]; [`tone`] is the phase; [`columns`] are the functions of which effects are made, one
 //! file an effect ([`offset`], [`gain`], [`latency`], [`feedthrough`], [`nonlinearity`],
 //! [`harmonics`], [`mains`], [`spur`] with [`truncation`]); [`gram`] their sums and least squares;
 //! [`search`] chooses. Outside of the linear part are [`clipping`], [`missing`] (the histogram), [`jitter`] (the
@@ -15,20 +16,31 @@
 //! [`fit`] runs all in rounds; [`report`] judges on held-out rows, with [`errors`], [`rivals`],
 //! [`structure`] and [`firmware`]; [`bend`] is for the page, which is made in `report::capture`.
 
+#[cfg(test)]
+mod accidents;
 pub mod around;
 pub mod bend;
+pub mod blocks;
 pub mod candidates;
 pub mod clipping;
+pub mod clock;
 pub mod columns;
+pub mod early;
 pub mod errors;
+pub mod examine;
+#[cfg(test)]
+mod examine_tests;
 pub mod feedthrough;
 pub mod firmware;
 pub mod fit;
+pub mod frequency;
 pub mod gain;
 pub mod gram;
 pub mod harmonics;
+pub mod idle;
 pub mod input;
 pub mod jitter;
+pub mod keys;
 pub mod latency;
 pub mod mains;
 pub mod missing;
@@ -36,12 +48,15 @@ pub mod nonlinearity;
 pub mod normal;
 pub mod offset;
 pub mod own_steps;
+#[cfg(test)]
+mod refusal_tests;
 pub mod report;
 mod reported_steps;
 pub mod rivals;
 pub mod search;
 pub mod spectrum;
 pub mod spur;
+pub mod stand_out;
 pub mod steps;
 pub mod structure;
 #[cfg(test)]
@@ -85,7 +100,8 @@ pub fn close(path: &Path, design: &Design, command: &str) -> Result<Closed> {
     let (capture, mut warnings) = input::read(path, bits)?;
     warnings.extend(key_warnings(&capture, bits));
     closed(capture, warnings, design, command, start).map_err(|e| match e {
-        crate::error::Error::Input(e) => (*e).in_file(path).into(),
+        // What has a place has its file: the side-car's, for a key of an NPY capture.
+        crate::error::Error::Input(e) if e.file.is_none() => (*e).in_file(path).into(),
         other => other,
     })
 }
@@ -101,6 +117,8 @@ pub fn closed(
     command: &str,
     start: std::time::Instant,
 ) -> Result<Closed> {
+    let (capture, seen) = examine::examined(capture)?;
+    warnings.extend(seen);
     let findings = analyse(&capture)?;
     warnings.extend(findings.warnings.iter().cloned());
     let closure = Closure {
@@ -127,20 +145,21 @@ pub fn closed(
     })
 }
 
-/// Models and evidence for a capture in memory.
+/// Models and evidence for a capture in memory, the rows of which were looked at by [`examine::examined`].
 ///
 /// # Errors
 /// A capture without a tone, or with less than four periods of it.
 pub fn analyse(capture: &Capture) -> Result<Findings> {
     let no_tone = |what: &str| {
-        InputError::new(what)
-            .help("check `ftw` and `fs_hz` against the capture; capture more periods of the drive")
+        let error = InputError::new(what)
+            .help("check `ftw` and `fs_hz` against the capture; capture more periods of the drive");
+        capture.places.put("ftw", error)
     };
-    let tone = Tone::of(capture)
-        .ok_or_else(|| no_tone("the drive codes hold no tone, and `ftw` is not given"))?;
-    let rows = capture.rows() as f64;
-    let edge = (0.5 - tone.folded()).min(tone.folded());
-    if edge * rows < LEAST_PERIODS {
+    let tone = Tone::of(capture).ok_or_else(|| {
+        let error = no_tone("the drive codes hold no tone, and `ftw` is not given");
+        capture.places.put(idle::COLUMNS[0], error)
+    })?;
+    if periods(capture, &tone) < LEAST_PERIODS {
         return Err(no_tone(
             "the drive tone has less than four periods to zero frequency or to half the sample rate in \
              this capture",
@@ -148,11 +167,16 @@ pub fn analyse(capture: &Capture) -> Result<Findings> {
         .into());
     }
     let (known, plain) = known(capture, tone);
-    let fitted = fit::fit(capture, &known, tone);
+    let fitted = fit::fit(capture, &known, tone, &plain);
     let mut plain = plain;
     plain.variance = fitted.model.variance;
     plain.variance.jitter = 0.0;
     Ok(report::findings(capture, &known, &plain, &fitted))
+}
+
+/// Periods of the tone in a capture, to zero frequency or to half the sample rate.
+fn periods(capture: &Capture, tone: &Tone) -> f64 {
+    (0.5 - tone.folded()).min(tone.folded()) * capture.rows() as f64
 }
 
 /// What the keys say, and the declared model fitted to the codes. The contract leaves open whether the rate's

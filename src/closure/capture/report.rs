@@ -61,11 +61,12 @@ pub fn findings(capture: &Capture, known: &Known, plain: &Model, fitted: &Fitted
         &fitted.variants,
     );
     let before = judge(capture, plain);
+    let model = &with_useful_shifts(capture, &fitted.model);
     let mut warnings = Vec::new();
     let mut set = fitted.set.clone();
     let (order, judged) = loop {
         let order = turns(fitted, &mut search, &set);
-        let judged = prefixes(capture, fitted, &search, &order);
+        let judged = prefixes(capture, fitted, model, &search, &order);
         let mut last = weighted(capture, plain, fitted);
         let mut failed = unsure(fitted, &mut search, &set);
         for (turn, j) in order.iter().zip(&judged) {
@@ -86,6 +87,13 @@ pub fn findings(capture: &Capture, known: &Known, plain: &Model, fitted: &Fitted
         .zip(judged)
         .filter(|(turn, _)| *turn != Turn::Jitter || jitter_holds(capture, fitted))
         .collect();
+    // Noise changes no mean, and a histogram little of it: where they are all, the errors are those of the declared
+    // model unless they are smaller.
+    let is_mean = order.iter().any(|(turn, j)| match turn {
+        Turn::Jitter => false,
+        Turn::Missing => j.errors.heldout_rms < before.errors.heldout_rms,
+        Turn::Linear(_) | Turn::Clipping => true,
+    });
     let (combos, solved) = search.solution(&set);
     let mut steps = Vec::new();
     for (turn, judged) in &order {
@@ -110,16 +118,19 @@ pub fn findings(capture: &Capture, known: &Known, plain: &Model, fitted: &Fitted
                 jitter_step(known, fitted)
             }
         };
-        step.heldout_rms = judged.errors.heldout_rms;
+        step.heldout_rms = match is_mean {
+            true => judged.errors.heldout_rms,
+            false => before.errors.heldout_rms,
+        };
         for name in step.parameters.keys() {
             // Counts, codes and numbers of knots: nothing of them is estimated.
             step.parameter_std.entry(name.clone()).or_insert(0.0);
         }
         steps.push(step);
     }
-    let mut last = fitted.model.clone();
+    let mut last = model.clone();
     last.coefficients = without_nuisance(fitted, &combos, &solved);
-    let after = if order.is_empty() {
+    let after = if !is_mean {
         before.errors
     } else {
         judge(capture, &last).errors
@@ -225,17 +236,35 @@ fn turns(fitted: &Fitted, search: &mut Search, set: &[usize]) -> Vec<Turn> {
     out
 }
 
-/// The model after each turn, judged.
-fn prefixes(capture: &Capture, fitted: &Fitted, search: &Search, order: &[Turn]) -> Vec<Judged> {
+/// The model, without what missing codes shift if that does not make the held-out errors smaller: the codes are known
+/// by the histogram, and where noise is wide or they are few the mean hardly knows them.
+fn with_useful_shifts(capture: &Capture, model: &Model) -> Model {
+    let mut without = model.clone();
+    without.missing = Default::default();
+    let held = |model: &Model| judge(capture, model).errors.heldout_rms;
+    if held(model) < held(&without) {
+        return model.clone();
+    }
+    without
+}
+
+/// `last` after each turn, judged.
+fn prefixes(
+    capture: &Capture,
+    fitted: &Fitted,
+    last: &Model,
+    search: &Search,
+    order: &[Turn],
+) -> Vec<Judged> {
     let mut set = Vec::new();
-    let mut model = fitted.model.clone();
+    let mut model = last.clone();
     model.missing = Default::default();
     order
         .iter()
         .map(|turn| {
             match turn {
                 Turn::Linear(k) => set.push(*k),
-                Turn::Missing => model.missing = fitted.model.missing.clone(),
+                Turn::Missing => model.missing = last.missing.clone(),
                 _ => {}
             }
             let (combos, solved) = search.solution(&set);

@@ -85,7 +85,8 @@ pub(super) fn own_combos(fitted: &Fitted, set: &[usize], member: usize) -> std::
 fn parameters(step: &mut Step, combos: &[&Combo], solved: &Solved, own: std::ops::Range<usize>) {
     let value = |k: usize| solved.coefficients.get(k).copied().unwrap_or(0.0);
     let deviation = |k: usize| solved.stds.get(k).copied().unwrap_or(0.0);
-    if own.len() > 12 {
+    let is_line = |k: usize| combos.get(k).is_some_and(|c| c.name.starts_with("line"));
+    if own.len() > 12 && !own.clone().all(is_line) {
         let extreme = |sign: f64| own.clone().map(|k| sign * value(k)).fold(0.0, f64::max) * sign;
         let worst = own.clone().map(deviation).fold(0.0, f64::max);
         for (name, v) in [
@@ -147,7 +148,7 @@ pub(super) fn clipping_step(capture: &Capture, fitted: &Fitted) -> Step {
             }
         }
     }
-    step.p_value = (13.0 - fitted.clipping.unwrap_or(0.0)).exp().min(1.0);
+    step.p_value = (-fitted.clipping.unwrap_or(0.0)).exp().min(1.0);
     step
 }
 

@@ -130,10 +130,8 @@ pub fn evidence(
 fn single(fitted: &Fitted, search: &mut Search, effect: Effect) -> (Option<f64>, Option<f64>) {
     match effect {
         Effect::Clipping => {
-            return (
-                fitted.clipping,
-                fitted.clipping.map(|g| (13.0 - g).exp().min(1.0)),
-            );
+            let gain = fitted.clipping;
+            return (gain, gain.map(|g| (-g).exp().min(1.0)));
         }
         Effect::MissingCodes => {
             let gain = fitted.missing.as_ref().map(|m| m.gain);

@@ -30,7 +30,7 @@ pub fn left(capture: &Capture, model: &Model, coefficients: &[Vec<f64>; 2]) -> S
         }
     }
     let [drive, sense] = &residuals;
-    let spectrum = Spectrum::of([drive, sense], capture.rows());
+    let spectrum = Spectrum::of([drive, sense], capture.used_rows());
     let lines = spectrum.lines(&model.tone, 1, 3.0, [LEAST_WHITE; 2]);
     if let Some(line) = lines.first() {
         let surprise = line.surprise - (capture.rows() as f64).ln();

@@ -25,9 +25,12 @@ pub struct Histogram {
 
 impl Histogram {
     /// Bars for these codes, empty.
-    pub fn new(codes: &[i32]) -> Self {
-        let low = codes.iter().min().copied().map_or(0, i64::from);
-        let high = codes.iter().max().copied().map_or(0, i64::from);
+    pub fn new(codes: impl Iterator<Item = i32>) -> Self {
+        let range = codes.map(i64::from).fold(None, |range, code| match range {
+            None => Some((code, code)),
+            Some((low, high)) => Some((code.min(low), code.max(high))),
+        });
+        let (low, high) = range.unwrap_or((0, 0));
         let width = (high - low + 1).div_euclid(BARS) + 1;
         // Two more on each side, for what is expected beyond.
         let bars = ((high - low) / width + 5) as usize;
@@ -128,7 +131,7 @@ mod tests {
     #[test]
     fn bars_hold_all_codes_whatever_their_range() {
         for codes in [vec![-3, 5], vec![-32768, 32767], vec![0], vec![-120, 119]] {
-            let mut h = Histogram::new(&codes);
+            let mut h = Histogram::new(codes.iter().copied());
             for code in &codes {
                 h.add(f64::from(*code), f64::from(*code));
             }

@@ -68,7 +68,7 @@ impl<'a> View<'a> {
     pub fn new(closed: &'a Closed) -> Self {
         let capture = &closed.capture;
         let reach = [0, 1].map(|c: usize| {
-            let largest = capture.codes[c].iter().map(|c| c.unsigned_abs()).max();
+            let largest = capture.used_codes(c).map(i32::unsigned_abs).max();
             f64::from(largest.unwrap_or(1).max(1))
         });
         let [before, after] = &closed.findings.models;
@@ -100,15 +100,19 @@ fn left(capture: &Capture, model: &Model, reach: [f64; 2]) -> [Left; 2] {
     let steepest = reach.map(|r| 1.02 * r * model.tone.angle().abs());
     let mut by_code = [(); 2].map(|()| vec![Cell::default(); CELLS]);
     let mut by_slope = [(); 2].map(|()| vec![Cell::default(); SLOPES]);
-    let mut histograms = [0, 1].map(|c: usize| Histogram::new(&capture.codes[c]));
+    let mut histograms = [0, 1].map(|c: usize| Histogram::new(capture.used_codes(c)));
     let mut chunk_rows = Rows::new();
     for chunk in chunks(0..rows) {
-        let n = chunk.len();
+        let (start, n) = (chunk.start, chunk.len());
         chunk_rows.fill(capture, model, chunk);
         for channel in 0..2 {
             let signals = &chunk_rows.signal[channel];
             let slopes = &chunk_rows.slope[channel];
             for (i, (signal, slope)) in signals.iter().zip(slopes).take(n).enumerate() {
+                if capture.is_left_out(start + i) {
+                    residuals[channel].push(0.0);
+                    continue;
+                }
                 let residual = chunk_rows.error(model, channel, i);
                 residuals[channel].push(residual);
                 histograms[channel].add(chunk_rows.code(channel, i), *signal);
@@ -130,6 +134,7 @@ fn left(capture: &Capture, model: &Model, reach: [f64; 2]) -> [Left; 2] {
         let drawn = thin(residual).into_iter();
         Left {
             over_time: drawn
+                .filter(|i| !capture.is_left_out(*i))
                 .filter_map(|i| Some((i as f64, *residual.get(i)?)))
                 .collect(),
             spectrum: std::mem::take(&mut spectra[c]),
