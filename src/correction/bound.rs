@@ -128,10 +128,13 @@ fn on_rate(formats: &Formats, term: &Term, largest: f64) -> (f64, f64) {
         Term::ScaleBy {
             input: Some(input),
             s1,
+            s2,
             ..
         } => {
-            let x = s1.abs() * pow2(-formats.input_bits(*input));
-            (c + s1.abs(), 3.0 * half + x)
+            // Coefficients and casts: two for each power of x, and s0.
+            let roundings = if *s2 == 0.0 { 3.0 } else { 5.0 };
+            let x = (s1.abs() + 2.0 * s2.abs()) * pow2(-formats.input_bits(*input));
+            (c + (s1.abs() + s2.abs()), roundings * half + x)
         }
         Term::Even {
             absolute: false, ..

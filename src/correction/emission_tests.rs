@@ -1,7 +1,7 @@
 //! Emitted C and Rust against the model, and damage to them.
 
 use super::firmware::{Origin, emit};
-use super::sample::{plan, record};
+use super::sample::{bends, plan, record};
 use super::*;
 use crate::emit::files;
 use crate::emit::views::Language;
@@ -16,9 +16,11 @@ const ORIGIN: Origin = Origin {
 
 #[test]
 fn emitted_c_and_rust_are_the_model_bit_for_bit_on_random_plans() {
+    let mut bent = 0;
     for seed in 0..10u64 {
         // No input, one and so on up to eight, and relays.
         let plan = plan(1000 + seed, seed as usize % 9, true);
+        bent += usize::from(bends(&plan));
         let correction = Correction::auto(&plan).unwrap();
         let firmware = Firmware::make(&correction, &ORIGIN).unwrap();
         let readings = record(&plan, 3000, seed);
@@ -29,6 +31,7 @@ fn emitted_c_and_rust_are_the_model_bit_for_bit_on_random_plans() {
             assert!(c.name != "correct" || c.inputs >= 3000);
         }
     }
+    assert!(bent > 2, "{bent} plans with an s2");
 }
 
 #[test]

@@ -127,7 +127,7 @@ pub(super) fn slope_dps(plan: &Plan, input: usize) -> f64 {
             gain_dps_s, rows, ..
         } => 2.0 * slope_gain_dps(plan, *gain_dps_s, *rows).abs(),
         Term::Curve { values_dps, .. } => steepest(values_dps),
-        Term::ScaleBy { s1, .. } => s1.abs() * full_scale,
+        Term::ScaleBy { s1, s2, .. } => (s1.abs() + 2.0 * s2.abs()) * full_scale,
         _ => 0.0,
     };
     let terms = plan.terms.iter();

@@ -148,14 +148,16 @@ pub enum Term {
         /// Never off again, not even by a restart, once it was on; off before the first time.
         once: bool,
     },
-    /// Error r (s0 + s1 x).
+    /// Error r (s0 + s1 x + s2 x^2).
     ScaleBy {
-        /// x; `None`: s1 is not used.
+        /// x; `None`: s1 and s2 are not used.
         input: Option<usize>,
         /// 1.
         s0: f64,
         /// 1 per unit of x.
         s1: f64,
+        /// 1 per unit of x^2.
+        s2: f64,
     },
     /// Error ppm 1e-6 r (r / rate_max)^2.
     Cubic {
@@ -356,9 +358,13 @@ impl Plan {
                 within(&named("gap"), *gap, 0.0, 1e3)?;
                 gain("gain_dps", *gain_dps)
             }
-            Term::ScaleBy { s0, s1, .. } => {
+            Term::ScaleBy { s0, s1, s2, .. } => {
                 within(&named("s0"), *s0, -0.5, 0.5)?;
-                within(&named("s1"), *s1, -0.5, 0.5)
+                within(&named("s1"), *s1, -0.5, 0.5)?;
+                within(&named("s2"), *s2, -0.5, 0.5)?;
+                // What s0 and s1 alone reach: products stay as narrow as with these two.
+                let sum = s0.abs() + s1.abs() + s2.abs();
+                within(&named("|s0| + |s1| + |s2|"), sum, 0.0, 1.0)
             }
             Term::Cubic { ppm, rate_max_dps }
             | Term::Even {

@@ -6,6 +6,7 @@
 //! | term | k |
 //! |---|---|
 //! | `ScaleBy` | s0 + cast(s1 x) |
+//! | `ScaleBy` with s2 | s0 + cast((s1 + cast(s2 x)) x) |
 //! | `Even`, absolute | ppm 1e-6, on abs(r) |
 //! | `Even` | cast(c u), c = ppm 1e-6 2^e / rate_max |
 //! | `Cubic` | cast(c cast(u u)), c = ppm 1e-6 (2^e / rate_max)^2 |
@@ -38,6 +39,9 @@ enum Law {
     Constant,
     /// The constant and slope * x: input, slope, rounding.
     Linear(usize, i128, Cast),
+    /// The constant and (slope + curvature * x) * x: input, slope and curvature, rounding of the inner product,
+    /// then of the outer.
+    Quadratic(usize, [i128; 2], Box<[Cast; 2]>),
     /// The constant, on abs(r).
     Absolute,
     /// Constant * u.
@@ -84,7 +88,10 @@ const TRIED: usize = 32;
 /// The error of a term at a rate of `rate_dps`, and its slope there, at most: deg/s and 1.
 fn at_most(term: &Term, rate_dps: f64) -> (f64, f64) {
     let (share, power) = match term {
-        Term::ScaleBy { input, s0, s1 } => (s0.abs() + input.map_or(0.0, |_| s1.abs()), 1.0),
+        Term::ScaleBy { input, s0, s1, s2 } => {
+            let of_input = input.map_or(0.0, |_| s1.abs() + s2.abs());
+            (s0.abs() + of_input, 1.0)
+        }
         Term::Even {
             ppm,
             absolute: true,
@@ -105,7 +112,9 @@ fn at_most(term: &Term, rate_dps: f64) -> (f64, f64) {
 fn error_dps(term: &Term, rate_dps: f64, x: f64) -> f64 {
     let over = |rate_max_dps: &f64| rate_dps / rate_max_dps;
     match term {
-        Term::ScaleBy { input, s0, s1 } => rate_dps * (s0 + input.map_or(0.0, |_| s1 * x)),
+        Term::ScaleBy { input, s0, s1, s2 } => {
+            rate_dps * (s0 + input.map_or(0.0, |_| (s1 + s2 * x) * x))
+        }
         Term::Even {
             ppm,
             absolute: true,
@@ -143,8 +152,21 @@ pub(super) fn passes(plan: &Plan, formats: &Formats) -> usize {
     passes
 }
 
+/// The x between the ends at which the error of a term on the rate is largest or smallest, if any.
+fn vertex(term: &Term) -> Option<f64> {
+    match term {
+        Term::ScaleBy {
+            input: Some(_),
+            s1,
+            s2,
+            ..
+        } if *s2 != 0.0 => Some(-s1 / (2.0 * s2)).filter(|x| x.abs() < 1.0),
+        _ => None,
+    }
+}
+
 /// The fewest passes that leave no more than `enough`, deg/s, else those that leave least: over readings within the
-/// full scale, every input at either end.
+/// full scale, every input at either end, or where a term's error turns.
 fn tried(plan: &Plan, enough: f64) -> usize {
     let most = plan.full_scale_dps;
     let errors = |rate_dps: f64, x: f64| -> f64 {
@@ -152,7 +174,8 @@ fn tried(plan: &Plan, enough: f64) -> usize {
         plan.terms.iter().map(|t| error_dps(t, held, x)).sum()
     };
     let mut worst = [0.0f64; MOST_PASSES];
-    for x in [-1.0, 1.0] {
+    let turns = plan.terms.iter().filter_map(vertex);
+    for x in [-1.0, 1.0].into_iter().chain(turns) {
         for k in 0..=2 * TRIED {
             let true_dps = most * (k as f64 / TRIED as f64 - 1.0);
             let measured = true_dps + errors(true_dps, x);
@@ -184,12 +207,20 @@ impl OnRate {
             Term::ScaleBy {
                 input: Some(input),
                 s1,
+                s2,
                 ..
-            } => Law::Linear(
-                *input,
-                (s1 * pow2(bits)).round() as i128,
-                exact("correction.scale", bits + formats.input_bits(*input), bits),
-            ),
+            } => {
+                let [slope, curvature] = [s1, s2].map(|s| (s * pow2(bits)).round() as i128);
+                let product = |label| exact(label, bits + formats.input_bits(*input), bits);
+                let outer = product("correction.scale");
+                match curvature {
+                    0 => Law::Linear(*input, slope, outer),
+                    _ => {
+                        let casts = Box::new([product("correction.scale_slope"), outer]);
+                        Law::Quadratic(*input, [slope, curvature], casts)
+                    }
+                }
+            }
             Term::Even { absolute: true, .. } => Law::Absolute,
             Term::Even { .. } => Law::Even(exact("correction.even", bits + u, bits)),
             Term::Cubic { .. } => Law::Cubic(Box::new([
@@ -211,7 +242,7 @@ impl OnRate {
         let mut casts = match &mut self.law {
             Law::Constant | Law::Absolute => Vec::new(),
             Law::Linear(_, _, cast) | Law::Even(cast) => vec![cast],
-            Law::Cubic(casts) => casts.iter_mut().collect(),
+            Law::Quadratic(_, _, casts) | Law::Cubic(casts) => casts.iter_mut().collect(),
         };
         casts.push(&mut self.last);
         casts
@@ -233,6 +264,18 @@ impl OnRate {
                 // The plan was checked: every input exists.
                 None => constant,
             },
+            Law::Quadratic(input, [slope, curvature], casts) => match inputs.get(*input) {
+                Some(x) => {
+                    let [inner, outer] = casts.as_ref();
+                    let product = ar.mul(ar.constant(*curvature, self.bits), *x);
+                    let bend = ar.cast(product, inner, &[*x]);
+                    let slope = ar.add(ar.constant(*slope, self.bits), bend);
+                    let product = ar.mul(slope, *x);
+                    ar.add(constant, ar.cast(product, outer, &[slope, *x]))
+                }
+                // As above.
+                None => constant,
+            },
             Law::Absolute => {
                 on = ar.select(ar.is_negative(r), ar.neg(r), r);
                 constant
@@ -250,3 +293,7 @@ impl OnRate {
         ar.cast(ar.mul(on, k), &self.last, &[on, k])
     }
 }
+
+#[cfg(test)]
+#[path = "rate_tests.rs"]
+mod tests;

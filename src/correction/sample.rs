@@ -37,6 +37,26 @@ fn curves_of_lags(seed: u64, inputs: usize, period_s: f64) -> Vec<Term> {
     (0..count).map(one).collect()
 }
 
+/// None to two scales that bend with an input, from draws of their own, as above.
+fn bent_scales(seed: u64, inputs: usize) -> Vec<Term> {
+    let mut lcg = Lcg(seed ^ 0x00be_4d5c);
+    (0..4).for_each(|_| _ = lcg.draw());
+    let count = below(&mut lcg, 3);
+    let one = |_| Term::ScaleBy {
+        input: Some(below(&mut lcg, inputs as u64) as usize),
+        s0: 1e-3 * unit(&mut lcg),
+        s1: 1e-3 * unit(&mut lcg),
+        s2: 1e-3 * unit(&mut lcg),
+    };
+    (0..count).map(one).collect()
+}
+
+/// True if a scale bends with an input.
+pub fn bends(plan: &Plan) -> bool {
+    let bent = |t: &Term| matches!(t, Term::ScaleBy { s2, .. } if *s2 != 0.0);
+    plan.terms.iter().any(bent)
+}
+
 /// A random plan of `inputs` inputs; with relays only if asked.
 pub fn plan(seed: u64, inputs: usize, relays: bool) -> Plan {
     let mut lcg = Lcg(seed);
@@ -60,6 +80,7 @@ pub fn plan(seed: u64, inputs: usize, relays: bool) -> Plan {
     ];
     if inputs > 0 {
         terms.extend(curves_of_lags(seed, inputs, period_s));
+        terms.extend(bent_scales(seed, inputs));
     }
     for _ in 0..count {
         let any = below(&mut lcg, inputs.max(1) as u64) as usize;
@@ -80,6 +101,7 @@ pub fn plan(seed: u64, inputs: usize, relays: bool) -> Plan {
                 input: None,
                 s0: 1e-3 * unit(&mut lcg),
                 s1: 0.0,
+                s2: 0.0,
             },
             3 | 4 => Term::Product {
                 gain_dps: 50.0 * unit(&mut lcg),
@@ -116,6 +138,7 @@ pub fn plan(seed: u64, inputs: usize, relays: bool) -> Plan {
                 input: Some(any),
                 s0: 1e-3 * unit(&mut lcg),
                 s1: 1e-3 * unit(&mut lcg),
+                s2: 0.0,
             },
             _ => Term::Curve {
                 input: any,
@@ -170,7 +193,9 @@ pub fn record(plan: &Plan, rows: usize, seed: u64) -> Vec<Reading> {
 /// The error of a term on the rate r.
 fn error_on_rate(term: &Term, r: f64, x: &[f64]) -> f64 {
     match term {
-        Term::ScaleBy { input, s0, s1 } => r * (s0 + input.map_or(0.0, |k| s1 * x[k])),
+        Term::ScaleBy { input, s0, s1, s2 } => {
+            r * (s0 + input.map_or(0.0, |k| s1 * x[k] + s2 * x[k].powi(2)))
+        }
         Term::Cubic { ppm, rate_max_dps } => ppm * 1e-6 * r * (r / rate_max_dps).powi(2),
         Term::Even {
             ppm,

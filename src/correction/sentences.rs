@@ -195,8 +195,9 @@ fn curve(input: usize, values: &[f64], curves: &mut usize) -> String {
 /// The error that a term has on the rate r, deg/s.
 fn on_rate(term: &Term) -> String {
     match term {
-        Term::ScaleBy { input, s0, s1 } => match input {
-            Some(input) => format!("r * ({s0:?} + {s1:?} * {})", name(*input)),
+        Term::ScaleBy { input, s0, s1, s2 } => match input.map(name) {
+            Some(x) if *s2 == 0.0 => format!("r * ({s0:?} + {s1:?} * {x})"),
+            Some(x) => format!("r * ({s0:?} + {s1:?} * {x} + {s2:?} * {x}^2)"),
             None => format!("r * {s0:?}"),
         },
         Term::Cubic { ppm, rate_max_dps } => {
@@ -275,15 +276,20 @@ mod tests {
             said(step(false)),
             "subtracted: 0.25 deg/s while on: on from input_1 >= 0.75, off below 0.25; at power-on, on from 0.5"
         );
-        let scale = |input| Term::ScaleBy {
+        let scale = |input, s2| Term::ScaleBy {
             input,
             s0: 1e-3,
             s1: 0.5,
+            s2,
         };
-        assert_eq!(said(scale(None)), "error on the rate r: r * 0.001");
+        assert_eq!(said(scale(None, 0.0)), "error on the rate r: r * 0.001");
         assert_eq!(
-            said(scale(Some(0))),
+            said(scale(Some(0), 0.0)),
             "error on the rate r: r * (0.001 + 0.5 * input_1)"
+        );
+        assert_eq!(
+            said(scale(Some(0), -0.25)),
+            "error on the rate r: r * (0.001 + 0.5 * input_1 + -0.25 * input_1^2)"
         );
     }
 }

@@ -1,6 +1,6 @@
 //! The float twin against closed formulas, fixed point against real numbers, refusals.
 
-use super::sample::{evaluate, normal, plan, record};
+use super::sample::{bends, evaluate, normal, plan, record};
 use super::*;
 use crate::verify::stimulus::Lcg;
 
@@ -92,6 +92,7 @@ fn the_float_twin_follows_closed_formulas() {
             input: Some(0),
             s0: 1e-3,
             s1: -2e-3,
+            s2: 0.0,
         },
         Term::Cubic {
             ppm: 100.0,
@@ -193,10 +194,11 @@ fn a_relay_remembers_and_a_latch_outlives_a_restart() {
 
 #[test]
 fn fixed_and_float_stay_within_the_bound_of_the_plan() {
-    let mut worst = 0.0f64;
+    let (mut worst, mut bent) = (0.0f64, 0);
     for seed in 0..60 {
         let inputs = seed as usize % 6;
         let plan = plan(seed, inputs, false);
+        bent += usize::from(bends(&plan));
         let correction = Correction::auto(&plan).unwrap();
         let readings = record(&plan, 600, seed);
         let due = evaluate(&plan, correction.formats.passes(&plan), &readings);
@@ -226,6 +228,7 @@ fn fixed_and_float_stay_within_the_bound_of_the_plan() {
     }
     // The bound is a worst case, yet no idle one.
     assert!(worst > 0.2, "{worst}");
+    assert!(bent > 10, "{bent} plans with an s2");
 }
 
 #[test]

@@ -106,9 +106,13 @@ fn keys(term: &Term) -> String {
             "gain_dps = {gain_dps:?}, input = {input}, centre = {centre:?}, gap = {gap:?}, once = {}",
             yes(*once)
         ),
-        Term::ScaleBy { input, s0, s1 } => {
+        Term::ScaleBy { input, s0, s1, s2 } => {
             let input = input.map_or(String::new(), |k| format!("input = {k}, "));
-            format!("{input}s0 = {s0:?}, s1 = {s1:?}")
+            let s2 = match *s2 == 0.0 {
+                true => String::new(),
+                false => format!(", s2 = {s2:?}"),
+            };
+            format!("{input}s0 = {s0:?}, s1 = {s1:?}{s2}")
         }
         Term::Cubic { ppm, rate_max_dps } => {
             format!("ppm = {ppm:?}, rate_max_dps = {rate_max_dps:?}")

@@ -197,12 +197,14 @@ impl Keys<'_> {
     fn on_rate(&self, kind: &str) -> Result<Term> {
         match kind {
             "scale_by" => {
-                self.only(&["input", "s0", "s1"])?;
+                self.only(&["input", "s0", "s1", "s2"])?;
+                let s2 = |v: Value| v.real(Real::Any, "of this term");
                 let given = self.table.get("input").is_some();
                 Ok(Term::ScaleBy {
                     input: if given { Some(self.input()?) } else { None },
                     s0: self.real("s0")?,
                     s1: self.real("s1")?,
+                    s2: self.table.take("s2", Some(0.0), s2)?,
                 })
             }
             "cubic" => {

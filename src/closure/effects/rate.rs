@@ -118,6 +118,7 @@ impl Candidate for ScaleTemperature {
             input: Some(f.thermometer()?),
             s0: e.beta.get(1).copied().unwrap_or(0.0) / top(c),
             s1: e.beta.first()? / top(c),
+            s2: 0.0,
         }])
     }
 
@@ -202,6 +203,7 @@ impl Candidate for Nonlinearity {
                 input: None,
                 s0: linear / top(c),
                 s1: 0.0,
+                s2: 0.0,
             });
         }
         Some(out)
@@ -279,6 +281,7 @@ impl Candidate for Asymmetry {
                 input: None,
                 s0: odd * relative,
                 s1: 0.0,
+                s2: 0.0,
             });
         }
         Some(out)
