@@ -110,14 +110,15 @@ impl Told<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::MORE;
     use crate::closure::close::close;
     use crate::closure::search::Effort;
     use crate::closure::synthetic::{Random, record, triangle};
     use crate::design::reader;
 
-    /// The full scale of the correction of a record with rates up to `most_dps`, and how many times the model's held-out
-    /// error its firmware leaves; in noise of `noise_dps`.
-    fn carried(most_dps: f64, noise_dps: f64) -> (f64, f64) {
+    /// The full scale of the correction of a record with rates up to `most_dps` in noise of `noise_dps`, and how many times the
+    /// model's held-out error its firmware leaves. The scale factor bends by `bend_ppm` a kelvin squared.
+    fn carried(most_dps: f64, noise_dps: f64, bend_ppm: f64) -> (f64, f64) {
         let mut random = Random::new(5);
         let degc = triangle(240);
         let rate: Vec<f64> = (0..240)
@@ -125,7 +126,10 @@ mod tests {
             .collect();
         let pairs = degc.iter().zip(&rate);
         let output: Vec<f64> = pairs
-            .map(|(t, rate)| 0.5 - 0.02 * t + rate + noise_dps * random.normal())
+            .map(|(t, rate)| {
+                let scale = 1.0 + 1e-6 * bend_ppm * (t - 30.0).powi(2);
+                0.5 - 0.02 * t + rate * scale + noise_dps * random.normal()
+            })
             .collect();
         let mut record = record("die_degc", &degc, &output);
         record.columns.insert("rate_dps".to_owned(), rate);
@@ -133,25 +137,34 @@ mod tests {
         let closed = close(&record, Vec::new(), &design, "test", Effort::default()).unwrap();
         let full_scale_dps = closed.correction.unwrap().plan.full_scale_dps;
         let errors = closed.closure;
+        assert_eq!(errors.steps.len(), usize::from(bend_ppm != 0.0));
         let times = errors.firmware.heldout_rms.unwrap() / errors.after.heldout_rms;
         (full_scale_dps, times)
     }
 
     #[test]
     fn firmware_of_a_record_at_rest_holds_the_gyros_rates() {
-        let (full_scale_dps, times) = carried(0.0, 0.01);
+        let (full_scale_dps, times) = carried(0.0, 0.01, 0.0);
         assert!(
-            full_scale_dps >= 1024.0 && times < 1.02,
+            full_scale_dps >= 1024.0 && times < MORE,
             "{full_scale_dps} {times}"
         );
         // Rates that were applied are those that the correction is for.
-        let (full_scale_dps, times) = carried(40.0, 0.01);
-        assert!((50.0..55.0).contains(&full_scale_dps) && times < 1.02);
+        let (full_scale_dps, times) = carried(40.0, 0.01, 0.0);
+        assert!((50.0..55.0).contains(&full_scale_dps) && times < MORE);
         // So little noise that the gyro's range does not fit into a word beside it.
-        let (full_scale_dps, times) = carried(0.0, 1e-6);
+        let (full_scale_dps, times) = carried(0.0, 1e-6, 0.0);
         assert!(
-            full_scale_dps < 2.0 && times < 1.02,
+            full_scale_dps < 2.0 && times < MORE,
             "{full_scale_dps} {times}"
         );
+    }
+
+    #[test]
+    fn firmware_carries_a_scale_factor_that_bends() {
+        for bend_ppm in [4.0, -2.0] {
+            let (_, times) = carried(200.0, 0.01, bend_ppm);
+            assert!(times < MORE, "{bend_ppm}: {times}");
+        }
     }
 }

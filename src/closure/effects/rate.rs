@@ -114,11 +114,12 @@ impl Candidate for ScaleTemperature {
         if e.point.form > 0 && !is_bent(c, &e.point) {
             return None;
         }
+        let relative = |k: usize| e.beta.get(k).copied().unwrap_or(0.0) / top(c);
         Some(vec![Term::ScaleBy {
             input: Some(f.thermometer()?),
-            s0: e.beta.get(1).copied().unwrap_or(0.0) / top(c),
-            s1: e.beta.first()? / top(c),
-            s2: 0.0,
+            s0: relative(1),
+            s1: relative(0),
+            s2: relative(2),
         }])
     }
 
