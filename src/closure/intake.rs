@@ -3,10 +3,10 @@
 use super::adc_rows;
 use super::baseline;
 use super::channels::Channels;
-use super::held;
 use super::holes;
 use super::quadrature;
 use super::quantised::{self, Course};
+use super::repeated;
 use super::weights;
 use crate::design::{Design, Gyro, RecordMapping};
 use crate::error::{InputError, Result};
@@ -156,7 +156,7 @@ pub fn channels_of(
     };
     let mut channels = seen(&columns)?;
     let step_u = quantised::step_u(&channels);
-    if let Some(course) = held::course(&channels) {
+    if let Some(course) = repeated::course(&channels) {
         warnings.push(behind(&name, &course));
         columns.insert(name.clone(), course.reading);
         channels = seen(&columns)?;
@@ -187,14 +187,14 @@ pub fn channels_of(
 }
 
 /// What is said of a thermometer that is read less often than the output.
-fn behind(thermometer: &str, course: &held::Course) -> Warning {
+fn behind(thermometer: &str, course: &repeated::Course) -> Warning {
     let said = format!(
         "{thermometer} has a new reading every {:.1} rows and repeats it in between: what the repeated ones are behind by \
          makes {:.3e} deg/s rms of the declared bias. It is taken out before and after (causes are sought along straight lines \
          between new readings); the firmware's error contains it: read the thermometer as often as the output",
         course.rows, course.artefact_rms_dps
     );
-    Warning::on("thermometer_held", thermometer, said)
+    Warning::on("thermometer_repeats", thermometer, said)
 }
 
 /// What is said of a thermometer that is read in coarse steps.

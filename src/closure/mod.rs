@@ -5,7 +5,7 @@
 //! correlation, and the coefficients' covariance), [`folds`] (held-out blocks), [`order`] (its
 //! choice), [`sweep`] (heating against cooling) and [`checks`] (what a user should know of before
 //! believing the fit). [`likelihood`] is what tells an effect from noise with a memory. [`capture`] does the
-//! same for ADC codes. [`close`] answers for a thermal record: [`intake`] ([`quantised`], [`staircase`]: coarse thermometers; [`held`]: slow ones; [`adc_rows`], [`adc_rounding`]: coarse ADCs; [`quadrature`]: one that contains the output), [`channels`],
+//! same for ADC codes. [`close`] answers for a thermal record: [`intake`] ([`quantised`], [`staircase`]: coarse thermometers; [`repeated`]: slow ones; [`adc_rows`], [`adc_rounding`]: coarse ADCs; [`quadrature`]: one that contains the output), [`channels`],
 //! candidate [`effects`] and their [`search`], [`firmware`]; [`verdict`] is the form of the answer. Nothing here knows the plant
 //! (law 4).
 
@@ -20,7 +20,6 @@ pub mod effects;
 pub mod firmware;
 pub mod folds;
 mod heats;
-pub mod held;
 mod holes;
 pub mod intake;
 pub mod likelihood;
@@ -30,6 +29,7 @@ pub mod polynomial;
 pub mod quadrature;
 pub mod quantised;
 pub mod rails;
+pub mod repeated;
 pub mod residuals;
 pub mod search;
 mod smooth;

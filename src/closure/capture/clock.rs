@@ -5,7 +5,7 @@
 //! the phase is judged as if nothing had happened: lost samples are rows that are left out, repeated ones are taken away.
 
 use super::blocks::{self, Block, noise, phase, wrapped};
-use super::early::early;
+use super::first_break::first_break;
 use super::input::Capture;
 use super::normal::median;
 use super::tone::Tone;
@@ -87,7 +87,7 @@ pub fn retimed(capture: Capture, tone: &Tone) -> Retimed {
         }
     }
     if out.breaks.iter().all(|b| b.samples.is_some())
-        && let Some(first) = early(&out.capture, tone)
+        && let Some(first) = first_break(&out.capture, tone)
     {
         out.mend(first);
     }

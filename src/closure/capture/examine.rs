@@ -5,8 +5,8 @@ use super::blocks::of_a_sample;
 use super::clock::{self, Break, Retimed};
 use super::idle::{COLUMNS, without_copies, without_idle};
 use super::input::{Capture, LEAST_ROWS};
-use super::stand_out::{self, StandOut};
 use super::tone::Tone;
+use super::wrong_codes::{self, StandOut};
 use super::{LEAST_PERIODS, frequency, keys, periods};
 use crate::error::{InputError, Result};
 use crate::record::Warning;
@@ -35,7 +35,7 @@ pub fn examined(capture: Capture) -> Result<(Capture, Vec<Warning>)> {
     frequency::checked(&retimed.capture, &tone)?;
     // Without a tuning word the tone was fitted to rows that were not at their time.
     let tone = Tone::of(&retimed.capture).unwrap_or(tone);
-    let found = stand_out::find(&retimed.capture, &tone);
+    let found = wrong_codes::find(&retimed.capture, &tone);
     if found.too_many {
         return Err(too_many(&found, &retimed).into());
     }

@@ -1,9 +1,9 @@
 //! Samples lost or repeated, wrong codes, stretches without a signal: with and without an effect beside them.
 
-use super::accidents::{
+use super::examine::examined;
+use super::synthetic_rows::{
     ROWS, WORDS, capture, clean, codes, judged, late, lose, meta, names, said, wrong,
 };
-use super::examine::examined;
 use super::{analyse, clock};
 use crate::closure::synthetic::Random;
 use crate::record::capture_meta::CaptureMeta;

@@ -5,8 +5,8 @@
 //! known rate only the quadrature's), and how much of the quantiser's own error shows (all if noise is
 //! added after rounding, next to none if before).
 //!
-//! [`input`] reads; [`examine`] looks whether the rows are what was sampled, with [`keys`], [`idle`], [`frequency`], [`clock`] and [`early`] (samples lost or repeated) and
-//! [`stand_out`] (wrong codes), both on [`blocks`]; [`tone`] is the phase; [`columns`] are the functions of which effects are made, one
+//! [`input`] reads; [`examine`] looks whether the rows are what was sampled, with [`keys`], [`idle`], [`frequency`], [`clock`] and [`first_break`] (samples lost or repeated) and
+//! [`wrong_codes`] (wrong codes), both on [`blocks`]; [`tone`] is the phase; [`columns`] are the functions of which effects are made, one
 //! file an effect ([`offset`], [`gain`], [`latency`], [`feedthrough`], [`nonlinearity`],
 //! [`harmonics`], [`mains`], [`spur`] with [`truncation`]); [`gram`] their sums and least squares;
 //! [`search`] chooses. Outside of the linear part are [`clipping`], [`missing`] (the histogram), [`jitter`] (the
@@ -16,8 +16,6 @@
 //! [`fit`] runs all in rounds; [`report`] judges on held-out rows, with [`errors`], [`rivals`],
 //! [`structure`] and [`firmware`]; [`bend`] is for the page, which is made in `report::capture`.
 
-#[cfg(test)]
-mod accidents;
 pub mod around;
 pub mod bend;
 pub mod blocks;
@@ -25,13 +23,13 @@ pub mod candidates;
 pub mod clipping;
 pub mod clock;
 pub mod columns;
-pub mod early;
 pub mod errors;
 pub mod examine;
 #[cfg(test)]
 mod examine_tests;
 pub mod feedthrough;
 pub mod firmware;
+pub mod first_break;
 pub mod fit;
 pub mod frequency;
 pub mod gain;
@@ -56,14 +54,16 @@ pub mod rivals;
 pub mod search;
 pub mod spectrum;
 pub mod spur;
-pub mod stand_out;
 pub mod steps;
 pub mod structure;
 #[cfg(test)]
 mod synthetic;
+#[cfg(test)]
+mod synthetic_rows;
 pub mod tone;
 pub mod truncation;
 pub mod wander;
+pub mod wrong_codes;
 
 use super::verdict::{Closure, SCHEMA, Verdict};
 use crate::design::Design;

@@ -1,7 +1,7 @@
 //! Captures that are refused: keys that cannot be true, columns without a signal, a tone that is elsewhere.
 
-use super::accidents::{ROWS, WORDS, capture, clean, judged, meta, names, said};
 use super::examine::examined;
+use super::synthetic_rows::{ROWS, WORDS, capture, clean, judged, meta, names, said};
 use crate::closure::synthetic::Random;
 use crate::record::capture_meta::CaptureMeta;
 use std::f64::consts::TAU;

@@ -28,7 +28,7 @@ fn closed(record: &ThermalRecord) -> (Vec<String>, bool) {
     (
         names.collect(),
         said.map(|w| w.code.to_string())
-            .any(|code| code == "thermometer_held"),
+            .any(|code| code == "thermometer_repeats"),
     )
 }
 
@@ -58,7 +58,7 @@ fn readings_that_are_repeated_name_no_lag() {
 }
 
 #[test]
-fn a_set_temperature_is_not_held() {
+fn a_set_temperature_is_not_repeated() {
     // Steps of 5 K, each for 10 rows, which the gyro follows at once.
     let degc: Vec<f64> = (0..ROWS)
         .map(|k| 5.0 * (7.0 - (k as f64 / 10.0 % 28.0).floor() + 14.0 - 7.0).abs())
@@ -76,7 +76,7 @@ fn a_set_temperature_is_not_held() {
 }
 
 #[test]
-fn fine_and_coarse_readings_are_not_held() {
+fn fine_and_coarse_readings_are_not_repeated() {
     let degc = noisy(3);
     for step in [0.0, 0.01, 0.1, 1.0, 2.0] {
         let read = |k: usize| match step {
@@ -84,6 +84,6 @@ fn fine_and_coarse_readings_are_not_held() {
             step => (degc[k] / step).round() * step,
         };
         let readings: Vec<f64> = (0..ROWS).map(read).collect();
-        assert!(!is_held(&readings, &new_readings(&readings)), "{step}");
+        assert!(!repeats(&readings, &new_readings(&readings)), "{step}");
     }
 }

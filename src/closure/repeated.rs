@@ -42,7 +42,7 @@ fn new_readings(readings: &[f64]) -> Vec<usize> {
 }
 
 /// Whether readings come in a rhythm of their own.
-fn is_held(readings: &[f64], new: &[usize]) -> bool {
+fn repeats(readings: &[f64], new: &[usize]) -> bool {
     let lengths: Vec<usize> = new.windows(2).map(|w| w[1] - w[0]).collect();
     let within = |rows: usize| {
         let kept = lengths.iter().filter(|l| (rows..=rows + 1).contains(*l));
@@ -74,10 +74,10 @@ fn straight(time_s: &[f64], readings: &[f64], new: &[usize]) -> Vec<f64> {
     out
 }
 
-/// The course of a record's thermometer, if it is held and the output follows the course rather than the readings.
+/// The course of a record's thermometer, if it repeats its readings and the output follows the course rather than the readings.
 pub fn course(c: &Channels) -> Option<Course> {
     let new = new_readings(&c.u);
-    if !is_held(&c.u, &new) {
+    if !repeats(&c.u, &new) {
         return None;
     }
     let u = straight(&c.time_s, &c.u, &new);
@@ -85,7 +85,7 @@ pub fn course(c: &Channels) -> Option<Course> {
     let (bias, _) = declared_by(&u, &c.error_dps);
     let pairs = c.u.iter().zip(&u);
     let artefact: Vec<f64> = pairs
-        .map(|(held, u)| bias.at(*held) - bias.at(*u))
+        .map(|(read, u)| bias.at(*read) - bias.at(*u))
         .collect();
     (left(&u) < left(&c.u).min(left(&averaged(&c.time_s, &c.u)))).then(|| Course {
         rows: c.len() as f64 / new.len() as f64,
@@ -95,5 +95,5 @@ pub fn course(c: &Channels) -> Option<Course> {
 }
 
 #[cfg(test)]
-#[path = "held_tests.rs"]
+#[path = "repeated_tests.rs"]
 mod tests;

@@ -23,7 +23,7 @@ const LEAST_OF_A_SAMPLE: f64 = 12.0;
 const FITS: f64 = 2.0;
 
 /// The break in the first rows, if there is one.
-pub fn early(capture: &Capture, tone: &Tone) -> Option<Break> {
+pub fn first_break(capture: &Capture, tone: &Tone) -> Option<Break> {
     let word = tone.word?;
     let blocks = blocks::blocks(capture, tone);
     let rows = blocks.get(BLOCKS)?.rows.start;
