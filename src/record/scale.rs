@@ -195,6 +195,28 @@ mod tests {
     }
 
     #[test]
+    fn a_scale_of_half_or_of_one_and_a_half_is_none_that_temperature_makes() {
+        for (scale, said) in [
+            (0.5, true),
+            (0.65, true),
+            (0.75, false),
+            (1.3, false),
+            (1.5, true),
+        ] {
+            let of_row = |k: f64| {
+                let rate = 40.0 * (k * 0.7).sin();
+                (rate, scale * rate + 0.01 * die(k) + wiggle(k), die(k))
+            };
+            let codes = codes(200, of_row);
+            assert_eq!(
+                codes.contains(&"scale_not_nominal"),
+                said,
+                "{scale}: {codes:?}"
+            );
+        }
+    }
+
+    #[test]
     fn drift_that_goes_with_rates_held_long_is_no_scale() {
         // 160 deg/s of drift over 70 K while the table stands at -20, then 0, then 20 deg/s.
         let held = |k: f64| ((k / 67.0).floor() - 1.0) * 20.0;

@@ -9,6 +9,13 @@ use crate::record::{ThermalRecord, Warning, stats};
 /// A held-out error that is so many times another one is more: that of firmware beside the model's, or the declared one's.
 const MORE: f64 = 1.02;
 
+/// Codes of what `intake` takes out of a record's readings, and firmware does not.
+const TAKEN_OUT: [&str; 3] = [
+    "thermometer_quantised",
+    "thermometer_repeats",
+    "adc_not_dithered",
+];
+
 /// The full scale of the rate, deg/s, that a record's own rates ask for, as they come in and as they go out; and the gyro's, which
 /// a record at rest says nothing of.
 fn full_scales_dps(record: &ThermalRecord, design: &Design) -> (f64, Option<f64>) {
@@ -74,12 +81,13 @@ impl Told<'_> {
             warnings.push(Warning::general("no_firmware", said));
             return None;
         }
-        warnings.extend(self.behind(&carried));
+        let behind = self.behind(&carried, warnings);
+        warnings.extend(behind);
         Some(carried)
     }
 
     /// What is said where firmware leaves more than the model does.
-    fn behind(&self, carried: &firmware::Judged) -> Option<Warning> {
+    fn behind(&self, carried: &firmware::Judged, said: &[Warning]) -> Option<Warning> {
         let model = self.errors(self.after).heldout_rms;
         let firmware = carried.errors.heldout_rms?;
         let terms = &carried.correction.plan.terms;
@@ -91,6 +99,9 @@ impl Told<'_> {
             reasons.push(
                 "it finds the rate from its own noisy output, where the model has the applied one",
             );
+        }
+        if said.iter().any(|w| TAKEN_OUT.contains(&w.code)) {
+            reasons.push("it has the readings as they are, and what was taken out of them for the model is in its error");
         }
         let without_rounding = carried.unrounded_rms_dps / model;
         if reasons.is_empty() || without_rounding < MORE {
