@@ -15,7 +15,7 @@ use std::io::Read;
 use std::path::Path;
 
 /// The two columns that are used, in the order of an NPY capture's columns.
-pub(super) const COLUMNS: [&str; 2] = ["drive_code", "sense_code"];
+pub(crate) const COLUMNS: [&str; 2] = ["drive_code", "sense_code"];
 
 /// A capture file, read block by block.
 pub struct CaptureReader {

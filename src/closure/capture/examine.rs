@@ -3,13 +3,14 @@
 
 use super::blocks::of_a_sample;
 use super::clock::{self, Break, Retimed};
-use super::idle::{COLUMNS, without_copies, without_idle};
+use super::idle::{without_copies, without_idle};
 use super::input::{Capture, LEAST_ROWS};
 use super::tone::Tone;
 use super::wrong_codes::{self, StandOut};
 use super::{LEAST_PERIODS, frequency, keys, periods};
 use crate::error::{InputError, Result};
 use crate::record::Warning;
+use crate::record::capture::COLUMNS;
 
 /// Breaks that a message names.
 const NAMED: usize = 4;

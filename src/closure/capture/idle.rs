@@ -6,10 +6,9 @@ use super::input::Capture;
 use super::tone::Tone;
 use crate::error::{InputError, Result};
 use crate::record::Warning;
+use crate::record::capture::COLUMNS;
 use std::ops::Range;
 
-/// Names of both columns.
-pub const COLUMNS: [&str; 2] = ["drive_code", "sense_code"];
 /// Rows of one code that are no accident, at least.
 const LEAST_RUN: usize = 32;
 /// Half the range of codes from which on a period of the tone cannot have one code.

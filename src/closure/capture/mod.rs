@@ -69,6 +69,7 @@ use super::verdict::{Closure, SCHEMA, Verdict};
 use crate::design::Design;
 use crate::error::{InputError, Result};
 use crate::record::Warning;
+use crate::record::capture::COLUMNS;
 use candidates::Known;
 use columns::{COS, Model, SIN};
 use gram::{Combo, Detail, Gram, Summed, solve};
@@ -157,7 +158,7 @@ pub fn analyse(capture: &Capture) -> Result<Findings> {
     };
     let tone = Tone::of(capture).ok_or_else(|| {
         let error = no_tone("the drive codes hold no tone, and `ftw` is not given");
-        capture.places.put(idle::COLUMNS[0], error)
+        capture.places.put(COLUMNS[0], error)
     })?;
     if periods(capture, &tone) < LEAST_PERIODS {
         return Err(no_tone(
