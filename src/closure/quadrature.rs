@@ -22,22 +22,28 @@ const SURELY: f64 = 4.0;
 /// Second differences beyond so many robust deviations are not noise (spikes, steps, a course that bends).
 const OUTLYING: f64 = 4.0;
 
+/// Share of the quadrature's noise by which the applied rate may bend.
+const STEADY: f64 = 0.5;
+
 /// Fewest second differences that a slope is trusted from.
 const FEWEST: usize = 30;
 
 /// Factor of a product's variance that its neighbours' correlation makes, for second differences of white noise: 1 + 2 (2/3)^2 + 2 (1/6)^2.
 const NEIGHBOURS: f64 = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0);
 
-/// Slope of the output's noise over the quadrature's, with its standard deviation; `None` where either has too little.
-fn slope(error_dps: &[f64], quad_dps: &[f64]) -> Option<(f64, f64)> {
+/// Slope of the output's noise over the quadrature's, with its standard deviation; `None` where either has too little. Where the
+/// applied rate bends by more than half of the quadrature's noise, both may follow it, the output by an error of its scale.
+fn slope(error_dps: &[f64], quad_dps: &[f64], rate_dps: &[f64]) -> Option<(f64, f64)> {
     let bend = |w: &[f64]| w[2] - 2.0 * w[1] + w[0];
     let bends = |v: &[f64]| v.windows(3).map(bend).collect::<Vec<f64>>();
-    let (x, y) = (bends(quad_dps), bends(error_dps));
-    let (most_x, most_y) = (OUTLYING * stats::mad_std(&x), OUTLYING * stats::mad_std(&y));
-    let pairs = x.iter().zip(&y);
+    let (x, y, applied) = (bends(quad_dps), bends(error_dps), bends(rate_dps));
+    let noise = stats::mad_std(&x);
+    let (most_x, most_y) = (OUTLYING * noise, OUTLYING * stats::mad_std(&y));
+    let steady = |k: usize| applied.get(k).is_none_or(|r| r.abs() < STEADY * noise);
+    let pairs = x.iter().zip(&y).enumerate();
     let kept: Vec<(f64, f64)> = pairs
-        .filter(|(x, y)| x.abs() < most_x && y.abs() < most_y)
-        .map(|(x, y)| (*x, *y))
+        .filter(|(k, (x, y))| steady(*k) && x.abs() < most_x && y.abs() < most_y)
+        .map(|(_, (x, y))| (*x, *y))
         .collect();
     let xx: f64 = kept.iter().map(|(x, _)| x * x).sum();
     if kept.len() < FEWEST || xx <= 0.0 {
@@ -52,12 +58,14 @@ fn slope(error_dps: &[f64], quad_dps: &[f64]) -> Option<(f64, f64)> {
 /// What is said of a quadrature that contains the output; `None`: it does not, or is not there.
 pub fn contains_output(c: &Channels) -> Option<Warning> {
     let (_, rest) = declared_by(&c.u, &c.error_dps);
-    let measured = c.error_dps.iter().zip(c.moving(NAME)?);
-    let quad_dps: Vec<f64> = measured
-        .filter(|(e, _)| e.is_finite())
-        .map(|(_, q)| *q)
-        .collect();
-    let (slope, std) = slope(&rest, &quad_dps)?;
+    let measured = |column: &[f64]| -> Vec<f64> {
+        let rows = c.error_dps.iter().zip(column);
+        let rows = rows.filter(|(e, _)| e.is_finite());
+        rows.map(|(_, v)| *v).collect()
+    };
+    let quad_dps = measured(c.moving(NAME)?);
+    let rate_dps = c.moving("rate_dps").map(measured).unwrap_or_default();
+    let (slope, std) = slope(&rest, &quad_dps, &rate_dps)?;
     (slope.abs() - SURELY * std > NO_PHASE_ERROR).then(|| {
         Warning::on(
             "quadrature_contains_output",

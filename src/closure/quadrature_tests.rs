@@ -82,3 +82,26 @@ fn what_the_output_shares_with_its_quadrature_is_no_leakage() {
         assert_eq!(names, ["warmup_transient"], "{seed}");
     }
 }
+
+#[test]
+fn an_output_and_a_quadrature_that_both_follow_the_applied_rate_do_not_contain_each_other() {
+    for seed in 0..20 {
+        let mut made = made(seed, 0.02, 0.0);
+        let rate = |k: usize| 50.0 * (k as f64 / 9.0).sin();
+        for (k, v) in made.columns.get_mut(NAME).unwrap().iter_mut().enumerate() {
+            *v += 0.01 * rate(k);
+        }
+        for (k, v) in made
+            .columns
+            .get_mut("rate_out_dps")
+            .unwrap()
+            .iter_mut()
+            .enumerate()
+        {
+            *v += rate(k) - 0.03 * rate(k).powi(3) / 2500.0;
+        }
+        let rates = (0..ROWS).map(rate).collect();
+        made.columns.insert("rate_dps".to_owned(), rates);
+        assert_eq!(said_of(&made), (false, false), "{seed}");
+    }
+}
