@@ -1,7 +1,7 @@
 //! What stands for channels with holes, and which way a temperature goes.
 
 use super::channels::{Channels, filled};
-use super::smooth::{averaged, reading_noise};
+use super::smooth::{averaged, reading_noise, smoothed};
 use super::synthetic::Random;
 use crate::record::stats;
 use std::collections::BTreeMap;
@@ -154,7 +154,7 @@ fn a_coarse_reading_has_the_noise_of_its_steps_and_a_mean_takes_away_noise_alone
         .iter()
         .map(|v| read(v + 0.5 * step * random.normal()))
         .collect();
-    let noise = reading_noise(&values);
+    let noise = reading_noise(&time_s, &values);
     // Half a step, and what rounding adds.
     assert!((0.4 * step..0.8 * step).contains(&noise), "{noise} {step}");
     let off = |mean: &[f64]| {
@@ -196,4 +196,25 @@ fn the_rows_after_a_power_on_are_fitted() {
     assert_eq!(held_out, 0);
     // The rule has something to do.
     assert!(without > 8, "{without}");
+}
+
+/// Readings at uneven times have third differences without any noise.
+#[test]
+fn a_ramp_read_at_uneven_times_has_no_noise_and_is_not_smoothed() {
+    let mut random = Random::new(11);
+    let mut at = 0.0;
+    let time_s: Vec<f64> = (0..400)
+        .map(|_| {
+            at += [1.0, 1.0, 2.0, 8.0][(4.0 * random.uniform()) as usize % 4];
+            at
+        })
+        .collect();
+    let course: Vec<f64> = time_s.iter().map(|t| (t / 60.0).sin()).collect();
+    assert!(reading_noise(&time_s, &course) < 1e-3);
+    let noisy: Vec<f64> = course.iter().map(|v| v + 0.01 * random.normal()).collect();
+    let noise = reading_noise(&time_s, &noisy);
+    assert!((0.008..0.012).contains(&noise), "{noise}");
+    let smooth = smoothed(&time_s, &course);
+    let most = smooth.iter().zip(&course).map(|(s, v)| (s - v).abs());
+    assert!(most.fold(0.0, f64::max) < 1e-3);
 }

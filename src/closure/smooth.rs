@@ -18,17 +18,34 @@ const QUANTILES: [(f64, f64); 2] = [(0.5, 0.674_489_75), (0.2, 0.253_347_1)];
 /// Share of the usual noise that is none.
 const STILL: f64 = 1e-6;
 
+/// What a parabola through any three of four readings leaves of the fourth, with weights whose squares add up to 1: the third
+/// difference, divided by the times (rows that are unevenly spaced make one of a straight line otherwise). `None` where times
+/// are repeated.
+fn third_difference(time_s: &[f64], values: &[f64]) -> Option<f64> {
+    let unit = time_s[3] - time_s[0];
+    let mut sum = 0.0;
+    let mut squares = 0.0;
+    for (i, v) in values.iter().enumerate() {
+        let others = (0..values.len()).filter(|j| *j != i);
+        let product: f64 = others.map(|j| (time_s[i] - time_s[j]) / unit).product();
+        sum += v / product;
+        squares += 1.0 / (product * product);
+    }
+    let difference = sum / squares.sqrt();
+    difference.is_finite().then_some(difference)
+}
+
 /// White noise of a reading, from its third differences (a smooth course has none).
-pub fn reading_noise(values: &[f64]) -> f64 {
-    let mut sizes: Vec<f64> = values
-        .windows(4)
-        .map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs())
+pub fn reading_noise(time_s: &[f64], values: &[f64]) -> f64 {
+    let rows = time_s.windows(4).zip(values.windows(4));
+    let mut sizes: Vec<f64> = rows
+        .filter_map(|(t, v)| third_difference(t, v))
+        .map(f64::abs)
         .collect();
     sizes.sort_by(f64::total_cmp);
-    // The four weights' squares add up to 20.
     let noise = |(share, deviate): (f64, f64)| {
         let size = sizes.get((share * sizes.len() as f64) as usize)?;
-        Some(size / (deviate * 20f64.sqrt()))
+        Some(size / deviate)
     };
     let [most, least] = QUANTILES.map(|q| noise(q).unwrap_or(0.0));
     // A coarse reading stands still in many rows (but for the rounding of its scale), which says nothing of its noise.
@@ -51,8 +68,8 @@ fn first_difference_noise(values: &[f64]) -> f64 {
 }
 
 /// The narrowest half width at which a slope's noise is small beside the slopes themselves.
-fn half_width(values: &[f64]) -> usize {
-    let noise = reading_noise(values);
+fn half_width(time_s: &[f64], values: &[f64]) -> usize {
+    let noise = reading_noise(time_s, values);
     for k in HALF_WIDTHS {
         let steps: Vec<f64> = (k..values.len().saturating_sub(k))
             .map(|i| (values[i + k] - values[i - k]) / (2 * k) as f64)
@@ -124,7 +141,7 @@ fn solved(s: [f64; 5], r: [f64; 3], parabola: bool) -> (f64, f64) {
 
 /// A column without most of its reading noise: untouched where its noise is small.
 pub fn smoothed(time_s: &[f64], values: &[f64]) -> Vec<f64> {
-    match half_width(values) {
+    match half_width(time_s, values) {
         1 => values.to_vec(),
         k => local(time_s, values, k).0,
     }
@@ -137,7 +154,7 @@ const NOISE_ALONE: f64 = 1.1;
 pub fn averaged(time_s: &[f64], values: &[f64]) -> Vec<f64> {
     // In dwells of a few readings most rows differ from the one before by noise alone, and third differences hardly do.
     let still = first_difference_noise(values);
-    let third = reading_noise(values);
+    let third = reading_noise(time_s, values);
     let noise = if still > STILL * third {
         third.min(still)
     } else {

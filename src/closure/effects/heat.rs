@@ -64,7 +64,7 @@ impl Candidate for ThermalLag {
     }
 
     fn points(&self, c: &Channels) -> Vec<Point> {
-        let fastest = (1.5 * c.period_s()).max(1e-3);
+        let fastest = 2.0 * shortest_s(c);
         let slowest = (c.span_s() / 2.5).max(2.0 * fastest);
         let taus = spaced(fastest, slowest, 18);
         let forms = if c.span_s() > 0.0 {
@@ -193,10 +193,16 @@ impl Lagging {
     }
 }
 
-/// The time constant of a lag: shorter ones are a rate of change, longer ones a drift in time.
+/// Shortest time constant of a lag, s: of a shorter one a row sees no more than that it comes after the rate of change.
+fn shortest_s(c: &Channels) -> f64 {
+    (0.25 * c.period_s()).max(1e-3)
+}
+
+/// The time constant of a lag: longer ones are a drift in time.
 fn tau_s(c: &Channels, point: &Point) -> f64 {
-    let longest = (0.5 * c.span_s()).max(c.period_s());
-    point.theta[0].exp().clamp(c.period_s(), longest)
+    let shortest = shortest_s(c);
+    let longest = (0.5 * c.span_s()).max(shortest);
+    point.theta[0].exp().clamp(shortest, longest)
 }
 
 /// Bias proportional to dT/dt.

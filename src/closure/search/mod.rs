@@ -32,6 +32,7 @@ mod rounding;
 pub mod stairs;
 pub mod structure;
 pub mod sweep;
+mod ties;
 mod together;
 pub mod tones;
 pub mod undone;

@@ -84,6 +84,7 @@ impl Search<'_> {
             found.left = Some("time_s".to_owned());
             self.kept_stable(&mut found)?;
         }
+        self.with_ties(&mut found)?;
         let named: Vec<String> = found.terms.iter().map(Term::id).collect();
         for term in &mut found.terms {
             // What is in beside a step is no other name for it.

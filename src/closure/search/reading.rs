@@ -59,7 +59,7 @@ fn errors(c: &Channels, truth: &[f64], count: i32) -> Vec<Vec<f64>> {
 
 /// u by all channels that read the temperature as well as the thermometer does: least squares over their powers.
 fn by_others(c: &Channels) -> Option<Vec<f64>> {
-    let noise = reading_noise(&c.u);
+    let noise = reading_noise(&c.time_s, &c.u);
     let follows = |x: &[f64]| {
         let (_, off) = least_squares(&of_powers(x), &c.u);
         stats::rms(&off) <= SAME * noise

@@ -13,6 +13,10 @@ use crate::closure::likelihood::linear::{Basis, dot};
 /// some two hundred pairs (Wilks 1938: four coefficients and a time constant rarely gain ten).
 const WORTH: f64 = 15.0;
 
+/// Probability, under the slow noise that it replaces, up to which one name more is beyond chance that is worth as much as a pair and
+/// ends the wander which others leave: that noise was found with the name out, and has it in.
+const NEARLY: f64 = 0.05;
+
 /// Pairs of which the noise is sought, and names alone; and how many times over.
 const TRIED: usize = 3;
 const TIMES: usize = 2;
@@ -42,13 +46,15 @@ impl Search<'_> {
             }
         }
         let known = model.terms.len();
+        let ends = known > 0 && with.terms.len() == known + 1 && self.wander(&with) <= WANDER;
+        let level = if ends { NEARLY } else { LEVEL };
         let mut terms = with.terms.clone();
         for (k, term) in terms.iter_mut().enumerate().skip(known) {
             let mut others = with.terms.clone();
             let own = others.remove(k);
             let round = self.round(&self.model(&others)?, self.effort.surrogates);
             let mut judged = round.judged.iter();
-            let again = judged.find(|j| j.candidate.id() == own.id() && j.p_value <= LEVEL);
+            let again = judged.find(|j| j.candidate.id() == own.id() && j.p_value <= level);
             let Some(again) = again else { return Ok(None) };
             *term = Term {
                 point: own.point,

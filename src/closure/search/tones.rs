@@ -13,6 +13,7 @@ use crate::closure::likelihood::null::bartlett;
 use crate::closure::likelihood::reml::Fit;
 use crate::closure::likelihood::tail::chi_square_surprise;
 use crate::closure::likelihood::whiten::Whitener;
+use crate::closure::smooth::slope;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -205,6 +206,14 @@ pub(super) fn power(time_s: &[f64], y: &[f64], weights: &[f64], hz: f64) -> f64 
 /// channel's.
 const WAVING: f64 = 0.5;
 
+/// Share of the square of what such a channel has beyond the sinusoid that its effect keeps at least (two lags far slower than it
+/// leave a ninth of the third harmonic's amplitude, and of the second a quarter), and log-likelihood at which it is seen.
+const SMOOTHED: f64 = 0.01;
+const SEEN: f64 = 10.0;
+
+/// Share of the square of the temperature's squared rate that a line has which is its pace.
+const PACE: f64 = 0.1;
+
 /// Most harmonics that are looked at, and the probability that the strongest of them is noise's up to which what repeats is
 /// no sinusoid.
 const HARMONICS: i32 = 9;
@@ -217,7 +226,27 @@ impl Search<'_> {
     pub(super) fn another_channels(&self, frequency_hz: f64) -> Option<String> {
         let c = self.channels;
         let few = (!tone::returns(c, frequency_hz)).then(|| "time_s".to_owned());
-        few.or_else(|| waving(c, frequency_hz))
+        few.or_else(|| Some(waving(c, frequency_hz)?.name))
+            .or_else(|| paces(c, frequency_hz).then(|| c.thermometer.clone()))
+    }
+
+    /// Whether a tone in a model, with nothing left beside it, is no answer to a channel that swings with it for the most part: what
+    /// that channel has beyond the sinusoid, smoothed by far, would be seen.
+    pub(super) fn is_apart(&self, model: &Model, own: usize) -> bool {
+        let c = self.channels;
+        let frequency_hz = model.terms[own].point.theta.first().copied();
+        let Some(frequency_hz) = frequency_hz.filter(|hz| tone::returns(c, *hz)) else {
+            return false;
+        };
+        let Some(wave) = waving(c, frequency_hz).filter(|_| !paces(c, frequency_hz)) else {
+            return false;
+        };
+        let all = model.contributions(c);
+        let used = all[own].iter().zip(&self.used).filter(|(_, used)| **used);
+        let square: f64 = used.map(|(v, _)| v * v).sum();
+        let beyond = square * (1.0 - wave.share) / wave.share * SMOOTHED;
+        let white = model.fit.noise.white_rms_dps.max(f64::MIN_POSITIVE);
+        0.5 * beyond > SEEN * white * white && self.is_clean(model)
     }
 
     /// Whether a shape is such a tone.
@@ -278,30 +307,66 @@ impl Search<'_> {
     }
 }
 
-/// A channel that is a sinusoid of a frequency for the most part, or whose square is.
-fn waving(c: &Channels, frequency_hz: f64) -> Option<String> {
+/// A channel that swings.
+struct Wave {
+    name: String,
+    /// Share of its square, or of the square of its square, that is the sinusoid's.
+    share: f64,
+}
+
+/// Sine and cosine of a frequency at the rows.
+fn pair(c: &Channels, frequency_hz: f64) -> Vec<Vec<f64>> {
     let wave = |f: fn(f64) -> f64| map(&c.time_s, |t| f(TAU * frequency_hz * t));
-    let pair = [wave(f64::sin), wave(f64::cos)];
-    let constant = Basis::new(&[vec![1.0; c.len()]]);
-    let both = Basis::new(&[vec![vec![1.0; c.len()]], pair.to_vec()].concat());
-    let left = |basis: &Basis, column: &[f64]| {
-        let mut rest = column.to_vec();
-        basis.project_off(&mut rest);
-        dot(&rest, &rest)
-    };
-    let waves = |column: &[f64]| left(&both, column) < (1.0 - WAVING) * left(&constant, column);
+    vec![wave(f64::sin), wave(f64::cos)]
+}
+
+/// Share of a column's square about its mean that is a sinusoid's.
+fn share(both: &Basis, column: &[f64]) -> f64 {
+    let mean = column.iter().sum::<f64>() / column.len().max(1) as f64;
+    let about = map(column, |v| v - mean);
+    let mut rest = about.clone();
+    both.project_off(&mut rest);
+    let whole = dot(&about, &about);
+    if whole > 0.0 {
+        1.0 - dot(&rest, &rest) / whole
+    } else {
+        0.0
+    }
+}
+
+/// The channel that is a sinusoid of a frequency for the most part, or whose square is, more than any other.
+fn waving(c: &Channels, frequency_hz: f64) -> Option<Wave> {
+    let both = Basis::new(&[vec![vec![1.0; c.len()]], pair(c, frequency_hz)].concat());
     // What answers to both signs alike swings twice as often.
     let square = |column: &[f64]| {
         let mean = column.iter().sum::<f64>() / column.len().max(1) as f64;
         map(column, |v| (v - mean).powi(2))
     };
-    let is_waving = |column: &[f64]| waves(column) || waves(&square(column));
-    if is_waving(&c.u) {
-        return Some(c.thermometer.clone());
-    }
+    let of = |name: &str, column: &[f64]| Wave {
+        name: name.to_owned(),
+        share: share(&both, column).max(share(&both, &square(column))),
+    };
     let names = c.columns.keys().filter(|name| *name != "time_s");
-    let mut moving = names.filter(|name| c.moving(name).is_some_and(is_waving));
-    moving.next().cloned()
+    let others = names.filter_map(|name| Some(of(name, c.moving(name)?)));
+    let all = [of(&c.thermometer, &c.u)].into_iter().chain(others);
+    all.filter(|wave| wave.share > WAVING)
+        .max_by(|a, b| a.share.total_cmp(&b.share))
+}
+
+/// Whether the temperature changes at the pace of a frequency: its squared rate has a line there, as that of a staircase of
+/// temperatures has.
+fn paces(c: &Channels, frequency_hz: f64) -> bool {
+    let span_s = c.span_s();
+    if span_s <= 0.0 {
+        return false;
+    }
+    let squared = map(&slope(&c.time_s, &c.u, 1), |v| v * v);
+    let near = (-AROUND..=AROUND).map(|k| 0.5 * f64::from(k) / f64::from(AROUND) / span_s);
+    let line = |by_hz: f64| {
+        let both = vec![vec![vec![1.0; c.len()]], pair(c, frequency_hz + by_hz)].concat();
+        share(&Basis::new(&both), &squared)
+    };
+    near.map(line).any(|share| share > PACE)
 }
 
 #[cfg(test)]

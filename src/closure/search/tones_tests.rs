@@ -95,3 +95,68 @@ fn a_second_tone_has_the_name_of_a_first_that_is_no_longer_in() {
     // Too few to tell from what wanders.
     assert!(!is_named(2.0, false));
 }
+
+/// A record of a staircase of temperatures, `step` rows each, in `turns` ramps up and down, with an output of it and of the row.
+fn on_stairs(
+    seed: u64,
+    rows: usize,
+    (step, turns): (usize, usize),
+    of: impl Fn(f64, usize) -> f64,
+) -> (Vec<String>, Option<String>) {
+    let mut random = Random::new(seed);
+    let quarter = rows / turns;
+    let level = |k: usize| {
+        let at = (k / step * step) as f64 / quarter as f64;
+        let up = at.fract();
+        30.0 + 40.0
+            * if (at as usize).is_multiple_of(2) {
+                up
+            } else {
+                1.0 - up
+            }
+    };
+    // The chamber is followed within a row or two.
+    let mut now = level(0);
+    let degc: Vec<f64> = (0..rows)
+        .map(|k| {
+            now += 0.8 * (level(k) - now);
+            now
+        })
+        .collect();
+    let rate = |k: usize| degc[k] - degc[k.saturating_sub(1)];
+    let output = (0..rows).map(|k| 0.3 - 0.01 * degc[k] + of(rate(k), k) + 0.02 * random.normal());
+    let columns = BTreeMap::from([
+        ("rate_out_dps".to_owned(), output.collect()),
+        ("die_degc".to_owned(), degc.clone()),
+    ]);
+    let time_s: Vec<f64> = (0..rows).map(|k| 60.0 * k as f64).collect();
+    let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+    let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+    let found = search.run().unwrap();
+    (found.terms.iter().map(|t| t.id()).collect(), found.left)
+}
+
+#[test]
+fn the_pace_of_a_staircase_is_no_pickup() {
+    for seed in 0..4 {
+        let (names, _) = on_stairs(seed, 240, (5, 4), |rate, _| 0.03 * rate * rate);
+        assert!(
+            !names.contains(&"periodic_pickup".to_owned()),
+            "{seed} {names:?}"
+        );
+    }
+}
+
+/// Twice as fast as the chamber, whose square therefore swings with it, but not on stairs.
+#[test]
+fn a_tone_of_twice_the_chambers_frequency_is_a_pickup_where_the_chamber_is_none() {
+    for seed in 0..4 {
+        let tone = |k: usize| 0.3 * (std::f64::consts::TAU * k as f64 / 238.0 + 0.7).sin();
+        let (names, left) = on_stairs(seed, 1200, (20, 5), |_, k| tone(k));
+        assert_eq!(
+            (names, left),
+            (vec!["periodic_pickup".to_owned()], None),
+            "{seed}"
+        );
+    }
+}

@@ -142,13 +142,18 @@ impl Search<'_> {
         let nameless = terms.iter().filter(|t| t.id() == tone::FURTHER);
         let channels = nameless.filter_map(|t| self.another_channels(*t.point.theta.first()?));
         found.left = found.left.take().or_else(|| channels.last());
-        for term in terms.iter_mut().filter(|t| t.id() == tone::NAMED) {
+        for (k, term) in terms.iter_mut().enumerate() {
+            if term.id() != tone::NAMED {
+                continue;
+            }
             let frequency_hz = term.point.theta.first().copied().unwrap_or(0.0);
             let overtones = || {
                 let has = self.has_overtones(&model, frequency_hz);
                 has.then(|| "time_s".to_owned())
             };
-            if let Some(channel) = self.another_channels(frequency_hz).or_else(overtones) {
+            let others = self.another_channels(frequency_hz);
+            let others = others.filter(|_| !self.is_apart(&model, k));
+            if let Some(channel) = others.or_else(overtones) {
                 waves = Some(channel);
                 term.candidate = Arc::new(Pickup {
                     frequency_hz,
@@ -303,7 +308,7 @@ impl Search<'_> {
     }
 
     /// Whether nothing is left of a record beside a model: no wander, no colour, nothing beyond chance.
-    fn is_clean(&self, model: &Model) -> bool {
+    pub(super) fn is_clean(&self, model: &Model) -> bool {
         if self.wander(model) > SLOW || self.coloured(model) {
             return false;
         }

@@ -1,0 +1,92 @@
+//! Names that the record cannot tell from a step's.
+//!
+//! A round compares names by what they explain at one noise. Two things more make equals of them: a cause that was measured with
+//! noise explains less than it does, and of two forms that are both off a little one is better in one part of the record, the other
+//! in the next.
+
+use super::judge::{EQUAL, Judged};
+use super::{Found, MOST_RIVALS, Model, Search, Term};
+use crate::closure::likelihood::Unusable;
+use crate::closure::smooth::reading_noise;
+
+/// Net gain behind a step's within which names are looked at, and how many of them.
+const BEHIND: f64 = 25.0;
+const LOOKED: usize = 3;
+
+/// Share of the record's halves in which an equal name is better.
+const OFTEN: f64 = 0.3;
+
+/// Most log-likelihood that the noise of a channel accounts for.
+const MOST_BLUR: f64 = 12.0;
+
+impl Search<'_> {
+    /// Adds to the rivals of each step what does as well in its place.
+    ///
+    /// # Errors
+    /// Too few rows.
+    pub(super) fn with_ties(&self, found: &mut Found) -> Result<(), Unusable> {
+        let model = self.model(&found.terms)?;
+        for k in 0..found.terms.len() {
+            let own = &found.terms[k];
+            if own.evident || own.candidate.is_whole() {
+                continue;
+            }
+            let mut others = found.terms.clone();
+            others.remove(k);
+            let without = self.model(&others)?;
+            let round = self.round(&without, 0);
+            let Some(same) = round.judged.iter().find(|j| j.candidate.id() == own.id()) else {
+                continue;
+            };
+            let mut ties = Vec::new();
+            for rival in self.near_ones(&round.judged, same, own) {
+                let mut terms = others.clone();
+                terms.insert(k, Term::of(rival, Vec::new()));
+                let with = self.tried(&terms, k)?;
+                let behind = self.net(&model) - self.net(&with) - rival.odds_against;
+                let blur = self.blur_of(&with, k) - self.blur_of(&model, k);
+                let wins = || self.selection_frequency(&with, k, &without, [same]) >= OFTEN;
+                if behind < EQUAL + blur.clamp(0.0, MOST_BLUR) || wins() {
+                    ties.push(rival.candidate.id());
+                }
+            }
+            let rivals = &mut found.terms[k].rivals;
+            rivals.extend(ties);
+            rivals.truncate(MOST_RIVALS);
+        }
+        Ok(())
+    }
+
+    /// Names next to a step's, best first, that are not its rivals yet.
+    fn near_ones<'j>(
+        &'j self,
+        judged: &'j [Judged],
+        same: &'j Judged,
+        own: &'j Term,
+    ) -> impl Iterator<Item = &'j Judged> {
+        let names = judged
+            .iter()
+            .filter(|j| j.candidate.named() && !j.candidate.is_whole());
+        let others = names.filter(|j| {
+            let id = j.candidate.id();
+            id != own.id() && !own.rivals.contains(&id)
+        });
+        let near = others.filter(|j| j.net + j.odds_against > same.net - BEHIND);
+        near.filter(|j| !self.is_another_channels(&j.candidate.id(), &j.point))
+            .take(LOOKED)
+    }
+
+    /// Log-likelihood that the noise of what a term is a function of takes away.
+    fn blur_of(&self, model: &Model, k: usize) -> f64 {
+        let c = self.channels;
+        let all = model.contributions(c);
+        let noise_dps = reading_noise(&c.time_s, &all[k]);
+        let white_dps = model.fit.noise.white_rms_dps.max(f64::MIN_POSITIVE);
+        let rows = self.used.iter().filter(|u| **u).count() as f64;
+        0.5 * rows * (noise_dps / white_dps).powi(2).ln_1p()
+    }
+}
+
+#[cfg(test)]
+#[path = "ties_tests.rs"]
+mod tests;

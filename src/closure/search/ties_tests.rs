@@ -1,0 +1,56 @@
+//! Causes that follow the temperature are told apart no better than their readings allow.
+
+use crate::closure::channels::Channels;
+use crate::closure::search::{Effort, Search};
+use crate::closure::synthetic::{Random, triangle};
+use std::collections::BTreeMap;
+
+const ROWS: usize = 600;
+const NOISE_DPS: f64 = 0.02;
+
+/// Of a record whose supply follows the cube of the temperature, is read with a noise (in parts of its course) and acts on the output: the
+/// names and what is as good.
+fn found(seed: u64, reading: f64) -> (Vec<String>, Vec<String>) {
+    let mut random = Random::new(seed);
+    let degc = [triangle(ROWS / 2), triangle(ROWS - ROWS / 2)].concat();
+    let of = |degc: f64| ((degc - 20.0) / 40.0).powi(3);
+    let output = degc
+        .iter()
+        .map(|t| 0.3 - 0.01 * t + 0.3 * of(*t) + NOISE_DPS * random.normal());
+    let output: Vec<f64> = output.collect();
+    let supply = degc
+        .iter()
+        .map(|t| 5.0 + 0.1 * (of(*t) + reading * random.normal()));
+    let columns = BTreeMap::from([
+        ("rate_out_dps".to_owned(), output),
+        ("supply_v".to_owned(), supply.collect()),
+        ("die_degc".to_owned(), degc),
+    ]);
+    let time_s: Vec<f64> = (0..ROWS).map(|k| 30.0 * k as f64).collect();
+    let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+    let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+    let found = search.run().unwrap();
+    let rivals = found.terms.iter().flat_map(|t| t.rivals.clone());
+    let rivals = rivals.collect();
+    (found.terms.iter().map(|t| t.id()).collect(), rivals)
+}
+
+#[test]
+fn a_cause_that_was_read_with_noise_is_named_or_listed() {
+    for seed in 0..6 {
+        let (names, rivals) = found(seed, 0.014);
+        assert_eq!(names.len(), 1, "{seed} {names:?}");
+        let mut both = [names, rivals].concat();
+        both.sort();
+        assert_eq!(both, ["bias_third_order", "supply_sensitivity"], "{seed}");
+    }
+}
+
+#[test]
+fn a_channel_of_which_most_is_noise_is_no_equal() {
+    for seed in 0..6 {
+        let (names, rivals) = found(seed, 0.3);
+        assert_eq!(names, ["bias_third_order"], "{seed}");
+        assert!(rivals.is_empty(), "{seed} {rivals:?}");
+    }
+}
