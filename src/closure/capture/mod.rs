@@ -9,8 +9,9 @@
 //! [`wrong_codes`] (wrong codes), both on [`blocks`]; [`tone`] is the phase; [`columns`] are the functions of which effects are made, one
 //! file an effect ([`offset`], [`gain`], [`latency`], [`feedthrough`], [`nonlinearity`],
 //! [`harmonics`], [`mains`], [`spur`] with [`truncation`]); [`gram`] their sums and least squares;
-//! [`search`] chooses. Outside of the linear part are [`clipping`] (with [`instant`]), [`missing`] (the histogram), [`jitter`] (the
-//! variance). [`spectrum`] gives noise and lines ([`rounding`]: those that are the quantiser's own), [`wander`] the slow noise that must not pass for an
+//! [`search`] chooses. Outside of the linear part are [`clipping`] (with [`instant`]), [`missing`] (the histogram),
+//! [`jitter`] (the variance). [`spectrum`] gives noise and lines ([`rounding`]: those that are the quantiser's own),
+//! [`wander`] the slow noise that must not pass for an
 //! effect. [`around`] is the fit with every freedom, [`steps`] where the quantiser's
 //! steps are, [`own_steps`] the search where they show,
 //! [`fit`] runs all in rounds; [`report`] judges on held-out rows, with [`errors`], [`rivals`],
@@ -178,7 +179,6 @@ pub fn analyse(capture: &Capture) -> Result<Findings> {
         plain = baseline(capture, &known, tone);
         fitted = fit::fit(capture, &known, tone, &plain);
     }
-    let mut plain = plain;
     plain.variance = fitted.model.variance;
     plain.variance.jitter = 0.0;
     Ok(report::findings(capture, &known, &plain, &fitted))
