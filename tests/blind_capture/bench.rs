@@ -239,11 +239,28 @@ impl Bench {
                 let code = |x: f64| (x + 0.5).floor();
                 let change: Vec<f64> = pairs.map(|(a, b)| code(bend(a)) - code(*b)).collect();
                 chi[1] += rest(&change, &free) / self.variance(channel);
+            } else if let Some(levels) = faults.levels() {
+                // A limit between two codes changes the codes beyond it alone.
+                let of = |x: &f64| self.codes_lost(channel, *x, levels.map(|l| l * full));
+                let change: Vec<f64> = without[channel].iter().map(of).collect();
+                chi[1] += rest(&change, &free) / self.variance(channel);
             } else {
                 chi[1] = f64::INFINITY;
             }
         }
         chi[0].min(chi[1]).sqrt()
+    }
+
+    /// What limits, low and high, change of the mean code of a signal with noise before rounding.
+    fn codes_lost(&self, channel: usize, x: f64, [low, high]: [f64; 2]) -> f64 {
+        let noise = self.noise[channel];
+        // Mean number of codes beyond one that is the last.
+        let beyond = |inside: f64| -> f64 {
+            let steps = (0..).map(|k| (inside + 0.5 + f64::from(k)) / noise);
+            steps.take_while(|z| *z < 6.0).map(upper_tail).sum()
+        };
+        let last = |level: f64| (level + 0.5).floor();
+        beyond(x - last(low)) - beyond(last(high) - x)
     }
 
     /// What the fit of a channel is free to take, so that a fault does not show in it: of the sense channel the
@@ -301,6 +318,22 @@ impl Bench {
         }
         fault.scaled((0.5 * (low + high)).exp())
     }
+}
+
+/// Probability above z standard deviations (Abramowitz and Stegun 7.1.26, to 1e-7).
+fn upper_tail(z: f64) -> f64 {
+    let x = z.abs() / std::f64::consts::SQRT_2;
+    let t = 1.0 / (1.0 + 0.327_591_1 * x);
+    let series = [
+        0.254_829_592,
+        -0.284_496_736,
+        1.421_413_741,
+        -1.453_152_027,
+        1.061_405_429,
+    ];
+    let sum = series.iter().rev().fold(0.0, |sum, c| (sum + c) * t);
+    let tail = 0.5 * sum * (-x * x).exp();
+    if z < 0.0 { 1.0 - tail } else { tail }
 }
 
 /// Sum of squares after a least squares fit of one or two columns.

@@ -170,7 +170,12 @@ impl Fault {
             // A larger step skips codes: these are missing.
             Fault::Inl(a, Shape::Steps(_)) => *a < 0.4,
             Fault::Latency(samples) => *samples < 2.0,
-            _ => true,
+            // A signal beyond full scale is clipped as well, and rightly said to be.
+            _ => bench
+                .signals(&Faults::of(vec![fault.clone()]))
+                .iter()
+                .flatten()
+                .all(|x| x.abs() < bench.full_scale() - 6.0 * bench.noise[0].max(bench.noise[1])),
         };
         (sane && seen > 0.9 * z).then_some(fault)
     }
@@ -263,6 +268,15 @@ impl Faults {
     /// A nonlinearity and nothing else.
     pub fn is_bend_alone(&self) -> bool {
         matches!(self.0.as_slice(), [Fault::Inl(..)])
+    }
+
+    /// Levels of a limit, of full scale.
+    pub fn levels(&self) -> Option<[f64; 2]> {
+        let of = |f: &Fault| match f {
+            Fault::Clip(low, high) => Some([*low, *high]),
+            _ => None,
+        };
+        self.0.iter().find_map(of)
     }
 
     pub fn only_jitter(&self) -> Option<f64> {

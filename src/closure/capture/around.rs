@@ -8,7 +8,7 @@ use super::gram::{Combo, Detail, Gram, Summed, solve, spread};
 use super::input::{Capture, Part};
 use super::spectrum::{self, Spectrum};
 use super::wander::{self, Series};
-use super::{mains, nonlinearity};
+use super::{mains, nonlinearity, rounding, steps};
 use crate::closure::likelihood::tail::chi_square_surprise;
 
 /// Least variance of a channel's noise, codes squared: nearly that of an ideal quantiser's error, whose
@@ -113,19 +113,27 @@ pub fn around(capture: &Capture, model: &mut Model, base: &[Combo], neutral: boo
 }
 
 /// Looks for new lines; true if any was added. Besides the strongest, those are taken that are no sidelobe
-/// of a stronger one.
-pub fn add_lines(capture: &Capture, model: &mut Model, around: &Around) -> bool {
+/// of a stronger one; where the quantiser's steps show, those only that are none of its own, unless they are the mains'.
+pub fn add_lines(capture: &Capture, known: &Known, model: &mut Model, around: &Around) -> bool {
     let rows = capture.rows() as f64;
     let spectrum = around.spectrum(capture);
     let [drive, sense] = &around.training;
     let before = model.lines.len();
+    let tones = around.free.map(|[sin, cos]| sin.hypot(cos));
+    let sharp = steps::is_sharp(&model.neutral, model);
+    let resolution = 1.0 / rows;
+    let is_rounding = |line: &spectrum::Line| {
+        sharp
+            && !mains::is_mains(known, line.turns, 0.5 * resolution)
+            && rounding::explains(&model.tone, tones, line.turns, resolution, line.amplitudes)
+    };
     let mut stronger: Vec<spectrum::Line> = Vec::new();
     for line in spectrum.lines(&model.tone, 12, 3.0, [LEAST_VARIANCE; 2]) {
         if model.lines.len() >= LINES {
             break;
         }
         // A line that is known is not found again: its rest is the frequency's error.
-        let known = model
+        let is_known = model
             .lines
             .iter()
             .any(|t| (t - line.turns).abs() * rows < 1.0);
@@ -133,7 +141,7 @@ pub fn add_lines(capture: &Capture, model: &mut Model, around: &Around) -> bool 
             let apart = (s.turns - line.turns) * rows;
             apart.abs() < 8.0 || line.surprise * apart * apart < 4.0 * s.surprise
         });
-        if !known && !sidelobe {
+        if !is_known && !sidelobe && !is_rounding(&line) {
             let turns = spectrum::refine([drive, sense], around.noise, line.turns);
             model.lines.push(turns);
             stronger.push(line);

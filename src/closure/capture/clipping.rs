@@ -6,6 +6,7 @@
 
 use super::columns::{COS, Model, Rows, SIN, TRUNCATED, chunks};
 use super::input::{Capture, Part};
+use super::instant::Instant;
 use super::normal;
 
 /// The levels of a channel; infinite where there is none.
@@ -239,7 +240,10 @@ fn cut(capture: &Capture, model: &Model, channel: usize, tone: &[f64; 3]) -> (Li
     let (Some(high), Some(low)) = (codes().max(), codes().min()) else {
         return out;
     };
-    let noise = (model.variance.base[channel] - 1.0 / 12.0).max(0.0).sqrt();
+    let instant = Instant::of(model, channel);
+    let noise = (model.variance.base[channel] - instant.bent - 1.0 / 12.0)
+        .max(0.0)
+        .sqrt();
     if 0.8 * noise < LEAST_NOISE {
         return out;
     }
@@ -247,7 +251,7 @@ fn cut(capture: &Capture, model: &Model, channel: usize, tone: &[f64; 3]) -> (Li
     let near = near(capture, model, channel, tone, sides, 6.0 * noise);
     for ((level, sign), points) in sides.into_iter().zip(near) {
         // Jitter and the noise at the peaks are hardly told from each other there.
-        let noise = match model.variance.jitter > 0.0 {
+        let noise = match instant.spread > 0.0 {
             true => noise.min(inner_noise(&points, 2.0 * noise)),
             false => noise,
         };
@@ -255,8 +259,10 @@ fn cut(capture: &Capture, model: &Model, channel: usize, tone: &[f64; 3]) -> (Li
         if noise < LEAST_NOISE {
             continue;
         }
-        let beyond = |p: &[f64; 2]| normal::below(-(p[0] + 0.5 + 0.25) / noise);
-        let expected: f64 = points.iter().map(beyond).sum();
+        let expected: f64 = points
+            .iter()
+            .map(|p| instant.beyond(p.under, p.tone, noise))
+            .sum();
         if expected > LEAST_CUT {
             out.1 += expected;
             match sign > 0.0 {
@@ -268,8 +274,17 @@ fn cut(capture: &Capture, model: &Model, channel: usize, tone: &[f64; 3]) -> (Li
     out
 }
 
-/// The training rows near each of two outermost codes (and the sign of its side): by how much tone and model are
-/// inside of it, the larger of both, up to `reach`; and the same of the code. Codes.
+/// A training row near an outermost code, codes.
+struct Near {
+    /// By how much tone and model are inside of the code, the larger of both.
+    under: f64,
+    /// By how much the row's own code is.
+    code: f64,
+    /// The tone, positive outward, and its slope, codes a radian.
+    tone: [f64; 2],
+}
+
+/// The training rows near each of two outermost codes (and the sign of its side), up to `reach` inside of it.
 fn near(
     capture: &Capture,
     model: &Model,
@@ -277,8 +292,13 @@ fn near(
     tone: &[f64; 3],
     sides: [(f64, f64); 2],
     reach: f64,
-) -> [Vec<[f64; 2]>; 2] {
+) -> [Vec<Near>; 2] {
     let mut out = [Vec::new(), Vec::new()];
+    let angle = model.tone.angle();
+    let own = |k: usize| {
+        let at = model.coefficients[channel].get(k).copied();
+        at.unwrap_or(0.0) + model.declared[channel][k - SIN]
+    };
     let mut rows = Rows::new();
     for segment in capture.segments.iter().filter(|s| s.part != Part::HeldOut) {
         for chunk in chunks(segment.rows.clone()) {
@@ -292,7 +312,13 @@ fn near(
                     let inside = |value: f64| sign * (level - value);
                     let under = inside(tone).max(inside(signal));
                     if under < reach {
-                        out.push([under, inside(rows.code(channel, i))]);
+                        let part = own(SIN) * at(SIN) + own(COS) * at(COS);
+                        let slope = rows.slope[channel][i] / if angle == 0.0 { 1.0 } else { angle };
+                        out.push(Near {
+                            under,
+                            code: inside(rows.code(channel, i)),
+                            tone: [sign * part, sign * slope],
+                        });
                     }
                 }
             }
@@ -307,11 +333,11 @@ const LEAST_INNER: usize = 50;
 /// The noise of rows less than `depth` inside an outermost code, from the codes that are further inside than the
 /// signal, as no limit touches these: their mean square about the signal is the variance, with the rounding's.
 /// 0 where they are few.
-fn inner_noise(points: &[[f64; 2]], depth: f64) -> f64 {
+fn inner_noise(points: &[Near], depth: f64) -> f64 {
     let inner = points
         .iter()
-        .filter(|[under, code]| *under < depth && code > under);
-    let squares: Vec<f64> = inner.map(|[under, code]| (code - under).powi(2)).collect();
+        .filter(|p| p.under < depth && p.code > p.under);
+    let squares: Vec<f64> = inner.map(|p| (p.code - p.under).powi(2)).collect();
     if squares.len() < LEAST_INNER {
         return 0.0;
     }
@@ -432,5 +458,30 @@ mod tests {
         let (_, loud) = model(&capture, &loud);
         let tone = [0.0, 0.0, -AMPLITUDE];
         assert_eq!(cut(&capture, &loud, 0, &tone).0, Limits::NONE);
+    }
+
+    #[test]
+    fn a_random_instant_that_bends_the_peaks_cuts_nothing() {
+        // Of a slow tone: the codes spread by some codes to the inside of the peaks, by the noise to the outside.
+        for (jitter, noise) in [(2.0, 0.3), (0.6, 0.4), (4.0, 1.0)] {
+            let made = Made {
+                rows: 80_000,
+                word: 0x0200_5679,
+                noise,
+                jitter,
+                ..Made::CLEAN
+            };
+            let capture = made.capture();
+            let (_, mut model) = model(&capture, &made);
+            let lost = jitter * jitter * model.tone.angle().powi(2);
+            // As the fit finds them: the mean tone, and the peaks' spread in the noise.
+            let left = (-0.5 * lost).exp();
+            model.variance.jitter = (1.0 - left * left) / model.tone.angle().powi(2);
+            model.variance.base[0] += 0.5 * (AMPLITUDE * (1.0 - left * left)).powi(2);
+            model.declared[0][1] *= left;
+            let tone = [0.0, 0.0, -AMPLITUDE * left];
+            let found = cut(&capture, &model, 0, &tone);
+            assert_eq!(found, (Limits::NONE, 0.0), "{jitter}");
+        }
     }
 }

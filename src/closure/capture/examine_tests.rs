@@ -298,3 +298,27 @@ fn samples_lost_in_the_first_rows_are_counted() {
         assert_eq!(names(&found), [""; 0], "{seed}");
     }
 }
+
+#[test]
+fn the_phases_of_a_short_table_are_no_break() {
+    // Words near a ratio of small numbers: the truncated tone differs from block to block.
+    for (word, bits) in [
+        (1_742_787_059u32, 5),
+        (1_742_787_059, 4),
+        (1_288_490_205, 5),
+    ] {
+        for seed in 1..4 {
+            let steps = f64::powi(2.0, bits);
+            let short = codes(seed, word, |c, row, x| {
+                let turns = f64::from(word.wrapping_mul(row as u32)) / 4_294_967_296.0;
+                let signal = |turns: f64| match c {
+                    0 => -1500.0 * (TAU * turns).cos(),
+                    _ => 300.0 * (TAU * turns + 0.3).sin() + 90.0 * (TAU * turns + 0.3).cos(),
+                };
+                x + signal((turns * steps).floor() / steps) - signal(turns)
+            });
+            let (_, warnings) = examined(capture(short, meta(word))).unwrap();
+            assert_eq!(said(&warnings), [""; 0], "{word} {bits} {seed}");
+        }
+    }
+}

@@ -30,17 +30,17 @@ pub fn first_break(capture: &Capture, tone: &Tone) -> Option<Break> {
     let near = blocks.get(BLOCKS..(BLOCKS + AFTER).min(blocks.len()))?;
     let after = [0, 1].map(|c: usize| blocks::median_tone(near, c));
     let start = Start::of(capture, tone, &blocks, rows);
-    let without = start.costs(&after);
+    let without = start.least_so_far(&after, near);
     let most = (1u64 << (32 - word.trailing_zeros().min(31))).min(MOST + 1);
     let mut best: Option<(f64, usize, i64)> = None;
     for samples in 1..most as i64 {
         let turns = samples as f64 * tone.turns;
         let with = start.costs(&after.map(|t| turned(&t, -turns)));
-        let (mut sum, mut own) = (0.0, 0.0);
+        let mut own = 0.0;
         let mut here = (LEAST, 0);
         for (row, (with, without)) in with.iter().zip(&without).enumerate() {
-            sum += without - with;
             own += with;
+            let sum = without - own;
             // Both channels, one variance each.
             if own <= 2.0 * FITS * (row + 1) as f64 && sum > here.0 {
                 here = (sum, row + 1);
@@ -79,6 +79,21 @@ impl Start {
             rows: (0..rows).map(row).collect(),
             variances: [0, 1].map(|c: usize| noise(blocks, c)),
         }
+    }
+
+    /// Squared deviations of the rows up to each from the tone after them, or from that of any of the blocks `near`
+    /// if it fits better: where the tone differs from block to block (a coarse phase truncation), a start that
+    /// differs as much is no break.
+    fn least_so_far(&self, after: &[[f64; 3]; 2], near: &[Block]) -> Vec<f64> {
+        let mut least = vec![f64::INFINITY; self.rows.len()];
+        for tone in std::iter::once(after).chain(near.iter().map(|b| &b.tone)) {
+            let mut sum = 0.0;
+            for (least, cost) in least.iter_mut().zip(self.costs(tone)) {
+                sum += cost;
+                *least = least.min(sum);
+            }
+        }
+        least
     }
 
     /// Squared deviations of each row from a tone of both channels.

@@ -52,6 +52,8 @@ pub struct Fitted {
     pub residuals: [Vec<f64>; 2],
     /// Noise of both channels, from the spectrum.
     pub noise: [f64; 2],
+    /// Sine and cosine of both tones as they are in the codes, beside whatever else is there.
+    pub free: [[f64; 2]; 2],
 }
 
 /// The declared model.
@@ -165,15 +167,21 @@ fn round(
             let mut search = OwnSteps::new(capture, &model, base, &nuisance, &variants);
             let (set, own) = search.best();
             let wants_all_rows = search.wants_all_rows();
+            let free_lines = search.free_lines();
             model.coefficients = own.coefficients;
+            model.neutral.clone_from(&model.coefficients);
             match wants_all_rows {
                 true => {
                     // The steps are placed by now: what is small is left to the sums of all rows.
-                    model.neutral.clone_from(&model.coefficients);
                     gram = Gram::of(capture, &model);
                     Search::new(gram.all(), base, &nuisance, &variants).best_from(set)
                 }
-                false => (set, own.objective),
+                false if free_lines.is_empty() => (set, own.objective),
+                false => {
+                    gram = Gram::of(capture, &model);
+                    let mut search = Search::new(gram.all(), base, &nuisance, &variants);
+                    (search.with_lines(set, &free_lines), own.objective)
+                }
             }
         }
         false => {
@@ -203,6 +211,7 @@ fn round(
         jitter_taken,
         residuals: seen.residuals,
         noise: seen.noise,
+        free: seen.free,
     };
     (fitted, sharp)
 }
@@ -216,7 +225,7 @@ fn follow_lines(
     seen: &mut Around,
 ) -> [Option<Series>; 2] {
     for _ in 0..3 {
-        if !add_lines(capture, model, seen) {
+        if !add_lines(capture, known, model, seen) {
             break;
         }
         *seen = around(capture, model, base, false);

@@ -10,6 +10,8 @@ use std::f64::consts::TAU;
 
 /// Phases.
 const BINS: usize = 64;
+/// Times that the noise is fitted with the weights that it gives.
+const BASE_TURNS: usize = 5;
 
 /// Sums at a phase: rows, r, r^2, r^4, slope^2, cos(2 pi signal).
 type Sums = [f64; 6];
@@ -116,20 +118,27 @@ impl Squares {
         })
     }
 
-    /// Mean squares of the channels' noise without the jitter, given it.
+    /// Mean squares of the channels' noise without the jitter, given it. A mean square is known to a share of itself:
+    /// weights one over the square of what is expected of it, or, where the slope is steep, a jitter that is a few per
+    /// cent off would be most of what is left.
     pub fn base(&self, jitter: f64) -> [f64; 2] {
         [0, 1].map(|c: usize| {
-            let (mut n, mut sum) = (0.0, 0.0);
-            for [count, r, r2, _, slope2, _] in &self.bins[c] {
-                if *count > 1.0 {
-                    // Where the slope is steep the difference is uncertain.
-                    let weight =
-                        1.0 / (1.0 + jitter * slope2 / count / 0.01f64.max(r2 / count)).powi(2);
+            let mut base = 0.0;
+            for turn in 0..BASE_TURNS {
+                let (mut n, mut sum) = (0.0, 0.0);
+                for [count, r, r2, _, slope2, _] in self.bins[c].iter().filter(|b| b[0] > 1.0) {
+                    let late = jitter * slope2 / count;
+                    let expected = match turn {
+                        0 => r2 / count + late,
+                        _ => base + late,
+                    };
+                    let weight = expected.max(0.01).powi(-2);
                     n += weight * count;
                     sum += weight * (r2 - r * r / count - jitter * slope2);
                 }
+                base = if n > 0.0 { (sum / n).max(0.0) } else { 0.0 };
             }
-            if n > 0.0 { (sum / n).max(0.0) } else { 0.0 }
+            base
         })
     }
 
@@ -145,5 +154,43 @@ impl Squares {
             }
         }
         sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::columns::{COS, SIN};
+    use super::super::synthetic::{AMPLITUDE, Made, model};
+    use super::*;
+
+    #[test]
+    fn the_noise_beside_a_strong_jitter_is_that_of_the_peaks() {
+        let made = Made {
+            rows: 40_000,
+            word: 0x0200_5679,
+            noise: 0.4,
+            jitter: 2.0,
+            ..Made::CLEAN
+        };
+        let capture = made.capture();
+        let (_, model) = model(&capture, &made);
+        let angle = model.tone.angle();
+        let lost = 1.0 - (-(made.jitter * angle).powi(2)).exp();
+        let residual = |channel: usize, left: f64| -> Vec<f64> {
+            let at = |k: usize| model.declared[channel][k - SIN] + model.coefficients[channel][k];
+            let tone = |row: usize| {
+                let (sin, cos) = model.phases.at(row);
+                left * (at(SIN) * sin + at(COS) * cos)
+            };
+            let codes = capture.codes[channel].iter().enumerate();
+            codes.map(|(row, c)| f64::from(*c) - tone(row)).collect()
+        };
+        let [drive, sense] = [residual(0, (1.0 - lost).sqrt()), residual(1, 1.0)];
+        let squares = Squares::of(&capture, &model, [&drive, &sense], false);
+        // A jitter some per cent too small, as the rows leave it open.
+        let base = squares.base(0.94 * lost / angle.powi(2))[0];
+        // Noise, rounding, and what the bend of the tone at its peaks makes of the random instant.
+        let exact = 0.4f64.powi(2) + 1.0 / 12.0 + 0.5 * (lost * AMPLITUDE).powi(2);
+        assert!((base / exact - 1.0).abs() < 0.15, "{base} {exact}");
     }
 }

@@ -9,8 +9,9 @@
 //! [`wrong_codes`] (wrong codes), both on [`blocks`]; [`tone`] is the phase; [`columns`] are the functions of which effects are made, one
 //! file an effect ([`offset`], [`gain`], [`latency`], [`feedthrough`], [`nonlinearity`],
 //! [`harmonics`], [`mains`], [`spur`] with [`truncation`]); [`gram`] their sums and least squares;
-//! [`search`] chooses. Outside of the linear part are [`clipping`], [`missing`] (the histogram), [`jitter`] (the
-//! variance). [`spectrum`] gives noise and lines, [`wander`] the slow noise that must not pass for an
+//! [`search`] chooses. Outside of the linear part are [`clipping`] (with [`instant`]), [`missing`] (the histogram),
+//! [`jitter`] (the variance). [`spectrum`] gives noise and lines ([`rounding`]: those that are the quantiser's own),
+//! [`wander`] the slow noise that must not pass for an
 //! effect. [`around`] is the fit with every freedom, [`steps`] where the quantiser's
 //! steps are, [`own_steps`] the search where they show,
 //! [`fit`] runs all in rounds; [`report`] judges on held-out rows, with [`errors`], [`rivals`],
@@ -37,6 +38,7 @@ pub mod gram;
 pub mod harmonics;
 pub mod idle;
 pub mod input;
+pub mod instant;
 pub mod jitter;
 pub mod keys;
 pub mod latency;
@@ -51,6 +53,7 @@ mod refusal_tests;
 pub mod report;
 mod reported_steps;
 pub mod rivals;
+pub mod rounding;
 pub mod search;
 pub mod spectrum;
 pub mod spur;
@@ -167,9 +170,15 @@ pub fn analyse(capture: &Capture) -> Result<Findings> {
         )
         .into());
     }
-    let (known, plain) = known(capture, tone);
-    let fitted = fit::fit(capture, &known, tone, &plain);
-    let mut plain = plain;
+    let (mut known, mut plain) = known(capture, tone);
+    let mut fitted = fit::fit(capture, &known, tone, &plain);
+    // A truncated oscillator turns the sense tone, so that another carrier may be nearer: judged again beside it.
+    let carrier = nearest_carrier(capture, fitted.free[1]);
+    if carrier != known.in_phase {
+        known.in_phase = carrier;
+        plain = baseline(capture, &known, tone);
+        fitted = fit::fit(capture, &known, tone, &plain);
+    }
     plain.variance = fitted.model.variance;
     plain.variance.jitter = 0.0;
     Ok(report::findings(capture, &known, &plain, &fitted))
@@ -180,9 +189,7 @@ fn periods(capture: &Capture, tone: &Tone) -> f64 {
     (0.5 - tone.folded()).min(tone.folded()) * capture.rows() as f64
 }
 
-/// What the keys say, and the declared model fitted to the codes. The contract leaves open whether the rate's
-/// carrier is the sine or the cosine at `sense_phase_rad`, and its sign: of the four the one is
-/// taken that is nearest to the known rate, so that only what none explains counts as a deviation.
+/// What the keys say, and the declared model fitted to the codes.
 fn known(capture: &Capture, tone: Tone) -> (Known, Model) {
     let meta = &capture.meta;
     let mut known = Known {
@@ -193,22 +200,26 @@ fn known(capture: &Capture, tone: Tone) -> (Known, Model) {
         full_scale_codes: capture.full_scale_codes,
     };
     let free = baseline(capture, &known, tone);
-    if let (Some(rate), Some(scale), Some(phase)) = (
-        meta.rate_dps,
-        meta.sense_codes_per_dps,
-        meta.sense_phase_rad,
-    ) {
-        let at = |k: usize| free.coefficients[1].get(k).copied().unwrap_or(0.0);
-        let (sin, cos) = phase.sin_cos();
-        let carriers = [[cos, sin], [-sin, cos], [-cos, -sin], [sin, -cos]];
-        let off = |c: &[f64; 2]| (c[0] * at(SIN) + c[1] * at(COS) - rate * scale).abs();
-        let nearest = carriers
-            .into_iter()
-            .min_by(|a, b| off(a).total_cmp(&off(b)));
-        known.in_phase = nearest.map(|c| (c, rate * scale));
-    }
+    let at = |k: usize| free.coefficients[1].get(k).copied().unwrap_or(0.0);
+    known.in_phase = nearest_carrier(capture, [at(SIN), at(COS)]);
     let plain = baseline(capture, &known, tone);
     (known, plain)
+}
+
+/// The rate's carrier (its sine and cosine) and amplitude, if the rate is known; `found` is the sense tone as it is in
+/// the codes. The contract leaves open whether the carrier is the sine or the cosine at `sense_phase_rad`, and its
+/// sign: of the four the one is taken that is nearest to the known rate, so that only what none explains counts as a
+/// deviation.
+fn nearest_carrier(capture: &Capture, found: [f64; 2]) -> Option<([f64; 2], f64)> {
+    let meta = &capture.meta;
+    let codes = meta.rate_dps? * meta.sense_codes_per_dps?;
+    let (sin, cos) = meta.sense_phase_rad?.sin_cos();
+    let carriers = [[cos, sin], [-sin, cos], [-cos, -sin], [sin, -cos]];
+    let off = |c: &[f64; 2]| (c[0] * found[0] + c[1] * found[1] - codes).abs();
+    let nearest = carriers
+        .into_iter()
+        .min_by(|a, b| off(a).total_cmp(&off(b)))?;
+    Some((nearest, codes))
 }
 
 /// The declared model with its free carriers fitted.

@@ -83,6 +83,27 @@ impl<'a> OwnSteps<'a> {
         self.stride > 1 && self.phases.is_none()
     }
 
+    /// The lines that more rows than were looked at tell better, however few the tone's phases are: those that pass
+    /// all of them.
+    pub fn free_lines(&self) -> Vec<usize> {
+        if self.stride == 1 {
+            return Vec::new();
+        }
+        let lines = self.model.lines.iter().enumerate();
+        let is_free = |turns: f64| match &self.phases {
+            Some(phases) => {
+                let places = turns * f64::powi(2.0, 32 - phases.shift as i32);
+                let apart = (places - places.round()).abs();
+                apart * self.capture.rows() as f64 > f64::powi(2.0, 32 - phases.shift as i32)
+            }
+            None => true,
+        };
+        lines
+            .filter(|(_, turns)| is_free(**turns))
+            .map(|(i, _)| i)
+            .collect()
+    }
+
     fn combos(&self, set: &[usize]) -> (Vec<&'a Combo>, Vec<f64>) {
         combos_of(self.base, self.nuisance, self.variants, set)
     }

@@ -72,7 +72,12 @@ pub fn findings(capture: &Capture, known: &Known, plain: &Model, fitted: &Fitted
         for (turn, j) in order.iter().zip(&judged) {
             match turn {
                 _ if failed.is_some() => break,
-                Turn::Linear(k) if j.heldout_chi >= last => failed = Some(*k),
+                Turn::Linear(k)
+                    if j.heldout_chi >= last
+                        && !helps_the_others(capture, fitted, model, &search, (&set, *k)) =>
+                {
+                    failed = Some(*k);
+                }
                 Turn::Linear(_) | Turn::Clipping => last = j.heldout_chi,
                 _ => {}
             }
@@ -163,6 +168,25 @@ pub fn findings(capture: &Capture, known: &Known, plain: &Model, fitted: &Fitted
         lines: taken_lines(fitted, &set),
         models: [plain.clone(), last],
     }
+}
+
+/// Whether the held-out rows are nearer to all members of a set than to all but one. In few held-out rows two effects
+/// may cancel (an offset and half a period of the mains): each alone is then farther than none, both are nearer.
+fn helps_the_others(
+    capture: &Capture,
+    fitted: &Fitted,
+    last: &Model,
+    search: &Search,
+    (set, member): (&[usize], usize),
+) -> bool {
+    let chi = |set: &[usize]| {
+        let mut model = last.clone();
+        let (combos, solved) = search.solution(set);
+        model.coefficients = without_nuisance(fitted, &combos, &solved);
+        judge(capture, &model).heldout_chi
+    };
+    let fewer: Vec<usize> = set.iter().copied().filter(|k| *k != member).collect();
+    !fewer.is_empty() && chi(set) < chi(&fewer)
 }
 
 /// The member of a set that is least sure, if it is not sure enough.

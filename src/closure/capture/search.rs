@@ -142,6 +142,33 @@ impl<'a> Search<'a> {
         (set, score)
     }
 
+    /// A set with the variants added to it that are made of these lines alone and earn their place.
+    pub fn with_lines(&mut self, mut set: Vec<usize>, lines: &[usize]) -> Vec<usize> {
+        let is_line = |column: usize| {
+            let mut own = lines.iter().map(|i| super::columns::line(*i));
+            own.any(|(sin, cos)| column == sin || column == cos)
+        };
+        let is_of_lines =
+            |v: &Variant| v.combos.iter().flat_map(|c| &c.parts).all(|p| is_line(p.1));
+        let mut score = self.objective(&set);
+        for _ in 0..2 {
+            let others = self.others(&set).into_iter();
+            let others = others.filter(|k| self.variants.get(*k).is_some_and(is_of_lines));
+            let mut best: Option<(f64, Vec<usize>)> = None;
+            for other in others.collect::<Vec<_>>() {
+                let mut more = set.clone();
+                more.push(other);
+                let value = self.objective(&more);
+                if value > best.as_ref().map_or(score + LEAST, |b| b.0) {
+                    best = Some((value, more));
+                }
+            }
+            let Some((value, more)) = best else { break };
+            (score, set) = (value, more);
+        }
+        set
+    }
+
     /// Sets with an offset and a gain error in the place of a bend, which a step forward may have taken for both.
     pub fn straightened(&self, set: &[usize]) -> Vec<Vec<usize>> {
         let is = |k: &usize, effect: Effect| self.effect(*k) == Some(effect);

@@ -24,6 +24,8 @@ pub struct Line {
     pub surprise: f64,
     /// Channel in which it is stronger.
     pub channel: usize,
+    /// Amplitude in each channel as far as it stands out of the noise around it, codes.
+    pub amplitudes: [f64; 2],
 }
 
 impl Spectrum {
@@ -121,6 +123,12 @@ impl Spectrum {
         here.copied().unwrap_or(least) / self.variance(channel).max(least)
     }
 
+    /// The amplitude that a line at a bin has beyond three deviations of the noise, codes.
+    fn amplitude(&self, channel: usize, bin: usize, floor: &[f64]) -> f64 {
+        let of = |power: Option<&f64>| 2.0 * (power.copied().unwrap_or(0.0) / self.rows).sqrt();
+        (of(self.power[channel].get(bin)) - 3.0 * of(floor.get(bin))).max(0.0)
+    }
+
     /// Lines above their surroundings, strongest first, with less than one in a thousand by chance. Harmonics
     /// of the tone up to `harmonics`, zero frequency, and what is within `apart` resolutions of
     /// either are none.
@@ -147,6 +155,7 @@ impl Spectrum {
                     turns: k as f64 / self.bins as f64,
                     surprise: here.0,
                     channel: here.1,
+                    amplitudes: [0, 1].map(|c: usize| self.amplitude(c, k, &floors[c])),
                 });
             }
         }
