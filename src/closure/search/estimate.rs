@@ -8,6 +8,14 @@ use crate::closure::likelihood::whiten::Whitener;
 use nalgebra::DMatrix;
 use std::ops::Range;
 
+/// Rows up to which a threshold may lie far between two readings.
+const FEW_ROWS: usize = 50_000;
+
+/// Smallest move of a threshold that is looked at, as a share of the points' distance; how often it is doubled, and halved again.
+const SMALLEST: f64 = 1e-4;
+const DOUBLED: usize = 20;
+const HALVED: usize = 8;
+
 /// Step of a derivative, as a share of the points' distance in that parameter.
 const STEP: f64 = 0.05;
 
@@ -115,7 +123,7 @@ impl Covariance {
 impl Search<'_> {
     /// An estimate for each term. Standard deviations are those of generalised least squares with the
     /// declared coefficients, all terms' coefficients and, linearised, all non-linear parameters in one
-    /// covariance; a threshold between two readings gets the distance of the search's last step.
+    /// covariance; a threshold lies anywhere between the readings next to it.
     pub fn estimates(&self, model: &Model) -> Vec<Estimate> {
         let tangents = tangents(self.channels, model);
         let covariance = Covariance::new(self.channels, model, &tangents);
@@ -128,19 +136,70 @@ impl Search<'_> {
                     false => covariance.std(first + k),
                 };
                 let steps = tangent.steps.iter().enumerate();
+                let between = |k: usize| self.between_readings(model, term, &tangent.own, k);
                 Estimate {
                     point: term.point.clone(),
                     beta_std: (0..tangent.own.len()).map(own).collect(),
                     theta_std: steps
                         .map(|(k, step)| match covariance.std(of_theta + k) {
-                            s if s > 0.0 => s,
-                            _ => *step,
+                            s if s > 0.0 => s.max(between(k)),
+                            _ => step.max(between(k)),
                         })
                         .collect(),
                     beta: model.beta.get(tangent.own).unwrap_or(&[]).to_vec(),
                 }
             })
             .collect()
+    }
+
+    /// Standard deviation of a threshold that may lie anywhere where no row of the fit tells: it moves there without moving the
+    /// rows by more than the noise of one. 0 for a shape without sharp ends.
+    fn between_readings(&self, model: &Model, term: &Term, own: &Range<usize>, k: usize) -> f64 {
+        let c = self.channels;
+        let sharp = term.candidate.is_local() || term.candidate.is_whole();
+        let spacing = term.candidate.spacing(c, &term.point);
+        let (Some(spacing), true) = (spacing.get(k), sharp && c.len() <= FEW_ROWS) else {
+            return 0.0;
+        };
+        let beta = model.beta.get(own.clone()).unwrap_or(&[]);
+        let at = |by: f64| {
+            let mut point = term.point.clone();
+            point.theta[k] += by;
+            let columns = term.candidate.columns(c, &model.acting, &point);
+            let mut sum = vec![0.0; c.len()];
+            for (column, b) in columns.iter().zip(beta) {
+                add_scaled(&mut sum, *b, column);
+            }
+            sum
+        };
+        let here = at(0.0);
+        let is_seen = |by: f64| {
+            let there = at(by);
+            let rows = here.iter().zip(&there).zip(&self.used);
+            let used = rows.filter(|(_, used)| **used);
+            let square: f64 = used.map(|((a, b), _)| (a - b).powi(2)).sum();
+            square > model.fit.at.white_variance()
+        };
+        let reach = |sign: f64| {
+            let mut to = SMALLEST * spacing;
+            let mut doubled = 0;
+            while doubled < DOUBLED && !is_seen(sign * to) {
+                to *= 2.0;
+                doubled += 1;
+            }
+            let mut from = if doubled == 0 { 0.0 } else { 0.5 * to };
+            for _ in 0..HALVED {
+                let middle = 0.5 * (from + to);
+                if is_seen(sign * middle) {
+                    to = middle;
+                } else {
+                    from = middle;
+                }
+            }
+            from
+        };
+        // Evenly likely over the whole width.
+        (reach(1.0) + reach(-1.0)) / 12f64.sqrt()
     }
 }
 
@@ -191,5 +250,37 @@ mod tests {
                 "{i}"
             );
         }
+    }
+
+    /// A step at a temperature that the record leaps over is only known to be there.
+    #[test]
+    fn a_threshold_lies_anywhere_between_two_readings() {
+        let rows = 240;
+        let mut random = Random::new(5);
+        let time_s: Vec<f64> = (0..rows).map(|k| 10.0 * k as f64).collect();
+        // Two dwells of a slow ramp each, 9 K apart.
+        let degc: Vec<f64> = (0..rows)
+            .map(|k| {
+                let ramp = 0.05 * (k % 30) as f64;
+                ramp + if k / 30 % 2 == 0 { 20.0 } else { 30.5 }
+            })
+            .collect();
+        let output = degc
+            .iter()
+            .map(|t| f64::from(u8::from(*t > 28.0)) * 0.4 + 0.01 * random.normal());
+        let columns = BTreeMap::from([
+            ("rate_out_dps".to_owned(), output.collect()),
+            ("die_degc".to_owned(), degc.clone()),
+        ]);
+        let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+        let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+        let candidate = search.candidates().iter();
+        let step = candidate.clone().find(|c| c.id() == "stress_jump").unwrap();
+        let middle = (26.0 - c.middle_degc) / c.kelvin_per_u;
+        let model = search.model(&[Term::new(step.clone(), Point::at(0, &[middle]))]);
+        let estimates = search.estimates(&model.unwrap());
+        let std_k = estimates[0].theta_std[0] * c.kelvin_per_u;
+        // Nine kelvins without a reading, evenly likely.
+        assert!((2.0..3.2).contains(&std_k), "{std_k}");
     }
 }

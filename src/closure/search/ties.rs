@@ -5,7 +5,7 @@
 //! in the next.
 
 use super::judge::{EQUAL, Judged};
-use super::{Found, MOST_RIVALS, Model, Search, Term};
+use super::{Found, LEVEL, MOST_RIVALS, Model, Search, Term};
 use crate::closure::likelihood::Unusable;
 use crate::closure::smooth::reading_noise;
 
@@ -19,45 +19,82 @@ const OFTEN: f64 = 0.3;
 /// Most log-likelihood that the noise of a channel accounts for.
 const MOST_BLUR: f64 = 12.0;
 
+/// Net gain by which an equal takes a step's place.
+const BETTER: f64 = 1.5;
+
+/// A step, and what was tried in its place.
+struct Tried<'a> {
+    /// The model of all steps, and the net gain of this one seen from the others.
+    model: &'a Model,
+    same: &'a Judged,
+    without: &'a Model,
+    k: usize,
+}
+
 impl Search<'_> {
-    /// Adds to the rivals of each step what does as well in its place.
+    /// Adds to the rivals of each step what does as well in its place, and names the best of them.
     ///
     /// # Errors
     /// Too few rows.
     pub(super) fn with_ties(&self, found: &mut Found) -> Result<(), Unusable> {
-        let model = self.model(&found.terms)?;
         for k in 0..found.terms.len() {
-            let own = &found.terms[k];
+            let model = self.model(&found.terms)?;
+            let own = found.terms[k].clone();
             if own.evident || own.candidate.is_whole() {
                 continue;
             }
             let mut others = found.terms.clone();
             others.remove(k);
             let without = self.model(&others)?;
-            let round = self.round(&without, 0);
+            let round = self.round(&without, self.effort.surrogates);
             let Some(same) = round.judged.iter().find(|j| j.candidate.id() == own.id()) else {
                 continue;
             };
-            let mut ties = Vec::new();
-            for rival in self.near_ones(&round.judged, same, own) {
+            let tried = Tried {
+                model: &model,
+                same,
+                without: &without,
+                k,
+            };
+            let mut rivals = own.rivals.clone();
+            let mut better: Option<(Term, f64)> = None;
+            for rival in self.near_ones(&round.judged, same, &own) {
                 let mut terms = others.clone();
                 terms.insert(k, Term::of(rival, Vec::new()));
                 let with = self.tried(&terms, k)?;
-                let behind = self.net(&model) - self.net(&with) - rival.odds_against;
-                let blur = self.blur_of(&with, k) - self.blur_of(&model, k);
-                let wins = || self.selection_frequency(&with, k, &without, [same]) >= OFTEN;
-                if behind < EQUAL + blur.clamp(0.0, MOST_BLUR) || wins() {
-                    ties.push(rival.candidate.id());
+                let id = rival.candidate.id();
+                if self.is_tie(&tried, &with, rival) && !rivals.contains(&id) {
+                    rivals.push(id.clone());
+                }
+                let net = self.net(&with);
+                if rivals.contains(&id)
+                    && rival.p_value <= LEVEL
+                    && net > better.as_ref().map_or(self.net(&model) + BETTER, |b| b.1)
+                {
+                    better = Some((with.terms[k].clone(), net));
                 }
             }
-            let rivals = &mut found.terms[k].rivals;
-            rivals.extend(ties);
+            if let Some((mut term, _)) = better {
+                rivals.retain(|id| *id != term.id());
+                rivals.insert(0, own.id());
+                term.beside = others.iter().map(Term::id).collect();
+                found.terms[k] = term;
+            }
             rivals.truncate(MOST_RIVALS);
+            found.terms[k].rivals = rivals;
         }
         Ok(())
     }
 
-    /// Names next to a step's, best first, that are not its rivals yet.
+    /// Whether a model with another name in a step's place is as good.
+    fn is_tie(&self, of: &Tried<'_>, with: &Model, rival: &Judged) -> bool {
+        let behind = self.net(of.model) - self.net(with) - rival.odds_against;
+        let blur = self.blur_of(with, of.k) - self.blur_of(of.model, of.k);
+        behind < EQUAL + blur.clamp(0.0, MOST_BLUR)
+            || self.selection_frequency(with, of.k, of.without, [of.same]) >= OFTEN
+    }
+
+    /// Names next to a step's, best first.
     fn near_ones<'j>(
         &'j self,
         judged: &'j [Judged],
@@ -67,10 +104,7 @@ impl Search<'_> {
         let names = judged
             .iter()
             .filter(|j| j.candidate.named() && !j.candidate.is_whole());
-        let others = names.filter(|j| {
-            let id = j.candidate.id();
-            id != own.id() && !own.rivals.contains(&id)
-        });
+        let others = names.filter(|j| j.candidate.id() != own.id());
         let near = others.filter(|j| j.net + j.odds_against > same.net - BEHIND);
         near.filter(|j| !self.is_another_channels(&j.candidate.id(), &j.point))
             .take(LOOKED)
