@@ -9,18 +9,30 @@ use std::collections::VecDeque;
 /// Entries that are kept: a search comes back to what it has just left.
 const KEPT: usize = 32;
 
+/// The same of shapes alone, which are small: another beginning of the search comes by most of the first one's.
+pub const MANY: usize = 512;
+
 /// Terms by their ids and shapes, in order.
 type Key = Vec<(String, Point)>;
 
 /// The latest results by the terms that they belong to.
 pub struct Memo<T> {
     entries: RefCell<VecDeque<(Key, T)>>,
+    kept: usize,
 }
 
 impl<T> Default for Memo<T> {
     fn default() -> Self {
+        Memo::of(KEPT)
+    }
+}
+
+impl<T> Memo<T> {
+    /// One that keeps so many.
+    pub fn of(kept: usize) -> Self {
         Memo {
             entries: RefCell::new(VecDeque::new()),
+            kept,
         }
     }
 }
@@ -47,7 +59,7 @@ impl<T: Clone> Memo<T> {
         let key = key(terms);
         let mut entries = self.entries.borrow_mut();
         entries.retain(|e| e.0 != key);
-        if entries.len() == KEPT {
+        if entries.len() == self.kept {
             entries.pop_front();
         }
         entries.push_back((key, value));

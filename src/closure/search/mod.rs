@@ -175,6 +175,7 @@ pub struct Search<'a> {
     candidates: Vec<Arc<dyn Candidate>>,
     models: Memo<Arc<Model>>,
     rounds: Memo<Arc<Round>>,
+    polishes: Memo<Vec<Point>>,
     beginning: RefCell<Beginning>,
 }
 
@@ -206,6 +207,7 @@ impl<'a> Search<'a> {
             candidates,
             models: Memo::default(),
             rounds: Memo::default(),
+            polishes: Memo::of(memo::MANY),
             beginning: RefCell::default(),
         };
         search.effort.rows = search.fitted_rows();

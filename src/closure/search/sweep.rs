@@ -65,7 +65,21 @@ impl Search<'_> {
     /// # Errors
     /// Too few rows.
     pub fn polished(&self, model: Model) -> Result<Model, Unusable> {
-        let mut model = model;
+        let given = model.terms.clone();
+        if let Some(points) = self.polishes.get(&given) {
+            let mut terms = given;
+            for (term, point) in terms.iter_mut().zip(points) {
+                term.point = point;
+            }
+            return self.model(&terms);
+        }
+        let polished = self.polished_anew(model)?;
+        let points = polished.terms.iter().map(|t| t.point.clone());
+        self.polishes.keep(&given, points.collect());
+        Ok(polished)
+    }
+
+    fn polished_anew(&self, mut model: Model) -> Result<Model, Unusable> {
         for _ in 0..POLISHES {
             let before: Vec<Point> = model.terms.iter().map(|t| t.point.clone()).collect();
             model = self.polished_once(model, 0)?;

@@ -227,7 +227,6 @@ impl Search<'_> {
         let c = self.channels;
         let few = (!tone::returns(c, frequency_hz)).then(|| "time_s".to_owned());
         few.or_else(|| Some(waving(c, frequency_hz)?.name))
-            .or_else(|| paces(c, frequency_hz).then(|| c.thermometer.clone()))
     }
 
     /// Whether a tone in a model, with nothing left beside it, is no answer to a channel that swings with it for the most part: what
@@ -238,7 +237,7 @@ impl Search<'_> {
         let Some(frequency_hz) = frequency_hz.filter(|hz| tone::returns(c, *hz)) else {
             return false;
         };
-        let Some(wave) = waving(c, frequency_hz).filter(|_| !paces(c, frequency_hz)) else {
+        let Some(wave) = waving(c, frequency_hz) else {
             return false;
         };
         let all = model.contributions(c);
@@ -310,7 +309,7 @@ impl Search<'_> {
 /// A channel that swings.
 struct Wave {
     name: String,
-    /// Share of its square, or of the square of its square, that is the sinusoid's.
+    /// Share of its square, of the square of its square or of that of its squared rate that is the sinusoid's.
     share: f64,
 }
 
@@ -334,7 +333,8 @@ fn share(both: &Basis, column: &[f64]) -> f64 {
     }
 }
 
-/// The channel that is a sinusoid of a frequency for the most part, or whose square is, more than any other.
+/// The channel that is a sinusoid of a frequency for the most part, or whose square is, more than any other; or the temperature,
+/// where it changes at that pace.
 fn waving(c: &Channels, frequency_hz: f64) -> Option<Wave> {
     let both = Basis::new(&[vec![vec![1.0; c.len()]], pair(c, frequency_hz)].concat());
     // What answers to both signs alike swings twice as often.
@@ -349,16 +349,22 @@ fn waving(c: &Channels, frequency_hz: f64) -> Option<Wave> {
     let names = c.columns.keys().filter(|name| *name != "time_s");
     let others = names.filter_map(|name| Some(of(name, c.moving(name)?)));
     let all = [of(&c.thermometer, &c.u)].into_iter().chain(others);
-    all.filter(|wave| wave.share > WAVING)
+    let waves = all.filter(|wave| wave.share > WAVING);
+    let pace = Wave {
+        name: c.thermometer.clone(),
+        share: pace(c, frequency_hz),
+    };
+    waves
+        .chain((pace.share > PACE).then_some(pace))
         .max_by(|a, b| a.share.total_cmp(&b.share))
 }
 
-/// Whether the temperature changes at the pace of a frequency: its squared rate has a line there, as that of a staircase of
-/// temperatures has.
-fn paces(c: &Channels, frequency_hz: f64) -> bool {
+/// Share of the temperature's squared rate that a line at a frequency has, or next to it: that of a staircase of temperatures has
+/// one at its pace.
+fn pace(c: &Channels, frequency_hz: f64) -> f64 {
     let span_s = c.span_s();
     if span_s <= 0.0 {
-        return false;
+        return 0.0;
     }
     let squared = map(&slope(&c.time_s, &c.u, 1), |v| v * v);
     let near = (-AROUND..=AROUND).map(|k| 0.5 * f64::from(k) / f64::from(AROUND) / span_s);
@@ -366,7 +372,7 @@ fn paces(c: &Channels, frequency_hz: f64) -> bool {
         let both = vec![vec![vec![1.0; c.len()]], pair(c, frequency_hz + by_hz)].concat();
         share(&Basis::new(&both), &squared)
     };
-    near.map(line).any(|share| share > PACE)
+    near.map(line).fold(0.0, f64::max)
 }
 
 #[cfg(test)]
