@@ -369,7 +369,7 @@ fn pace(c: &Channels, frequency_hz: f64) -> f64 {
     let squared = map(&slope(&c.time_s, &c.u, 1), |v| v * v);
     let near = (-AROUND..=AROUND).map(|k| 0.5 * f64::from(k) / f64::from(AROUND) / span_s);
     let line = |by_hz: f64| {
-        let both = vec![vec![vec![1.0; c.len()]], pair(c, frequency_hz + by_hz)].concat();
+        let both = [vec![vec![1.0; c.len()]], pair(c, frequency_hz + by_hz)].concat();
         share(&Basis::new(&both), &squared)
     };
     near.map(line).fold(0.0, f64::max)

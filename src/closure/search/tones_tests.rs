@@ -139,7 +139,7 @@ fn on_stairs(
 #[test]
 fn the_pace_of_a_staircase_is_no_pickup() {
     for seed in 0..4 {
-        let (names, _) = on_stairs(seed, 240, (5, 4), |rate, _| 0.03 * rate * rate);
+        let (names, _) = on_stairs(seed, 140, (3, 6), |rate, _| 0.02 * rate * rate);
         assert!(
             !names.contains(&"periodic_pickup".to_owned()),
             "{seed} {names:?}"
