@@ -46,7 +46,7 @@ impl Search<'_> {
             let mut others = found.terms.clone();
             others.remove(k);
             let without = self.model(&others)?;
-            let round = self.round(&without, self.effort.surrogates);
+            let round = self.round(&without, 0);
             let Some(same) = round.judged.iter().find(|j| j.candidate.id() == own.id()) else {
                 continue;
             };
@@ -67,14 +67,18 @@ impl Search<'_> {
                     rivals.push(id.clone());
                 }
                 let net = self.net(&with);
+                // What a clip is of was judged with the rows out that it holds.
                 if rivals.contains(&id)
-                    && rival.p_value <= LEVEL
+                    && !rival.candidate.is_whole()
                     && net > better.as_ref().map_or(self.net(&model) + BETTER, |b| b.1)
                 {
                     better = Some((with.terms[k].clone(), net));
                 }
             }
-            if let Some((mut term, _)) = better {
+            if let Some((mut term, _)) = better
+                && let Some(p_value) = self.chance(&without, &term)
+            {
+                term.p_value = p_value;
                 rivals.retain(|id| *id != term.id());
                 rivals.insert(0, own.id());
                 term.beside = others.iter().map(Term::id).collect();
@@ -84,6 +88,13 @@ impl Search<'_> {
             found.terms[k].rivals = rivals;
         }
         Ok(())
+    }
+
+    /// The probability of a name beside a model, if it is beyond chance.
+    fn chance(&self, without: &Model, term: &Term) -> Option<f64> {
+        let round = self.round(without, self.effort.surrogates);
+        let same = round.judged.iter().find(|j| j.candidate.id() == term.id());
+        same.map(|j| j.p_value).filter(|p| *p <= LEVEL)
     }
 
     /// Whether a model with another name in a step's place is as good.
@@ -101,9 +112,7 @@ impl Search<'_> {
         same: &'j Judged,
         own: &'j Term,
     ) -> impl Iterator<Item = &'j Judged> {
-        let names = judged
-            .iter()
-            .filter(|j| j.candidate.named() && !j.candidate.is_whole());
+        let names = judged.iter().filter(|j| j.candidate.named());
         let others = names.filter(|j| j.candidate.id() != own.id());
         let near = others.filter(|j| j.net + j.odds_against > same.net - BEHIND);
         near.filter(|j| !self.is_another_channels(&j.candidate.id(), &j.point))
