@@ -243,7 +243,7 @@ impl Search<'_> {
         let all = model.contributions(c);
         let used = all[own].iter().zip(&self.used).filter(|(_, used)| **used);
         let square: f64 = used.map(|(v, _)| v * v).sum();
-        let beyond = square * (1.0 - wave.share) / wave.share * SMOOTHED;
+        let beyond = square * (1.0 - wave.share) / wave.share * wave.kept;
         let white = model.fit.noise.white_rms_dps.max(f64::MIN_POSITIVE);
         0.5 * beyond > SEEN * white * white && self.is_clean(model)
     }
@@ -311,6 +311,8 @@ struct Wave {
     name: String,
     /// Share of its square, of the square of its square or of that of its squared rate that is the sinusoid's.
     share: f64,
+    /// Share of the square of the rest that an effect of it keeps at least.
+    kept: f64,
 }
 
 /// Sine and cosine of a frequency at the rows.
@@ -345,6 +347,7 @@ fn waving(c: &Channels, frequency_hz: f64) -> Option<Wave> {
     let of = |name: &str, column: &[f64]| Wave {
         name: name.to_owned(),
         share: share(&both, column).max(share(&both, &square(column))),
+        kept: SMOOTHED,
     };
     let names = c.columns.keys().filter(|name| *name != "time_s");
     let others = names.filter_map(|name| Some(of(name, c.moving(name)?)));
@@ -353,6 +356,8 @@ fn waving(c: &Channels, frequency_hz: f64) -> Option<Wave> {
     let pace = Wave {
         name: c.thermometer.clone(),
         share: pace(c, frequency_hz),
+        // Of rates between rows the readings' slopes over rows show no more than the pace.
+        kept: SMOOTHED.powi(2),
     };
     waves
         .chain((pace.share > PACE).then_some(pace))
