@@ -43,18 +43,7 @@ impl Tangent {
         let columns = term.candidate.columns(c, &model.acting, &term.point);
         let own = first..first + columns.len();
         let beta = model.beta.get(own.clone()).unwrap_or(&[]);
-        let moved = |parameter: usize, by: f64| {
-            let mut point = term.point.clone();
-            if let Some(theta) = point.theta.get_mut(parameter) {
-                *theta += by;
-            }
-            let mut sum = vec![0.0; c.len()];
-            let columns = term.candidate.columns(c, &model.acting, &point);
-            for (column, b) in columns.iter().zip(beta) {
-                add_scaled(&mut sum, *b, column);
-            }
-            sum
-        };
+        let moved = |parameter: usize, by: f64| moved(c, model, (term, beta), (parameter, by));
         let spacing = term.candidate.spacing(c, &term.point);
         let steps: Vec<f64> = spacing.iter().map(|s| STEP * s).collect();
         let slope = |(k, step): (usize, &f64)| {
@@ -70,6 +59,25 @@ impl Tangent {
             steps,
         }
     }
+}
+
+/// What a term with its coefficients contributes, deg/s, every row, where one of its non-linear parameters is moved.
+fn moved(
+    c: &Channels,
+    model: &Model,
+    (term, beta): (&Term, &[f64]),
+    (parameter, by): (usize, f64),
+) -> Vec<f64> {
+    let mut point = term.point.clone();
+    if let Some(theta) = point.theta.get_mut(parameter) {
+        *theta += by;
+    }
+    let mut sum = vec![0.0; c.len()];
+    let columns = term.candidate.columns(c, &model.acting, &point);
+    for (column, b) in columns.iter().zip(beta) {
+        add_scaled(&mut sum, *b, column);
+    }
+    sum
 }
 
 /// The tangents of a model's terms, in their order.
@@ -162,16 +170,7 @@ impl Search<'_> {
             return 0.0;
         };
         let beta = model.beta.get(own.clone()).unwrap_or(&[]);
-        let at = |by: f64| {
-            let mut point = term.point.clone();
-            point.theta[k] += by;
-            let columns = term.candidate.columns(c, &model.acting, &point);
-            let mut sum = vec![0.0; c.len()];
-            for (column, b) in columns.iter().zip(beta) {
-                add_scaled(&mut sum, *b, column);
-            }
-            sum
-        };
+        let at = |by: f64| moved(c, model, (term, beta), (k, by));
         let here = at(0.0);
         let is_seen = |by: f64| {
             let there = at(by);

@@ -11,7 +11,7 @@ use crate::closure::likelihood::noise::Shape;
 use crate::closure::likelihood::reml::Fit;
 
 /// Net gain by which another candidate takes a term's place.
-const BETTER: f64 = 1.5;
+pub(super) const BETTER: f64 = 1.5;
 
 /// Most polishes in a row.
 const POLISHES: usize = 3;

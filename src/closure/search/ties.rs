@@ -5,6 +5,7 @@
 //! in the next.
 
 use super::judge::{EQUAL, Judged};
+use super::sweep::BETTER;
 use super::{Found, LEVEL, MOST_RIVALS, Model, Search, Term};
 use crate::closure::likelihood::Unusable;
 use crate::closure::smooth::reading_noise;
@@ -19,15 +20,14 @@ const OFTEN: f64 = 0.3;
 /// Most log-likelihood that the noise of a channel accounts for.
 const MOST_BLUR: f64 = 12.0;
 
-/// Net gain by which an equal takes a step's place.
-const BETTER: f64 = 1.5;
-
-/// A step, and what was tried in its place.
-struct Tried<'a> {
-    /// The model of all steps, and the net gain of this one seen from the others.
+/// A step that another name is tried in the place of.
+struct Place<'a> {
+    /// The model of all steps, and of all but this one.
     model: &'a Model,
-    same: &'a Judged,
     without: &'a Model,
+    /// The step as it is judged beside the others.
+    same: &'a Judged,
+    /// Its place among the terms.
     k: usize,
 }
 
@@ -50,10 +50,10 @@ impl Search<'_> {
             let Some(same) = round.judged.iter().find(|j| j.candidate.id() == own.id()) else {
                 continue;
             };
-            let tried = Tried {
+            let place = Place {
                 model: &model,
-                same,
                 without: &without,
+                same,
                 k,
             };
             let mut rivals = own.rivals.clone();
@@ -63,7 +63,7 @@ impl Search<'_> {
                 terms.insert(k, Term::of(rival, Vec::new()));
                 let with = self.tried(&terms, k)?;
                 let id = rival.candidate.id();
-                if self.is_tie(&tried, &with, rival) && !rivals.contains(&id) {
+                if self.is_tie(&place, &with, rival) && !rivals.contains(&id) {
                     rivals.push(id.clone());
                 }
                 let net = self.net(&with);
@@ -98,7 +98,7 @@ impl Search<'_> {
     }
 
     /// Whether a model with another name in a step's place is as good.
-    fn is_tie(&self, of: &Tried<'_>, with: &Model, rival: &Judged) -> bool {
+    fn is_tie(&self, of: &Place<'_>, with: &Model, rival: &Judged) -> bool {
         let behind = self.net(of.model) - self.net(with) - rival.odds_against;
         let blur = self.blur_of(with, of.k) - self.blur_of(of.model, of.k);
         behind < EQUAL + blur.clamp(0.0, MOST_BLUR)
