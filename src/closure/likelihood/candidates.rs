@@ -2,7 +2,7 @@
 //! parameters, each point of the grid one or a few columns.
 //!
 //! Everything happens among the error contrasts of the declared regressors (what is left of a
-//! whitened record after projecting them off), so that the declared model costs the candidates
+//! whitened record without them, [`super::partial`]), so that the declared model costs the candidates
 //! nothing but degrees of freedom. A point's likelihood ratio with the noise's shape **held** is
 //! -nu ln(1 - R^2), R^2 being the share of the contrasts' sum of squares that it explains. A
 //! **profiled** ratio lets the null hypothesis and the candidate each choose the shape that suits
@@ -14,17 +14,15 @@
 //! the pointwise chi-square probability.
 
 use super::lattice::{Evaluated, profile};
-use super::linear::{Basis, dot, dots};
+use super::linear::{Basis, dot};
 use super::noise::Shape;
-use super::null::bartlett;
+use super::partial::Partial;
 use super::reml::Fit;
 use super::tail::chi_square_surprise;
 use super::whiten::Whitener;
-use std::ops::Range;
 
-/// A column of which less than this share survives the projection lies in the declared model: it is
-/// not excited.
-pub const SURVIVAL: f64 = 1e-4;
+/// Points whose columns are whitened and multiplied side by side: they stay in the cache.
+const BATCH: usize = 16;
 
 /// One candidate effect: its points, each the columns of the effect at one value of its non-linear
 /// parameters, in the rows of [`Fit::problem`] ([`Fit::reduce`]).
@@ -32,86 +30,6 @@ pub const SURVIVAL: f64 = 1e-4;
 pub struct Group {
     /// point, column, row.
     pub points: Vec<Vec<Vec<f64>>>,
-}
-
-/// The directions of a point.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Point {
-    /// Its orthonormal columns among [`Directions::columns`]; empty if it is not excited.
-    pub range: Range<usize>,
-    /// Norm of each given column after the projection, per unit of its parameter, in units of the
-    /// white standard deviation: one over it (times the white rms) is the parameter's standard
-    /// deviation if it is the only one. 0 if not excited.
-    pub excitation: Vec<f64>,
-    /// The given columns that are among the directions.
-    pub kept: Vec<usize>,
-}
-
-/// A dictionary at one shape of the noise: orthonormal directions of every point.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Directions {
-    /// The directions of all points, one after the other.
-    pub columns: Vec<Vec<f64>>,
-    /// All points of all groups in order.
-    pub points: Vec<Point>,
-}
-
-impl Directions {
-    /// Whitens and projects the dictionary.
-    pub fn new(groups: &[Group], whitener: &Whitener, declared: &Basis) -> Self {
-        let points: Vec<&Vec<Vec<f64>>> = groups.iter().flat_map(|g| &g.points).collect();
-        let all: Vec<&[f64]> = points
-            .iter()
-            .flat_map(|p| p.iter().map(Vec::as_slice))
-            .collect();
-        let mut white = whitener.apply_all(&all).into_iter();
-        let mut out = Directions {
-            columns: Vec::with_capacity(all.len()),
-            points: Vec::with_capacity(points.len()),
-        };
-        for point in points {
-            let start = out.columns.len();
-            let mut own = Basis::default();
-            let (mut excitation, mut kept) = (Vec::new(), Vec::new());
-            for (index, mut column) in white.by_ref().take(point.len()).enumerate() {
-                let before = dot(&column, &column).sqrt();
-                // A direction keeps at least [`SURVIVAL`]: one pass leaves 1e-12 of the declared model.
-                declared.project_off_once(&mut column);
-                let after = dot(&column, &column).sqrt();
-                let excited = after > SURVIVAL * before && after.is_finite();
-                excitation.push(if excited { after } else { 0.0 });
-                if excited && own.push(&column) {
-                    kept.push(index);
-                }
-            }
-            out.columns.append(&mut own.q);
-            out.points.push(Point {
-                range: start..out.columns.len(),
-                excitation,
-                kept,
-            });
-        }
-        out
-    }
-
-    /// The largest canonical correlation of two points: 1 = one explains whatever the other does.
-    pub fn correlation(&self, a: usize, b: usize) -> f64 {
-        let columns = |i: usize| -> &[Vec<f64>] {
-            let range = self.points.get(i).map_or(0..0, |p| p.range.clone());
-            self.columns.get(range).unwrap_or(&[])
-        };
-        let (a, b) = (columns(a), columns(b));
-        if a.is_empty() || b.is_empty() {
-            return 0.0;
-        }
-        let products = dots(a, b);
-        let matrix = nalgebra::DMatrix::from_row_slice(a.len(), b.len(), &products);
-        matrix
-            .singular_values()
-            .iter()
-            .fold(0.0, |m: f64, s| m.max(*s))
-            .min(1.0)
-    }
 }
 
 /// The shapes of the noise that scores are taken over.
@@ -190,8 +108,8 @@ pub struct AtShape {
     pub rss: Vec<f64>,
     /// What each point explains of it: [point * signals + signal].
     pub gain: Vec<f64>,
-    /// The dictionary at this shape.
-    pub directions: Directions,
+    /// Columns of each point that are excited.
+    pub degrees: Vec<usize>,
 }
 
 impl AtShape {
@@ -199,20 +117,28 @@ impl AtShape {
     pub fn new(fit: &Fit, groups: &[Group], signals: &[Vec<f64>], shape: Shape) -> Self {
         let whitener = Whitener::new(&fit.problem.line, shape);
         let declared = Basis::new(&whitener.apply_all(&fit.problem.columns));
-        let directions = Directions::new(groups, &whitener, &declared);
         let mut white = whitener.apply_all(signals);
         for column in &mut white {
             declared.project_off(column);
         }
-        let products = dots(&directions.columns, &white);
+        let partial = Partial::new(&declared, &white);
+        let points: Vec<&Vec<Vec<f64>>> = groups.iter().flat_map(|g| &g.points).collect();
         let count = signals.len();
-        let mut gain = vec![0.0; directions.points.len() * count];
-        for (point, gain) in directions.points.iter().zip(gain.chunks_mut(count.max(1))) {
-            for direction in point.range.clone() {
-                let row = &products[direction * count..(direction + 1) * count];
-                for (g, z) in gain.iter_mut().zip(row) {
-                    *g += z * z;
-                }
+        let mut gain = vec![0.0; points.len() * count];
+        let mut degrees = Vec::with_capacity(points.len());
+        let batches = gain.chunks_mut((BATCH * count).max(1));
+        for (points, gain) in points.chunks(BATCH).zip(batches) {
+            let columns: Vec<&[f64]> = points
+                .iter()
+                .flat_map(|p| p.iter().map(Vec::as_slice))
+                .collect();
+            let columns = whitener.apply_all(&columns);
+            let products = partial.products(&columns);
+            let mut next = 0;
+            for (point, gain) in points.iter().zip(gain.chunks_mut(count.max(1))) {
+                let own = next..next + point.len();
+                next = own.end;
+                degrees.push(products.explained(own, gain));
             }
         }
         AtShape {
@@ -220,7 +146,7 @@ impl AtShape {
             contrasts: whitener.used.saturating_sub(declared.rank()),
             rss: white.iter().map(|c| dot(c, c)).collect(),
             gain,
-            directions,
+            degrees,
         }
     }
 
@@ -242,6 +168,12 @@ impl AtShape {
     pub fn with_point(&self, point: usize, signal: usize) -> f64 {
         self.null(signal) + 0.5 * self.contrasts as f64 * self.ratio(point, signal)
     }
+}
+
+/// Multiplier of -ln(1 - R^2), R^2 being the share that `degrees` columns explain of `contrasts`,
+/// that makes it chi-square with `degrees` degrees of freedom on average (Bartlett 1937).
+pub fn bartlett(contrasts: usize, degrees: usize) -> f64 {
+    (contrasts as f64 - 0.5 * degrees as f64 - 1.0).max(1.0)
 }
 
 /// The surprise of a profiled gain in log-likelihood.

@@ -2,7 +2,7 @@
 //! so that the bits do not depend on the processor.
 
 use super::wide::{Kernel, widest};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 /// A pivot that falls below this share of the column's norm is rounding: the column lies in the
 /// span of those before it.
@@ -60,12 +60,11 @@ pub fn add_scaled(y: &mut [f64], factor: f64, x: &[f64]) {
     }
 }
 
-/// Takes orthonormal columns out of another, `passes` times; adds what was taken to `taken`.
+/// Takes orthonormal columns out of another, twice; adds what was taken to `taken`.
 struct Projection<'a> {
     q: &'a [Vec<f64>],
     column: &'a mut [f64],
     taken: &'a mut [f64],
-    passes: usize,
 }
 
 impl Kernel for Projection<'_> {
@@ -73,7 +72,7 @@ impl Kernel for Projection<'_> {
 
     #[inline(always)]
     fn run(self) {
-        for _ in 0..self.passes {
+        for _ in 0..2 {
             for (q, t) in self.q.iter().zip(self.taken.iter_mut()) {
                 let part = product(q, self.column);
                 *t += part;
@@ -133,22 +132,11 @@ impl Basis {
 
     /// Takes the span out of a column, twice; returns what was taken, in coordinates of Q.
     pub fn project_off(&self, column: &mut [f64]) -> Vec<f64> {
-        self.project_off_in(2, column)
-    }
-
-    /// Takes the span out of a column once: enough for a column of which a share is left that is large against
-    /// the rounding of its norm.
-    pub fn project_off_once(&self, column: &mut [f64]) {
-        self.project_off_in(1, column);
-    }
-
-    fn project_off_in(&self, passes: usize, column: &mut [f64]) -> Vec<f64> {
         let mut taken = vec![0.0; self.q.len()];
         widest(Projection {
             q: &self.q,
             column,
             taken: &mut taken,
-            passes,
         });
         taken
     }
@@ -198,6 +186,79 @@ impl Basis {
         }
         out
     }
+}
+
+/// A pivot that falls below this share of the column's square is the rounding of products of columns.
+const ROUNDED: f64 = 1e-12;
+
+/// Cholesky's factor of the products of columns, column by column.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Factor {
+    /// The columns that are in.
+    pub kept: Vec<usize>,
+    /// Row k of the factor: k + 1 values.
+    rows: Vec<Vec<f64>>,
+}
+
+impl Factor {
+    /// Adds a column of a sum of squares (`square`, beyond whatever all columns are taken beyond) and products with the earlier ones.
+    /// False where no more than `least` of its square is beyond those: then it stays out.
+    pub fn push(
+        &mut self,
+        column: usize,
+        square: f64,
+        least: f64,
+        product: impl Fn(usize) -> f64,
+    ) -> bool {
+        let mut pivot = square;
+        let mut row: Vec<f64> = Vec::with_capacity(self.kept.len() + 1);
+        for (earlier, of_earlier) in self.kept.iter().zip(&self.rows) {
+            let known: f64 = row.iter().zip(of_earlier).map(|(a, b)| a * b).sum();
+            let entry = (product(*earlier) - known) / of_earlier[row.len()];
+            pivot -= entry * entry;
+            row.push(entry);
+        }
+        let stays = pivot > least && pivot.is_finite();
+        if stays {
+            row.push(pivot.sqrt());
+            self.rows.push(row);
+            self.kept.push(column);
+        }
+        stays
+    }
+
+    /// The coordinate of something along the last column, given its product with that column and its earlier coordinates.
+    pub fn along(&self, product: f64, earlier: impl Iterator<Item = f64>) -> f64 {
+        let Some((diagonal, row)) = self.rows.last().and_then(|row| row.split_last()) else {
+            return 0.0;
+        };
+        let known: f64 = row.iter().zip(earlier).map(|(r, z)| r * z).sum();
+        (product - known) / diagonal
+    }
+
+    /// The coefficients of `count` columns for coordinates along those that are in; 0 for the others.
+    pub fn solve(&self, coordinates: &[f64], count: usize) -> Vec<f64> {
+        let mut out = vec![0.0; count];
+        for k in (0..self.kept.len()).rev() {
+            let later = (k + 1..self.kept.len()).map(|j| self.rows[j][k] * out[self.kept[j]]);
+            out[self.kept[k]] = (coordinates[k] - later.sum::<f64>()) / self.rows[k][k];
+        }
+        out
+    }
+}
+
+/// Least squares from products alone: `gram` holds those of the columns, `with` those with what is to be explained. Columns in the
+/// span of earlier ones get 0. Only half the digits of [`Basis`] are left.
+pub fn normal(gram: &DMatrix<f64>, with: &DVector<f64>) -> Vec<f64> {
+    let mut factor = Factor::default();
+    let mut coordinates: Vec<f64> = Vec::new();
+    for k in 0..gram.nrows() {
+        let square = gram[(k, k)];
+        if factor.push(k, square, ROUNDED * square, |j| gram[(k, j)]) {
+            coordinates.push(factor.along(with[k], coordinates.iter().copied()));
+        }
+    }
+    factor.solve(&coordinates, gram.nrows())
 }
 
 /// All dot products of the columns of `a` with those of `b`: entry [i * b.len() + j].
@@ -320,8 +381,12 @@ mod tests {
             .collect();
         let z: Vec<f64> = basis.q.iter().map(|q| dot(q, &target)).collect();
         let c = basis.solve(&z);
-        for (c, want) in c.iter().zip([3.0, 0.0, -1.0, 0.0, 0.5]) {
+        let gram = DMatrix::from_row_slice(5, 5, &dots(&three, &three));
+        let with = DVector::from_vec(dots(&three, &[&target]));
+        let by_products = normal(&gram, &with);
+        for ((c, d), want) in c.iter().zip(by_products).zip([3.0, 0.0, -1.0, 0.0, 0.5]) {
             assert!((c - want).abs() < 1e-12, "{c}");
+            assert!((d - want).abs() < 1e-10, "{d}");
         }
     }
 }

@@ -5,8 +5,8 @@
 //! reading order: [`noise`] writes n as a linear state space on the record's own times; [`whiten`]
 //! turns columns into uncorrelated ones, so that generalised least squares is ordinary least
 //! squares; [`reml`] estimates the strengths ([`robust`]: spikes; [`decimate`]: long records);
-//! [`candidates`] measures a dictionary of candidate effects; [`null`] and [`score`] say how often
-//! chance alone does as well ([`tail`]: small probabilities); [`blocks`] cuts held-out blocks.
+//! [`candidates`] measures a dictionary of candidate effects ([`partial`]: beside the declared model); [`score`] says how
+//! often chance alone does as well ([`tail`]: small probabilities); [`blocks`] cuts held-out blocks.
 //! [`linear`], [`random`] and [`wide`] are tools.
 //!
 //! Nothing here is random: surrogates are functions of a seed and a counter ([`random`]).
@@ -18,7 +18,7 @@ pub mod lattice;
 pub mod linear;
 pub mod memory;
 pub mod noise;
-pub mod null;
+pub mod partial;
 pub mod random;
 pub mod reml;
 pub mod robust;

@@ -43,13 +43,3 @@ impl Stream {
         out
     }
 }
-
-/// A chi-square number of `degrees` degrees of freedom made of one standard normal number, by
-/// Wilson and Hilferty's cube (1931); exact enough from ten degrees on.
-pub fn chi_square(degrees: f64, normal: f64) -> f64 {
-    if degrees < 1.0 {
-        return 0.0;
-    }
-    let c = 2.0 / (9.0 * degrees);
-    degrees * (1.0 - c + normal * c.sqrt()).max(0.0).powi(3)
-}

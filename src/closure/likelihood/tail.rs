@@ -24,13 +24,12 @@ pub struct Tail {
 }
 
 impl Tail {
-    /// From a sample (at least one number; not finite ones are dropped). The tail is the upper
-    /// tenth, or the upper quarter of a sample below 1000.
+    /// From a sample (at least one number; not finite ones are dropped). The tail is its upper quarter.
     pub fn new(sample: Vec<f64>) -> Self {
         let mut sorted: Vec<f64> = sample.into_iter().filter(|v| v.is_finite()).collect();
         sorted.sort_by(f64::total_cmp);
         let n = sorted.len();
-        let beyond = if n >= 1000 { n / 10 } else { n / 4 };
+        let beyond = n / 4;
         let start = n - beyond;
         let threshold = start.checked_sub(1).and_then(|i| sorted.get(i)).copied();
         let threshold = threshold.unwrap_or(0.0);

@@ -4,114 +4,233 @@
 //! y = D b + sum of g (a + M b) + what else there is. That is linear in b for given g, and in g for given b; least squares
 //! of the one and of the other in turn never raise the square. Columns of a bias that was found without the effect
 //! have another shape where the effect is strong.
+//!
+//! Every column of every turn is a combination of the same few: their products are taken once over the rows, and the turns
+//! are in small matrices ([`normal`]).
 
-use super::{declared, weighted};
+use super::declared;
 use crate::closure::channels::Channels;
 use crate::closure::effects::{Bias, Candidate, Point};
-use crate::closure::likelihood::linear::add_scaled;
+use crate::closure::likelihood::linear::{add_scaled, dots, normal};
+use nalgebra::{DMatrix, DVector};
 
 /// Most turns, and the share by which the bias still moves in the last.
 const TURNS: usize = 20;
 const STILL: f64 = 1e-5;
 
-/// An effect's column: a + M b.
-struct Affine {
-    still: Vec<f64>,
-    by_bias: Vec<Vec<f64>>,
+/// What is fitted, and all that is fitted beside an effect that is tried: everything is a combination of a few columns over the
+/// rows.
+pub(super) struct Settling<'a> {
+    c: &'a Channels,
+    /// Square roots of the rows' weights; rows of weight 0 may hold anything.
+    roots: Vec<f64>,
+    /// The columns, weighted: the declared ones, free ones, the signal, those of effects.
+    columns: Vec<Vec<f64>>,
+    products: DMatrix<f64>,
+    /// Declared columns, and declared and free ones.
+    order: usize,
+    linear: usize,
+    effects: Vec<Affine>,
 }
 
-impl Affine {
-    /// Those of a shape, for a bias with `order` coefficients.
-    fn of(c: &Channels, candidate: &dyn Candidate, point: &Point, order: usize) -> Vec<Affine> {
+/// An effect's column, a + M b, by the places of a and of M's columns among all.
+#[derive(Clone)]
+struct Affine {
+    still: usize,
+    by_bias: Vec<usize>,
+    is_sized: bool,
+}
+
+/// Factors of the columns.
+type Combination = DVector<f64>;
+
+/// A bias beside effects.
+pub(super) struct Settled {
+    /// Its coefficients, deg/s.
+    pub bias: Vec<f64>,
+    /// Coefficients of the columns of the effect that was tried, beside the declared ones alone.
+    pub own: Vec<f64>,
+}
+
+impl<'a> Settling<'a> {
+    /// For weighted least squares of `y` (deg/s, every row) by the declared model, `free` columns and effects that act on the
+    /// bias.
+    pub(super) fn new(
+        c: &'a Channels,
+        (y, weights): (&[f64], &[f64]),
+        acting: &[(&dyn Candidate, &Point)],
+        free: &[Vec<f64>],
+    ) -> Self {
+        let declared = declared(c);
+        let order = declared.len();
+        let mut out = Settling {
+            c,
+            roots: weights.iter().map(|w| w.max(0.0).sqrt()).collect(),
+            columns: Vec::new(),
+            products: DMatrix::zeros(0, 0),
+            order,
+            linear: order + free.len(),
+            effects: Vec::new(),
+        };
+        let mut columns = declared;
+        columns.extend_from_slice(free);
+        columns.push(y.to_vec());
+        for (candidate, point) in acting {
+            let (effects, own) = out.affine(*candidate, point, columns.len());
+            out.effects.extend(effects);
+            columns.extend(own);
+        }
+        out.columns = columns.iter().map(|column| out.weighted(column)).collect();
+        let count = columns.len();
+        let products = dots(&out.columns, &out.columns);
+        out.products = DMatrix::from_row_slice(count, count, &products);
+        out
+    }
+
+    fn weighted(&self, column: &[f64]) -> Vec<f64> {
+        let pairs = column.iter().zip(&self.roots);
+        pairs
+            .map(|(v, root)| if *root > 0.0 { v * root } else { 0.0 })
+            .collect()
+    }
+
+    /// The columns of a shape, and where they are if they follow `from` others.
+    fn affine(
+        &self,
+        candidate: &dyn Candidate,
+        point: &Point,
+        from: usize,
+    ) -> (Vec<Affine>, Vec<Vec<f64>>) {
         let bias = |coefficients_dps: Vec<f64>| Bias {
             coefficients_dps,
             others_dps: Vec::new(),
         };
+        let order = self.order;
         let unit = |j: usize| (0..order).map(|k| f64::from(u8::from(k == j))).collect();
         let mut biases = vec![bias(vec![0.0; order])];
         biases.extend((0..order).map(|j| bias(unit(j))));
-        let mut units = candidate.columns_of(c, &biases, point);
+        let mut units = candidate.columns_of(self.c, &biases, point);
         let still = units.remove(0);
-        let each = still.into_iter().enumerate();
-        each.map(|(i, still)| {
-            let by_bias = units.iter().map(|columns| {
-                let mut column = columns[i].clone();
+        let (mut effects, mut columns) = (Vec::new(), Vec::new());
+        for (i, still) in still.into_iter().enumerate() {
+            let first = from + columns.len();
+            for unit in &units {
+                let mut column = unit[i].clone();
                 add_scaled(&mut column, -1.0, &still);
-                column
-            });
-            Affine {
-                by_bias: by_bias.collect(),
-                still,
+                columns.push(column);
             }
-        })
-        .collect()
+            effects.push(Affine {
+                still: first + order,
+                by_bias: (first..first + order).collect(),
+                is_sized: candidate.is_sized(point),
+            });
+            columns.push(still);
+        }
+        (effects, columns)
     }
 
-    fn at(&self, bias: &[f64]) -> Vec<f64> {
-        let mut column = self.still.clone();
-        for (b, by) in bias.iter().zip(&self.by_bias) {
-            add_scaled(&mut column, *b, by);
+    /// The bias from a start.
+    pub(super) fn settled(&self, start: &[f64]) -> Vec<f64> {
+        self.turned(&self.products, &self.effects, start)
+    }
+
+    /// The bias with one effect more, from a start.
+    pub(super) fn beside(
+        &self,
+        candidate: &dyn Candidate,
+        point: &Point,
+        start: &[f64],
+    ) -> Settled {
+        let known = self.columns.len();
+        let (own, columns) = self.affine(candidate, point, known);
+        let columns: Vec<Vec<f64>> = columns.iter().map(|c| self.weighted(c)).collect();
+        let all = known + columns.len();
+        let mixed = dots(&columns, &self.columns);
+        let further = dots(&columns, &columns);
+        let product = |i: usize, j: usize| match (i.checked_sub(known), j.checked_sub(known)) {
+            (None, None) => self.products[(i, j)],
+            (Some(i), None) => mixed[i * known + j],
+            (None, Some(j)) => mixed[j * known + i],
+            (Some(i), Some(j)) => further[i * columns.len() + j],
+        };
+        let products = DMatrix::from_fn(all, all, product);
+        let effects = [self.effects.as_slice(), own.as_slice()].concat();
+        let bias = self.turned(&products, &effects, start);
+        let declared = (0..self.order).map(|k| unit(k, all));
+        let beside: Vec<Combination> = declared
+            .chain(own.iter().map(|e| e.at(&bias, all)))
+            .collect();
+        let fitted = fitted(&products, &beside, &unit(self.linear, all));
+        Settled {
+            bias,
+            own: fitted.get(self.order..).unwrap_or_default().to_vec(),
         }
-        column
+    }
+
+    /// Turns of least squares, the bias held and the effects held.
+    fn turned(&self, products: &DMatrix<f64>, effects: &[Affine], start: &[f64]) -> Vec<f64> {
+        let all = products.nrows();
+        let y = unit(self.linear, all);
+        let linear = || (0..self.linear).map(|k| unit(k, all));
+        let (sized, free): (Vec<&Affine>, Vec<&Affine>) = effects.iter().partition(|e| e.is_sized);
+        let mut bias = start.to_vec();
+        for _ in 0..TURNS {
+            let rest = sized.iter().fold(y.clone(), |y, e| y - e.at(&bias, all));
+            let columns: Vec<Combination> = free
+                .iter()
+                .map(|e| e.at(&bias, all))
+                .chain(linear())
+                .collect();
+            let mut gains = fitted(products, &columns, &rest);
+            gains.truncate(free.len());
+            gains.resize(effects.len(), 1.0);
+            let mut rest = y.clone();
+            let mut columns: Vec<Combination> = linear().collect();
+            for (gain, effect) in gains.iter().zip(free.iter().chain(&sized)) {
+                rest[effect.still] -= gain;
+                for (column, by) in columns.iter_mut().zip(&effect.by_bias) {
+                    column[*by] += gain;
+                }
+            }
+            let mut next = fitted(products, &columns, &rest);
+            next.truncate(self.order);
+            if free.is_empty() {
+                // Linear as it stands.
+                return next;
+            }
+            let pairs = next.iter().zip(&bias);
+            let moved = pairs.fold(0.0, |m: f64, (a, b)| m.max((a - b).abs()));
+            let most = next.iter().fold(0.0, |m: f64, b| m.max(b.abs()));
+            bias = next;
+            if moved <= STILL * most {
+                break;
+            }
+        }
+        bias
     }
 }
 
-/// The bias's coefficients, deg/s, beside effects that act on it and `free` columns, by weighted least squares of `y` (deg/s,
-/// every row; rows of weight 0 may hold anything). `start`: coefficients to begin with.
-pub(super) fn settled(
-    c: &Channels,
-    (y, weights): (&[f64], &[f64]),
-    start: &[f64],
-    acting: &[(&dyn Candidate, &Point)],
-    free: &[Vec<f64>],
-) -> Vec<f64> {
-    let declared = declared(c);
-    let order = declared.len();
-    let mut effects: Vec<Affine> = Vec::new();
-    let mut sized: Vec<Affine> = Vec::new();
-    for (candidate, point) in acting {
-        let own = Affine::of(c, *candidate, point, order);
-        match candidate.is_sized(point) {
-            true => sized.extend(own),
-            false => effects.extend(own),
+impl Affine {
+    /// The column for a bias, of so many factors.
+    fn at(&self, bias: &[f64], count: usize) -> Combination {
+        let mut out = unit(self.still, count);
+        for (k, b) in self.by_bias.iter().zip(bias) {
+            out[*k] += b;
         }
+        out
     }
-    let mut bias = start.to_vec();
-    for _ in 0..TURNS {
-        let mut columns: Vec<Vec<f64>> = effects.iter().map(|e| e.at(&bias)).collect();
-        columns.extend(declared.iter().cloned());
-        columns.extend(free.iter().cloned());
-        let mut rest = y.to_vec();
-        for effect in &sized {
-            add_scaled(&mut rest, -1.0, &effect.at(&bias));
-        }
-        let mut gains = weighted(&columns, &rest, weights);
-        gains.truncate(effects.len());
-        gains.resize(effects.len() + sized.len(), 1.0);
-        rest.copy_from_slice(y);
-        let mut columns = declared.clone();
-        for (gain, effect) in gains.iter().zip(effects.iter().chain(&sized)) {
-            add_scaled(&mut rest, -gain, &effect.still);
-            for (column, by) in columns.iter_mut().zip(&effect.by_bias) {
-                add_scaled(column, *gain, by);
-            }
-        }
-        columns.extend(free.iter().cloned());
-        let mut next = weighted(&columns, &rest, weights);
-        next.truncate(order);
-        if effects.is_empty() {
-            // Linear as it stands.
-            return next;
-        }
-        let pairs = next.iter().zip(&bias);
-        let moved = pairs.fold(0.0, |m: f64, (a, b)| m.max((a - b).abs()));
-        let most = next.iter().fold(0.0, |m: f64, b| m.max(b.abs()));
-        bias = next;
-        if moved <= STILL * most {
-            break;
-        }
-    }
-    bias
+}
+
+/// One column of so many.
+fn unit(k: usize, count: usize) -> Combination {
+    Combination::from_fn(count, |i, _| f64::from(u8::from(i == k)))
+}
+
+/// Least squares of a combination by others.
+fn fitted(products: &DMatrix<f64>, columns: &[Combination], of: &Combination) -> Vec<f64> {
+    let columns = DMatrix::from_columns(columns);
+    let along = columns.transpose() * products;
+    normal(&(&along * &columns), &(along * of))
 }
 
 #[cfg(test)]
@@ -141,7 +260,13 @@ mod tests {
         let start = search.model(&[]).unwrap().bias.coefficients_dps;
         let acting = [(candidate.as_ref(), &point)];
         let data = (c.error_dps.as_slice(), [1.0; 400].as_slice());
-        let found = settled(c, data, &start, &acting, &free);
+        let found = Settling::new(c, data, &acting, &free).settled(&start);
+        // The same with the effect tried.
+        let none = Settling::new(c, data, &[], &free);
+        let tried = none.beside(candidate.as_ref(), &point, &start).bias;
+        for (a, b) in tried.iter().zip(&found) {
+            assert!((a - b).abs() < 1e-9, "{a} {b}");
+        }
         (off(&start), off(&found))
     }
 

@@ -48,6 +48,7 @@ fn taken(periods: f64, behind: f64) -> String {
         ],
         equal: 4.0,
         missing: Vec::new(),
+        leads: None,
     };
     match search.next(&search.model(&[]).unwrap(), &round).unwrap() {
         Next::Add(term) => term.id(),

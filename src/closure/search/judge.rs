@@ -1,7 +1,8 @@
 //! One round: all candidates beside those that are taken, each at its best shape.
 
+use super::acting::Settling;
 use super::refine::{self, Bench, Profiled};
-use super::{LEVEL, MOST_RIVALS, Model, Search, acting, fast, tones};
+use super::{LEVEL, MOST_RIVALS, Model, Search, fast, tones};
 use crate::closure::channels::Channels;
 use crate::closure::effects::tone::{Pickup, returns};
 use crate::closure::effects::{Bias, Candidate, Missing, Point, map};
@@ -88,6 +89,7 @@ struct Top {
 type Running = Vec<(Arc<dyn Candidate>, Vec<Point>)>;
 
 /// A round's result.
+#[derive(Clone)]
 pub struct Round {
     /// The best net gain first.
     pub judged: Vec<Judged>,
@@ -95,6 +97,8 @@ pub struct Round {
     pub equal: f64,
     /// What could not be judged.
     pub missing: Vec<(Arc<dyn Candidate>, Missing)>,
+    /// The candidate by whose gain the others were near enough for a fine look, or not.
+    pub leads: Option<String>,
 }
 
 impl Round {
@@ -144,7 +148,8 @@ impl Search<'_> {
                     .collect(),
             })
             .collect();
-        let scores = scored(fit, &groups, surrogates);
+        let scores = self.scored(fit, &groups, surrogates);
+        let leads = scores.greatest().map(|g| running[g].0.id());
         let grid = match surrogates {
             0 => scores.grid.thinned(),
             _ => scores.grid.clone(),
@@ -177,6 +182,7 @@ impl Search<'_> {
             judged,
             equal: equal(c),
             missing,
+            leads,
         }
     }
 
@@ -314,8 +320,10 @@ impl Search<'_> {
     ) -> Option<(Point, Option<Bias>)> {
         let c = self.channels;
         let gain = |p: &Point| refine::gain(bench, candidate, c, &model.bias, p);
-        let net = |p: &Point| gain(p) - price(candidate, c, p);
-        let each = points.iter().map(|p| (net(p), p));
+        let each = points.iter().map(|p| (p, &model.bias));
+        let gains = refine::gains(bench, candidate, c, each);
+        let each = points.iter().zip(gains);
+        let each = each.map(|(p, gain)| (gain - price(candidate, c, p), p));
         let (_, start) = each.max_by(|a, b| a.0.total_cmp(&b.0))?;
         let steps = map(&candidate.spacing(c, start), |s| 0.5 * s);
         Some((refine::climbed(start, steps, gain), None))
@@ -332,15 +340,32 @@ impl Search<'_> {
         bench: &Bench<'_>,
     ) -> Option<(Point, Option<Bias>)> {
         let c = self.channels;
-        let net = |point: &Point| {
-            let (bias, beta) = self.bias_beside(model, candidate, point);
-            let paid = PRICE * beta.len() as f64 + price(candidate, c, point);
-            let admitted = candidate.admits(point, &beta);
-            let gain = || refine::gain(bench, candidate, c, &bias, point);
-            admitted.then(|| gain() - paid)
+        let settling = self.settling_beside(model);
+        let start = &model.bias.coefficients_dps;
+        // The bias beside a shape, and what the shape costs, if it is admitted.
+        let beside = |point: &Point| {
+            let settled = settling.beside(candidate, point, start);
+            let paid = PRICE * settled.own.len() as f64 + price(candidate, c, point);
+            let bias = Bias {
+                coefficients_dps: settled.bias,
+                ..model.bias.clone()
+            };
+            candidate
+                .admits(point, &settled.own)
+                .then_some((bias, paid))
         };
-        let mut places: Vec<(f64, &Point)> =
-            points.iter().filter_map(|p| Some((net(p)?, p))).collect();
+        let net = |point: &Point| {
+            let (bias, paid) = beside(point)?;
+            Some(refine::gain(bench, candidate, c, &bias, point) - paid)
+        };
+        let admitted = points.iter().filter_map(|p| Some((p, beside(p)?)));
+        let admitted: Vec<(&Point, (Bias, f64))> = admitted.collect();
+        let each = admitted.iter().map(|(point, (bias, _))| (*point, bias));
+        let gains = refine::gains(bench, candidate, c, each);
+        let nets = gains.into_iter().zip(&admitted);
+        let mut places: Vec<(f64, &Point)> = nets
+            .map(|(gain, (point, (_, paid)))| (gain - paid, *point))
+            .collect();
         places.sort_by(|a, b| b.0.total_cmp(&a.0));
         let (_, first) = *places.first()?;
         let mut starts = vec![first];
@@ -356,33 +381,21 @@ impl Search<'_> {
             (reached(&top), top)
         });
         let (_, top) = tops.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        let (bias, _) = self.bias_beside(model, candidate, &top);
+        let bias = Bias {
+            coefficients_dps: settling.beside(candidate, &top, start).bias,
+            ..model.bias.clone()
+        };
         Some((top, Some(bias)))
     }
 
-    /// The declared bias with a candidate in, and the candidate's coefficients. Ordinary least squares, for the shape
-    /// alone.
-    fn bias_beside(
-        &self,
-        model: &Model,
-        candidate: &dyn Candidate,
-        point: &Point,
-    ) -> (Bias, Vec<f64>) {
-        let c = self.channels;
-        let mut bias = model.bias.clone();
-        let order = bias.coefficients_dps.len();
-        let mut rest = c.error_dps.clone();
+    /// For the declared bias with a candidate in, beside what a model has. Ordinary least squares, for the shape alone.
+    fn settling_beside(&self, model: &Model) -> Settling<'_> {
+        let mut rest = self.channels.error_dps.clone();
+        let order = model.bias.coefficients_dps.len();
         for (column, b) in model.columns.iter().zip(&model.beta).skip(order) {
             add_scaled(&mut rest, -b, column);
         }
-        let weights = model.free_weights();
-        let data = (rest.as_slice(), weights.as_slice());
-        let acting = [(candidate, point)];
-        bias.coefficients_dps = acting::settled(c, data, &bias.coefficients_dps, &acting, &[]);
-        let mut columns = super::declared(c);
-        columns.extend(candidate.columns(c, &bias, point));
-        let own = super::weighted(&columns, &rest, &weights);
-        (bias, own.get(order..).unwrap_or_default().to_vec())
+        Settling::new(self.channels, (&rest, &model.free_weights()), &[], &[])
     }
 }
 
@@ -391,25 +404,37 @@ impl Search<'_> {
 const FIRST_LOOK: usize = 30;
 const CLEAR: (f64, f64) = (1e-4, 0.12);
 
-/// Scores with as many surrogates as it takes, `surrogates` at most.
-fn scored(fit: &Fit, groups: &[Group], surrogates: usize) -> Scores {
-    let with = |surrogates: usize| {
-        let options = score::Options {
-            draws: 0,
-            surrogates,
-            seed: 1,
+/// The same with the surrogates of another round of the record: by chance the best of a dictionary is as good beside other
+/// terms as beside these, nearly.
+const BEYOND_DOUBT: (f64, f64) = (1e-8, 0.5);
+
+impl Search<'_> {
+    /// Scores with as many surrogates as it takes, `surrogates` at most.
+    fn scored(&self, fit: &Fit, groups: &[Group], surrogates: usize) -> Scores {
+        let with = |surrogates: usize| {
+            let options = score::Options {
+                surrogates,
+                seed: 1,
+            };
+            score::score(fit, groups, &options)
         };
-        score::score(fit, groups, &options)
-    };
-    if surrogates <= FIRST_LOOK {
-        return with(surrogates);
+        if surrogates == 0 {
+            return with(0);
+        }
+        let known = self.by_chance.borrow().clone();
+        if let Some(tail) = known {
+            let scores = with(0).judged_by(&tail);
+            if scores.is_clear(BEYOND_DOUBT) {
+                return scores;
+            }
+        }
+        let mut scores = with(surrogates.min(FIRST_LOOK));
+        if surrogates > FIRST_LOOK && !scores.is_clear(CLEAR) {
+            scores = with(surrogates);
+        }
+        self.by_chance.replace(scores.by_chance.clone());
+        scores
     }
-    let first = with(FIRST_LOOK);
-    let p = first.leader().and_then(|g| first.groups[g].p_bootstrap);
-    if p.is_none_or(|p| p < CLEAR.0 || p > CLEAR.1) {
-        return first;
-    }
-    with(surrogates)
 }
 
 /// Columns of a shape in the rows of the fit's problem.

@@ -19,13 +19,16 @@ fn beside(pull: &Pull, sized: bool) -> (f64, f64, f64) {
         true => (Point::at(form, &[pulled.most_u]), 1.0),
         false => (Point::form(form), pulled.pull_u),
     };
-    let off = |bias: &Bias| {
-        let pairs = bias.coefficients_dps.iter().zip(Pull::BIAS_DPS);
+    let off = |bias: &[f64]| {
+        let pairs = bias.iter().zip(Pull::BIAS_DPS);
         pairs.fold(0.0, |m: f64, (b, due)| m.max((b - due).abs()))
     };
-    let (found, own) = search.bias_beside(&model, candidate.as_ref(), &point);
-    assert_eq!(own.len(), 1);
-    (off(&model.bias), off(&found), own[0] / due)
+    let alone = &model.bias.coefficients_dps;
+    let settled = search
+        .settling_beside(&model)
+        .beside(candidate.as_ref(), &point, alone);
+    assert_eq!(settled.own.len(), 1);
+    (off(alone), off(&settled.bias), settled.own[0] / due)
 }
 
 #[test]

@@ -29,6 +29,7 @@ mod reading;
 pub mod refine;
 mod reported;
 mod rounding;
+mod rounds;
 pub mod stairs;
 pub mod structure;
 pub mod sweep;
@@ -44,13 +45,16 @@ use super::likelihood::Unusable;
 use super::likelihood::blocks::Split;
 use super::likelihood::linear::add_scaled;
 use super::likelihood::reml::{self, Fit};
+use super::likelihood::tail::Tail;
 use super::rails::{self, Rails};
+use acting::Settling;
 use clip::{Kind, clip};
 pub use declared::{declared, declared_by, powers, weighted};
-use judge::{Judged, Round};
+use judge::Judged;
 use memo::Memo;
 pub use model::Model;
 use otherwise::Beginning;
+use rounds::Known;
 use std::cell::RefCell;
 use std::sync::Arc;
 
@@ -174,7 +178,8 @@ pub struct Search<'a> {
     blur: Vec<Vec<f64>>,
     candidates: Vec<Arc<dyn Candidate>>,
     models: Memo<Arc<Model>>,
-    rounds: Memo<Arc<Round>>,
+    rounds: Memo<Known>,
+    by_chance: RefCell<Option<Tail>>,
     polishes: Memo<Vec<Point>>,
     beginning: RefCell<Beginning>,
 }
@@ -206,7 +211,8 @@ impl<'a> Search<'a> {
             blur: reading::errors_of(channels),
             candidates,
             models: Memo::default(),
-            rounds: Memo::default(),
+            rounds: Memo::of(memo::SOME),
+            by_chance: RefCell::default(),
             polishes: Memo::of(memo::MANY),
             beginning: RefCell::default(),
         };
@@ -252,19 +258,6 @@ impl<'a> Search<'a> {
         Ok(model)
     }
 
-    /// Everything judged beside a [`Search::model`]; `surrogates` = 0: gains alone, which an earlier round
-    /// beside the same terms has as well.
-    pub fn round(&self, model: &Model, surrogates: usize) -> Arc<Round> {
-        if surrogates == 0
-            && let Some(known) = self.rounds.get(&model.terms)
-        {
-            return known;
-        }
-        let round = Arc::new(self.judge(model, surrogates));
-        self.rounds.keep(&model.terms, round.clone());
-        round
-    }
-
     /// The usual way to fit.
     pub fn options(&self) -> reml::Options {
         reml::Options {
@@ -294,10 +287,12 @@ impl<'a> Search<'a> {
             }
             return self.model_once(terms, &bias, options);
         }
-        bias.coefficients_dps = self.settled(terms, &bias, &self.weights());
+        let settling = self.settling(terms, &bias, &self.weights());
+        bias.coefficients_dps = settling.settled(&bias.coefficients_dps);
         // Again with the rows out that stand out from that.
         let pass = self.model_once(terms, &bias, options)?;
-        bias.coefficients_dps = self.settled(terms, &bias, &pass.fit.row_weights);
+        let settling = self.settling(terms, &bias, &pass.fit.row_weights);
+        bias.coefficients_dps = settling.settled(&bias.coefficients_dps);
         let near = reml::Options {
             near: options.near.or(Some(pass.fit.at.shape)),
             ..*options
@@ -305,8 +300,8 @@ impl<'a> Search<'a> {
         self.model_once(terms, &bias, &near)
     }
 
-    /// The bias's coefficients beside terms some of which act on it.
-    fn settled(&self, terms: &[Term], bias: &Bias, weights: &[f64]) -> Vec<f64> {
+    /// For the bias's coefficients beside terms some of which act on it.
+    fn settling(&self, terms: &[Term], bias: &Bias, weights: &[f64]) -> Settling<'a> {
         let c = self.channels;
         let mut y = c.error_dps.clone();
         let mut free = Vec::new();
@@ -323,7 +318,7 @@ impl<'a> Search<'a> {
                 }
             }
         }
-        acting::settled(c, (&y, weights), &bias.coefficients_dps, &acting, &free)
+        Settling::new(c, (&y, weights), &acting, &free)
     }
 
     /// 1 for rows of the fit.

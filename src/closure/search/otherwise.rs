@@ -232,16 +232,14 @@ impl Search<'_> {
         NOTHING * (high - low)
     }
 
-    /// Never again a candidate: it was taken and did not hold. Rounds with it are forgotten.
+    /// Never again a candidate: it was taken and did not hold.
     pub(super) fn bar(&self, id: String) {
         self.beginning.borrow_mut().barred.push(id);
-        self.rounds.clear();
     }
 
     /// How the next run begins; how the last one did. The report's rounds do without what the accepted run did
     /// without: else a name that was taken without it competes with it again.
     fn begin(&self, how: Beginning) -> Beginning {
-        self.rounds.clear();
         self.beginning.replace(how)
     }
 

@@ -5,10 +5,12 @@ use crate::closure::channels::Channels;
 use crate::closure::effects::{Bias, Candidate, Point};
 use crate::closure::likelihood::candidates::{AtShape, Grid, Group};
 use crate::closure::likelihood::lattice::Problem;
-use crate::closure::likelihood::linear::{Basis, add_scaled, dot};
+use crate::closure::likelihood::linear::{Basis, dot};
 use crate::closure::likelihood::noise::Shape;
+use crate::closure::likelihood::partial::Partial;
 use crate::closure::likelihood::reml::Fit;
 use crate::closure::likelihood::whiten::Whitener;
+use std::borrow::Borrow;
 
 /// One noise, ready for many columns.
 pub struct Bench<'a> {
@@ -17,8 +19,9 @@ pub struct Bench<'a> {
     model: Option<&'a Model>,
     whitener: Whitener,
     declared: Basis,
-    /// The whitened signal without the declared regressors.
+    /// The whitened signal without the declared regressors, and its sum of squares.
     y: Vec<f64>,
+    square: f64,
 }
 
 impl<'a> Bench<'a> {
@@ -40,6 +43,7 @@ impl<'a> Bench<'a> {
             model: None,
             whitener,
             declared,
+            square: dot(&y, &y),
             y,
         }
     }
@@ -47,35 +51,42 @@ impl<'a> Bench<'a> {
     /// -ln(1 - R^2) of columns over the record's rows, times half the contrasts: a gain in
     /// log-likelihood at this noise.
     pub fn gain(&self, columns: &[Vec<f64>]) -> f64 {
-        self.ratio(columns, false)
+        self.gained(columns, false)
     }
 
     /// The same with the sum of the columns taken as it is, its coefficient being 1.
     pub fn gain_whole(&self, columns: &[Vec<f64>]) -> f64 {
-        self.ratio(columns, true)
+        self.gained(columns, true)
     }
 
-    fn ratio(&self, columns: &[Vec<f64>], whole: bool) -> f64 {
+    fn gained(&self, columns: &[Vec<f64>], whole: bool) -> f64 {
+        let each = [(columns.len(), whole)];
+        self.gains(columns, &each).first().copied().unwrap_or(0.0)
+    }
+
+    /// Gains of several shapes, by their number of columns and whether these are whole. Side by side they
+    /// are whitened in the time of one.
+    fn gains(&self, columns: &[Vec<f64>], each: &[(usize, bool)]) -> Vec<f64> {
         let reduced: Vec<Vec<f64>> = columns.iter().map(|c| self.fit.reduce(c)).collect();
         let white = self.whitener.apply_all(&reduced);
-        let mut own = Basis::default();
-        let mut rest = self.y.clone();
-        for mut column in white {
-            let before = dot(&column, &column).sqrt();
-            self.declared.project_off(&mut column);
-            if dot(&column, &column).sqrt() > 1e-4 * before {
-                add_scaled(&mut rest, -1.0, &column);
-                own.push(&column);
-            }
-        }
-        if !whole {
-            rest.clone_from(&self.y);
-            own.project_off(&mut rest);
-        }
-        let before = dot(&self.y, &self.y).max(f64::MIN_POSITIVE);
-        let after = dot(&rest, &rest).max(1e-12 * before);
+        let partial = Partial::new(&self.declared, std::slice::from_ref(&self.y));
+        let products = partial.products(&white);
         let contrasts = self.whitener.used.saturating_sub(self.declared.rank());
-        0.5 * contrasts as f64 * (before / after).ln()
+        let before = self.square.max(f64::MIN_POSITIVE);
+        let mut next = 0;
+        let gain = |(count, whole): &(usize, bool)| {
+            let own = next..next + count;
+            next = own.end;
+            let after = if *whole {
+                products.without_whole(own, self.square)
+            } else {
+                let mut explained = [0.0];
+                products.explained(own, &mut explained);
+                self.square - explained[0]
+            };
+            0.5 * contrasts as f64 * (before / after.max(1e-12 * before)).ln()
+        };
+        each.iter().map(gain).collect()
     }
 }
 
@@ -137,15 +148,35 @@ pub fn gain(
     bias: &Bias,
     point: &Point,
 ) -> f64 {
-    let mut columns = candidate.columns(c, bias, point);
-    if let Some(model) = bench.model {
-        columns = model.shown(columns);
+    let gains = gains(bench, candidate, c, [(point, bias)]);
+    gains.first().copied().unwrap_or(0.0)
+}
+
+/// Shapes whose columns are made, whitened and multiplied side by side.
+const BATCH: usize = 16;
+
+/// Gains of many shapes, each beside its own bias.
+pub fn gains<'p, B: Borrow<Bias>>(
+    bench: &Bench<'_>,
+    candidate: &dyn Candidate,
+    c: &Channels,
+    points: impl IntoIterator<Item = (&'p Point, B)>,
+) -> Vec<f64> {
+    let mut points = points.into_iter().peekable();
+    let mut out = Vec::new();
+    while points.peek().is_some() {
+        let (mut all, mut each) = (Vec::new(), Vec::with_capacity(BATCH));
+        for (point, bias) in points.by_ref().take(BATCH) {
+            let mut columns = candidate.columns(c, bias.borrow(), point);
+            if let Some(model) = bench.model {
+                columns = model.shown(columns);
+            }
+            each.push((columns.len(), candidate.is_sized(point)));
+            all.append(&mut columns);
+        }
+        out.append(&mut bench.gains(&all, &each));
     }
-    if candidate.is_sized(point) {
-        bench.gain_whole(&columns)
-    } else {
-        bench.gain(&columns)
-    }
+    out
 }
 
 /// What a set of shapes comes to over all noises of the grid.
@@ -185,7 +216,7 @@ pub fn profiled(fit: &Fit, grid: &Grid, points: &[Vec<Vec<f64>>]) -> Vec<Profile
             if with > p.gain {
                 p.gain = with;
                 p.shape = *shape;
-                p.columns = at.directions.points.get(k).map_or(0, |p| p.range.len());
+                p.columns = at.degrees.get(k).copied().unwrap_or(0);
             }
         }
     }

@@ -18,15 +18,15 @@ pub fn settled(
     c: &Channels,
     top: &Point,
     fine: &[(Point, f64)],
-    gain: impl Fn(&Point) -> f64,
+    gains: impl Fn(&[Point]) -> Vec<f64>,
 ) -> Point {
     let (axes, others) = candidate.stairs(c, top);
     if axes.is_empty() {
-        return middle(top, fine, gain);
+        return middle(top, fine, |p| one(&gains, p));
     }
-    let (mut best, mut reached) = climbed(candidate, c, top, &gain);
+    let (mut best, mut reached) = climbed(candidate, c, top, &gains);
     for other in others {
-        let (point, there) = climbed(candidate, c, &other, &gain);
+        let (point, there) = climbed(candidate, c, &other, &gains);
         // What costs less may gain less.
         if there - price(candidate, c, &point) > reached - price(candidate, c, &best) {
             (best, reached) = (point, there);
@@ -35,15 +35,20 @@ pub fn settled(
     best
 }
 
+fn one(gains: &impl Fn(&[Point]) -> Vec<f64>, point: &Point) -> f64 {
+    let there = gains(std::slice::from_ref(point));
+    there.first().copied().unwrap_or(f64::NEG_INFINITY)
+}
+
 /// Along each threshold in turn to the middle of its highest stair, and the gain there.
 fn climbed(
     candidate: &dyn Candidate,
     c: &Channels,
     start: &Point,
-    gain: &impl Fn(&Point) -> f64,
+    gains: &impl Fn(&[Point]) -> Vec<f64>,
 ) -> (Point, f64) {
     let mut best = start.clone();
-    let mut reached = gain(&best);
+    let mut reached = one(gains, &best);
     for _ in 0..TURNS {
         let before = best.clone();
         let axes = candidate.stairs(c, &best).0.len();
@@ -52,19 +57,19 @@ fn climbed(
             let Some(along) = stairs.into_iter().nth(axis) else {
                 continue;
             };
-            let gains: Vec<f64> = along.iter().map(gain).collect();
-            let highest = (0..gains.len()).max_by(|a, b| gains[*a].total_cmp(&gains[*b]));
-            let Some(top) = highest.filter(|k| gains[*k] > reached - FLAT) else {
+            let there = gains(&along);
+            let highest = (0..there.len()).max_by(|a, b| there[*a].total_cmp(&there[*b]));
+            let Some(top) = highest.filter(|k| there[*k] > reached - FLAT) else {
                 continue;
             };
-            let level = |k: &usize| gains[*k] > gains[top] - FLAT;
+            let level = |k: &usize| there[*k] > there[top] - FLAT;
             let first = (0..=top).rev().take_while(level).last().unwrap_or(top);
-            let last = (top..gains.len()).take_while(level).last().unwrap_or(top);
+            let last = (top..there.len()).take_while(level).last().unwrap_or(top);
             let mut point = along[first].clone();
             for (theta, end) in point.theta.iter_mut().zip(&along[last].theta) {
                 *theta = 0.5 * (*theta + end);
             }
-            let there = gain(&point);
+            let there = one(gains, &point);
             if there > reached - FLAT {
                 (best, reached) = (point, there);
             }
@@ -178,6 +183,10 @@ mod tests {
         }
     }
 
+    fn all_of(gain: &dyn Fn(&Point) -> f64) -> impl Fn(&[Point]) -> Vec<f64> {
+        move |points| points.iter().map(gain).collect()
+    }
+
     fn no_channels() -> Channels {
         let columns = BTreeMap::from([
             ("rate_out_dps".to_owned(), vec![0.0; 2]),
@@ -205,7 +214,7 @@ mod tests {
                 p.theta.iter().enumerate().map(of).sum()
             };
             let start: Vec<f64> = (0..count).map(|_| random.uniform()).collect();
-            let found = settled(&t, &c, &Point::at(0, &start), &[], gain);
+            let found = settled(&t, &c, &Point::at(0, &start), &[], all_of(&gain));
             for (k, theta) in found.theta.iter().enumerate() {
                 let middle = |stair: usize| 0.5 * (t.readings[stair - 1] + t.readings[stair]);
                 let expected = 0.5 * (middle(lows[k]) + middle(highs[k]));
@@ -227,7 +236,11 @@ mod tests {
                 let off = p.theta.iter().map(|v| t.stair(*v).abs_diff(12) as f64);
                 -off.sum::<f64>() - if p.form == 1 { less } else { 0.0 }
             };
-            assert_eq!(settled(&t, &c, &start, &[], gain).form, form, "{less}");
+            assert_eq!(
+                settled(&t, &c, &start, &[], all_of(&gain)).form,
+                form,
+                "{less}"
+            );
         }
     }
 
@@ -267,7 +280,7 @@ mod tests {
         };
         let top = Point::at(0, &[0.22]);
         // A plateau of another form does not count.
-        let found = settled(&Smooth, &c, &top, &all(&flat), flat);
+        let found = settled(&Smooth, &c, &top, &all(&flat), all_of(&flat));
         assert!(
             found.form == 0 && (found.theta[0] - 0.405).abs() < 1e-9,
             "{found:?}"
@@ -276,8 +289,8 @@ mod tests {
             let near = |at: f64| (p.theta[0] - at).abs() < 0.055;
             if near(0.2) || near(0.8) { 3.0 } else { 0.0 }
         };
-        let found = settled(&Smooth, &c, &top, &all(&twin), twin);
+        let found = settled(&Smooth, &c, &top, &all(&twin), all_of(&twin));
         assert_eq!(found, top);
-        assert_eq!(settled(&Smooth, &c, &top, &[], flat), top);
+        assert_eq!(settled(&Smooth, &c, &top, &[], all_of(&flat)), top);
     }
 }

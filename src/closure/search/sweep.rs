@@ -9,6 +9,7 @@ use crate::closure::likelihood::Unusable;
 use crate::closure::likelihood::linear::add_scaled;
 use crate::closure::likelihood::noise::Shape;
 use crate::closure::likelihood::reml::Fit;
+use std::borrow::Cow;
 
 /// Net gain by which another candidate takes a term's place.
 pub(super) const BETTER: f64 = 1.5;
@@ -203,22 +204,33 @@ impl Search<'_> {
         let candidate = term.candidate.as_ref();
         // A shape that acts on the bias moves it: each is judged by the bias that is there beside it.
         let moves = candidate.acts_on_bias() && !candidate.is_last();
-        let gain = |p: &Point| match moves {
-            true => refine::gain(&bench, candidate, c, &self.bias_with(model, k, p), p),
-            false => refine::gain(&bench, candidate, c, &model.bias, p),
+        let settling = moves.then(|| {
+            let mut others = model.terms.clone();
+            others.remove(k);
+            self.settling(&others, &model.acting, &model.fit.row_weights)
+        });
+        let start = &model.acting.coefficients_dps;
+        let bias = |p: &Point| match &settling {
+            Some(settling) => Cow::Owned(Bias {
+                coefficients_dps: settling.beside(candidate, p, start).bias,
+                ..model.acting.clone()
+            }),
+            None => Cow::Borrowed(&model.bias),
         };
+        let gains = |points: &[Point]| {
+            let each = points.iter().map(|p| (p, bias(p)));
+            refine::gains(&bench, candidate, c, each)
+        };
+        let gain = |p: &Point| refine::gain(&bench, candidate, c, &bias(p), p);
         let climbed = |start: &Point| {
             let steps = candidate.spacing(c, start);
             refine::climbed(start, map(&steps, |s| 0.5 * s), gain)
         };
-        let mut fine: Vec<(Point, f64)> = candidate
-            .fine(c, &term.point, &self.used)
-            .into_iter()
-            .map(|p| {
-                let there = gain(&p);
-                (p, there)
-            })
-            .collect();
+        let with_gains = |points: Vec<Point>| -> Vec<(Point, f64)> {
+            let gains = gains(&points);
+            points.into_iter().zip(gains).collect()
+        };
+        let mut fine = with_gains(candidate.fine(c, &term.point, &self.used));
         if moves {
             // The bias follows closely: tops are narrow beside the distance of these places.
             fine.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -240,13 +252,7 @@ impl Search<'_> {
         let mut top = climbed(&term.point);
         let mut best = net(&top, gain(&top));
         let others: Vec<(Point, f64)> = match fine.is_empty() {
-            true => in_other_forms(&candidate.points(c), &top)
-                .into_iter()
-                .map(|p| {
-                    let there = gain(&p);
-                    (p, there)
-                })
-                .collect(),
+            true => with_gains(in_other_forms(&candidate.points(c), &top)),
             false => Vec::new(),
         };
         let other = others
@@ -261,16 +267,7 @@ impl Search<'_> {
                 (top, best) = (point, there);
             }
         }
-        stairs::settled(candidate, c, &top, &fine, gain)
-    }
-
-    /// The bias of a model in which a term has another shape.
-    fn bias_with(&self, model: &Model, k: usize, point: &Point) -> Bias {
-        let mut terms = model.terms.clone();
-        terms[k].point = point.clone();
-        let mut bias = model.acting.clone();
-        bias.coefficients_dps = self.settled(&terms, &bias, &model.fit.row_weights);
-        bias
+        stairs::settled(candidate, c, &top, &fine, gains)
     }
 
     /// Every term against all other candidates, the other terms being in: it is replaced by a better

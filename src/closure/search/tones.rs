@@ -7,9 +7,9 @@ use crate::closure::channels::Channels;
 use crate::closure::effects::tone::{self, Pickup};
 use crate::closure::effects::{Point, map};
 use crate::closure::likelihood::Unusable;
-use crate::closure::likelihood::candidates::Grid;
-use crate::closure::likelihood::linear::{Basis, dot, dots};
-use crate::closure::likelihood::null::bartlett;
+use crate::closure::likelihood::candidates::{Grid, bartlett};
+use crate::closure::likelihood::linear::{Basis, dot};
+use crate::closure::likelihood::partial::Partial;
 use crate::closure::likelihood::reml::Fit;
 use crate::closure::likelihood::tail::chi_square_surprise;
 use crate::closure::likelihood::whiten::Whitener;
@@ -37,9 +37,6 @@ const LIGHT: f64 = 0.1;
 
 /// Frequencies that are whitened side by side.
 const BATCH: usize = 16;
-
-/// A share of a tone's sum of squares below which it lies in the declared model.
-const DECLARED: f64 = 1e-8;
 
 /// Sine and cosine of one frequency at the rows' times, turned from one frequency to the next by a constant
 /// step.
@@ -77,32 +74,6 @@ impl Turning {
     }
 }
 
-/// What a pair of whitened columns explains of a signal that has nothing of the declared model any more:
-/// z' G^-1 z. `products` of each column: with the declared model's directions, then with the signal.
-fn explained(pair: [&[f64]; 2], products: [&[f64]; 2]) -> f64 {
-    let rank = products[0].len() - 1;
-    let gram = |i: usize, j: usize| {
-        let whole = dot(pair[i], pair[j]);
-        let parts = products[i][..rank].iter().zip(&products[j][..rank]);
-        (whole, whole - parts.map(|(a, b)| a * b).sum::<f64>())
-    };
-    let ((ss, s), (cc, c), (_, sc)) = (gram(0, 0), gram(1, 1), gram(0, 1));
-    let (y_s, y_c) = (products[0][rank], products[1][rank]);
-    let alone = |whole: f64, left: f64, y: f64| {
-        if left > DECLARED * whole {
-            y * y / left
-        } else {
-            0.0
-        }
-    };
-    let determinant = s * c - sc * sc;
-    if s > DECLARED * ss && c > DECLARED * cc && determinant > DECLARED * ss * cc {
-        (c * y_s * y_s - 2.0 * sc * y_s * y_c + s * y_c * y_c) / determinant
-    } else {
-        alone(ss, s, y_s).max(alone(cc, c, y_c))
-    }
-}
-
 /// Scans frequencies from three periods over the record to the rows' Nyquist frequency, under the
 /// likeliest noises of the grid.
 pub fn strongest(c: &Channels, fit: &Fit, grid: &Grid) -> Option<Tone> {
@@ -128,17 +99,16 @@ pub fn strongest(c: &Channels, fit: &Fit, grid: &Grid) -> Option<Tone> {
         let rss = dot(&y, &y).max(f64::MIN_POSITIVE);
         let mut greatest = 0.0f64;
         let mut turning = Turning::new(&times, TAU * frequency(0), TAU / (OVERSAMPLING * span));
-        let against: Vec<&[f64]> = declared.q.iter().chain([&y]).map(Vec::as_slice).collect();
-        let width = against.len();
+        let signals = [y];
+        let partial = Partial::new(&declared, &signals);
         for start in (0..count).step_by(BATCH) {
             let pairs = turning.next(BATCH.min(count - start));
             let white = whitener.apply_all(&pairs);
-            let products = dots(&white, &against);
-            let each = white.chunks_exact(2).zip(products.chunks_exact(2 * width));
-            for (k, (pair, products)) in each.enumerate() {
-                let (sine, cosine) = products.split_at(width);
-                let explained = explained([&pair[0], &pair[1]], [sine, cosine]);
-                let ratio = -(-(explained / rss).clamp(0.0, 1.0 - 1e-12)).ln_1p();
+            let products = partial.products(&white);
+            for k in 0..white.len() / 2 {
+                let mut explained = [0.0];
+                products.explained(2 * k..2 * k + 2, &mut explained);
+                let ratio = -(-(explained[0] / rss).clamp(0.0, 1.0 - 1e-12)).ln_1p();
                 let surprise = chi_square_surprise(2, bartlett(contrasts, 2) * ratio);
                 if surprise > greatest {
                     greatest = surprise;
