@@ -14,7 +14,7 @@ use std::borrow::Cow;
 /// Net gain by which another candidate takes a term's place.
 pub(super) const BETTER: f64 = 1.5;
 
-/// Most polishes in a row.
+/// Most turns of a polish.
 const POLISHES: usize = 3;
 
 /// Places from which a shape that moves the bias is climbed.
@@ -74,23 +74,62 @@ impl Search<'_> {
             }
             return self.model(&terms);
         }
-        let polished = self.polished_anew(model)?;
+        match self.turned(model, f64::NEG_INFINITY)? {
+            Some(turned) => self.kept(&given, turned),
+            None => self.model(&given),
+        }
+    }
+
+    /// The polished model of some terms, if its net log-likelihood is at least what is due.
+    fn polished_to(&self, terms: &[Term], due: f64) -> Result<Option<Model>, Unusable> {
+        let model = self.model(terms)?;
+        let polished = match self.polishes.get(terms) {
+            Some(_) => self.polished(model)?,
+            None => match self.turned(model, due)? {
+                Some(turned) => self.kept(terms, turned)?,
+                None => return Ok(None),
+            },
+        };
+        Ok((self.net(&polished) >= due).then_some(polished))
+    }
+
+    /// The model of turned terms, kept as the polish of the given ones.
+    fn kept(&self, given: &[Term], turned: Model) -> Result<Model, Unusable> {
+        let polished = self.levelled(self.model(&turned.terms)?)?;
         let points = polished.terms.iter().map(|t| t.point.clone());
-        self.polishes.keep(&given, points.collect());
+        self.polishes.keep(given, points.collect());
         Ok(polished)
     }
 
-    fn polished_anew(&self, mut model: Model) -> Result<Model, Unusable> {
-        for _ in 0..POLISHES {
-            let before: Vec<Point> = model.terms.iter().map(|t| t.point.clone()).collect();
-            model = self.polished_once(model, 0)?;
-            // What acts on the bias and the bias move each other; other shapes are done at once.
-            let acting = model.terms.iter().any(|t| t.candidate.acts_on_bias());
-            if !acting || model.terms.iter().map(|t| &t.point).eq(before.iter()) {
+    /// One term after the other: once, or, as what acts on the bias and the bias move each other, until all stay where they are.
+    /// `None` where a turn over all terms has gained so little that the model will not come to a net
+    /// log-likelihood of `due`.
+    fn turned(&self, mut model: Model, due: f64) -> Result<Option<Model>, Unusable> {
+        let count = model.terms.len();
+        let acting = model.terms.iter().any(|t| t.candidate.acts_on_bias());
+        let mut staying = 0;
+        for turn in 0..POLISHES {
+            let before = self.net(&model);
+            for k in 0..count {
+                let from = model.terms[k].point.clone();
+                model = self.polished_at(model, k)?;
+                let stays = model.terms[k].point == from;
+                staying = if stays { staying + 1 } else { 0 };
+                // The one that moved last need not be asked.
+                if turn > 0 && staying + 1 >= count {
+                    return Ok(Some(model));
+                }
+            }
+            if !acting || staying == count {
                 break;
             }
+            let reached = self.net(&model);
+            let turns_left = (POLISHES - 1 - turn) as f64;
+            if reached + turns_left * (reached - before) < due {
+                return Ok(None);
+            }
         }
-        self.levelled(self.model(&model.terms)?)
+        Ok(Some(model))
     }
 
     /// A clip's levels where its rows lie: what all clipped rows have in common is a constant beside the model,
@@ -139,40 +178,40 @@ impl Search<'_> {
     /// # Errors
     /// Too few rows.
     pub fn tried(&self, terms: &[Term], from: usize) -> Result<Model, Unusable> {
-        let model = self.polished_once(self.model(terms)?, from)?;
+        let mut model = self.model(terms)?;
+        for k in from..terms.len() {
+            model = self.polished_at(model, k)?;
+        }
         self.levelled(self.model(&model.terms)?)
     }
 
-    fn polished_once(&self, mut model: Model, from: usize) -> Result<Model, Unusable> {
-        for k in from..model.terms.len() {
-            let term = &model.terms[k];
-            if term.evident {
+    fn polished_at(&self, mut model: Model, k: usize) -> Result<Model, Unusable> {
+        if model.terms[k].evident {
+            return Ok(model);
+        }
+        let mut ways = vec![(model.fit.clone(), model.fit.at.shape)];
+        if self.spikes(&model.fit) > 0 {
+            let full = model.fit.unspiked(&self.channels.time_s, &self.used)?;
+            ways.push((full, model.fit.at.shape));
+        }
+        if self.wander(&model) > WANDER {
+            // A shape that is off makes the very wander under which it seems to be right.
+            ways.push((model.fit.clone(), WHITE));
+        }
+        for (fit, shape) in ways {
+            let point = self.repolished(&model, k, (&fit, shape));
+            if point == model.terms[k].point {
                 continue;
             }
-            let mut ways = vec![(model.fit.clone(), model.fit.at.shape)];
-            if self.spikes(&model.fit) > 0 {
-                let full = model.fit.unspiked(&self.channels.time_s, &self.used)?;
-                ways.push((full, model.fit.at.shape));
-            }
-            if self.wander(&model) > WANDER {
-                // A shape that is off makes the very wander under which it seems to be right.
-                ways.push((model.fit.clone(), WHITE));
-            }
-            for (fit, shape) in ways {
-                let point = self.repolished(&model, k, (&fit, shape));
-                if point == model.terms[k].point {
-                    continue;
-                }
-                let mut terms = model.terms.clone();
-                terms[k].point = point;
-                let options = match shape == WHITE {
-                    true => self.options(),
-                    false => self.near(&model),
-                };
-                let next = self.model_with(&terms, &options)?;
-                if self.net(&next) > self.net(&model) && next.admits(self.channels, k) {
-                    model = next;
-                }
+            let mut terms = model.terms.clone();
+            terms[k].point = point;
+            let options = match shape == WHITE {
+                true => self.options(),
+                false => self.near(&model),
+            };
+            let next = self.model_with(&terms, &options)?;
+            if self.net(&next) > self.net(&model) && next.admits(self.channels, k) {
+                model = next;
             }
         }
         Ok(model)
@@ -322,8 +361,8 @@ impl Search<'_> {
             others.remove(k);
             let doubted = own.candidate.named() && !own.evident;
             if doubted && others.iter().any(|t| t.candidate.named()) {
-                let without = self.polished(self.model(&others)?)?;
-                if self.net(&without) >= self.net(&model) - EQUAL {
+                let due = self.net(&model) - EQUAL;
+                if let Some(without) = self.polished_to(&others, due)? {
                     model = without;
                     k = 0;
                     continue;
