@@ -24,6 +24,7 @@ mod memo;
 mod model;
 mod once;
 mod otherwise;
+mod polish;
 mod proven;
 mod reading;
 pub mod refine;

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::closure::channels::Channels;
-use crate::closure::effects::Candidate;
+use crate::closure::effects::{Candidate, Point};
 use crate::closure::search::{Effort, Search};
 use crate::closure::synthetic::{Pull, Random, triangle};
 use std::collections::BTreeMap;
