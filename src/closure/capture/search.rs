@@ -4,6 +4,7 @@
 //! a step forward began wrongly (a table for what are an offset and a clipping) is left by exchange.
 
 use super::candidates::{Effect, Variant};
+use super::columns::{HAT, POWER, POWERS};
 use super::gram::{Combo, Detail, Solved, solve};
 use std::collections::BTreeMap;
 
@@ -86,11 +87,22 @@ impl<'a> Search<'a> {
         self.variants.get(variant).map(|v| v.effect)
     }
 
-    /// The variants of effects that are not in the set.
+    /// The variants of effects that are not in the set, but for those that are a part of one that is: a front end's
+    /// bend and a converter's of the same codes are one, and the line of a bend that has one is the gain error.
     pub fn others(&self, set: &[usize]) -> Vec<usize> {
         let taken: Vec<_> = set.iter().map(|k| self.effect(*k)).collect();
+        let has = |is: &dyn Fn(&Variant) -> bool| {
+            set.iter().any(|k| self.variants.get(*k).is_some_and(is))
+        };
+        let is_bent = has(&is_bend);
+        let is_lined = has(&has_line);
+        let has_gain = has(&|v| v.effect == Effect::Gain);
+        let is_part = |v: &Variant| {
+            is_bent && is_bend(v) || is_lined && v.effect == Effect::Gain || has_gain && has_line(v)
+        };
         (0..self.variants.len())
             .filter(|k| !taken.contains(&self.effect(*k)))
+            .filter(|k| !self.variants.get(*k).is_some_and(is_part))
             .collect()
     }
 
@@ -169,7 +181,8 @@ impl<'a> Search<'a> {
         set
     }
 
-    /// Sets with an offset and a gain error in the place of a bend, which a step forward may have taken for both.
+    /// Sets with an offset and a gain error in the place of a bend, which a step forward may have taken for both; and
+    /// of a bend beside harmonics, with a gain error beside others: a bend of a tone is its harmonics and the tone.
     pub fn straightened(&self, set: &[usize]) -> Vec<Vec<usize>> {
         let is = |k: &usize, effect: Effect| self.effect(*k) == Some(effect);
         if !set.iter().any(|k| is(k, Effect::Nonlinearity)) {
@@ -180,10 +193,18 @@ impl<'a> Search<'a> {
         let rest: Vec<usize> = rest.copied().collect();
         let of = |effect: Effect| (0..self.variants.len()).filter(move |k| is(k, effect));
         let with = |a: usize, b: usize| rest.iter().copied().chain([a, b]).collect();
-        of(Effect::Offset)
+        let mut out: Vec<Vec<usize>> = of(Effect::Offset)
             .flat_map(|a| of(Effect::Gain).map(move |b| (a, b)))
             .map(|(a, b)| with(a, b))
-            .collect()
+            .collect();
+        if set.iter().any(|k| is(k, Effect::Harmonics)) {
+            let rest = rest.iter().filter(|k| !is(k, Effect::Harmonics));
+            let rest: Vec<usize> = rest.copied().collect();
+            let with = |a: usize, b: usize| rest.iter().copied().chain([a, b]).collect();
+            let pairs = of(Effect::Harmonics).flat_map(|a| of(Effect::Gain).map(move |b| (a, b)));
+            out.extend(pairs.map(|(a, b)| with(a, b)));
+        }
+        out
     }
 
     /// The effects that do nearly as well in the place of one of a set: best variant, and its
@@ -211,6 +232,24 @@ impl<'a> Search<'a> {
     }
 }
 
+/// Whether a variant is a function of the signal: a nonlinearity, or harmonics by powers of it.
+fn is_bend(variant: &Variant) -> bool {
+    let mut columns = variant.combos.iter().flat_map(|c| &c.parts);
+    variant.effect == Effect::Nonlinearity
+        || variant.effect == Effect::Harmonics && columns.any(|p| is_power(p.1))
+}
+
+/// Whether a variant is a bend with a line of its own: the first power, or a table.
+fn has_line(variant: &Variant) -> bool {
+    let mut columns = variant.combos.iter().flat_map(|c| &c.parts);
+    variant.effect == Effect::Nonlinearity && columns.any(|p| p.1 == POWER || p.1 >= HAT)
+}
+
+/// Whether a column is a power of the signal.
+fn is_power(column: usize) -> bool {
+    (POWER..POWER + POWERS).contains(&column)
+}
+
 /// Combos of a set, the base and the nuisance first, and their ridges.
 pub fn combos_of<'a>(
     base: &'a [Combo],
@@ -228,4 +267,69 @@ pub fn combos_of<'a>(
     combos.extend(chosen.flat_map(|v| &v.combos));
     ridge.resize(combos.len(), 0.0);
     (combos, ridge)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::candidates::variants;
+    use super::super::columns::ALL;
+    use super::super::synthetic::{AMPLITUDE, Made, model};
+    use super::*;
+
+    /// All variants of a capture.
+    fn all() -> Vec<Variant> {
+        let made = Made::CLEAN;
+        let (known, model) = model(&made.capture(), &made);
+        let free = [[0.0, -AMPLITUDE], [61.7, 20.2]];
+        variants(&known, &model, free, made.rows, false)
+    }
+
+    fn first(variants: &[Variant], effect: Effect) -> usize {
+        variants.iter().position(|v| v.effect == effect).unwrap()
+    }
+
+    #[test]
+    fn a_bend_is_not_beside_another_bend() {
+        let variants = all();
+        let sums = [vec![0.0; (ALL + 1).pow(2)], vec![0.0; (ALL + 1).pow(2)]];
+        let search = Search::new(&sums, &[], &[], &variants);
+        let bend = first(&variants, Effect::Nonlinearity);
+        let others = search.others(&[bend]);
+        let harmonics = others
+            .iter()
+            .filter(|k| variants[**k].effect == Effect::Harmonics);
+        let powers = |k: &usize| variants[*k].combos.iter().any(|c| is_power(c.parts[0].1));
+        assert!(harmonics.clone().count() > 20);
+        assert!(!harmonics.clone().any(powers));
+    }
+
+    #[test]
+    fn a_gain_error_is_not_beside_a_bend_that_has_a_line() {
+        let variants = all();
+        let sums = [vec![0.0; (ALL + 1).pow(2)], vec![0.0; (ALL + 1).pow(2)]];
+        let search = Search::new(&sums, &[], &[], &variants);
+        let gain = first(&variants, Effect::Gain);
+        let with = |set: &[usize], other: usize| search.others(set).contains(&other);
+        let bends = || (0..variants.len()).filter(|k| variants[*k].effect == Effect::Nonlinearity);
+        let lines = bends().filter(|k| has_line(&variants[*k]));
+        assert!(lines.clone().count() > 20 && bends().any(|k| !has_line(&variants[k])));
+        for bend in bends() {
+            let apart = !has_line(&variants[bend]);
+            assert_eq!((with(&[bend], gain), with(&[gain], bend)), (apart, apart));
+        }
+    }
+
+    #[test]
+    fn a_bend_beside_harmonics_may_be_a_gain_error_beside_others() {
+        let variants = all();
+        let sums = [vec![0.0; (ALL + 1).pow(2)], vec![0.0; (ALL + 1).pow(2)]];
+        let search = Search::new(&sums, &[], &[], &variants);
+        let set = [Effect::Nonlinearity, Effect::Harmonics].map(|e| first(&variants, e));
+        let is = |set: &Vec<usize>| {
+            let mut effects: Vec<Effect> = set.iter().map(|k| variants[*k].effect).collect();
+            effects.sort();
+            effects == [Effect::Gain, Effect::Harmonics]
+        };
+        assert!(search.straightened(&set).iter().any(is));
+    }
 }

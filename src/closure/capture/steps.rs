@@ -2,7 +2,7 @@
 
 use super::around::{TABLES, generous};
 use super::candidates::{Variant, base_ridge};
-use super::columns::{Model, SAW, WAVE};
+use super::columns::{COS, Model, SAW, SIN, WAVE};
 use super::gram::{Combo, Detail, Gram, Summed, solve, spread};
 use super::input::Capture;
 use super::search::combos_of;
@@ -13,12 +13,24 @@ const ROWS: usize = 100_000;
 const LEAST_SAW: f64 = 0.3;
 /// The same of its smoothed wave, codes: what 0.3 codes of noise leave of it.
 const LEAST_WAVE: f64 = 0.05;
+/// Variance that hides the steps: what leaves [`LEAST_WAVE`].
+const HIDING: f64 = 0.09;
 
-/// Whether the quantiser's error shows undithered in a channel: the place of the steps then matters.
+/// Whether the quantiser's error shows undithered in a channel: the place of the steps then matters. Where a random
+/// instant moves the signal by what hides them, they are left at its peaks alone, where few rows say nothing of the
+/// rest.
 pub fn is_sharp(coefficients: &[Vec<f64>; 2], model: &Model) -> bool {
-    coefficients.iter().zip(model.variance.base).any(|(c, v)| {
-        let at = |k: usize| c.get(k).copied().unwrap_or(0.0).abs();
-        v < 16.0 && (at(SAW) > LEAST_SAW || at(WAVE) > LEAST_WAVE)
+    (0..2).any(|channel| {
+        let Some(c) = coefficients.get(channel) else {
+            return false;
+        };
+        let at = |k: usize| c.get(k).copied().unwrap_or(0.0);
+        let [sin, cos] = model.declared[channel];
+        let slope = model.tone.angle() * (sin + at(SIN)).hypot(cos + at(COS));
+        let late = 0.5 * model.variance.jitter * slope * slope;
+        model.variance.base[channel] < 16.0
+            && late < HIDING
+            && (at(SAW).abs() > LEAST_SAW || at(WAVE).abs() > LEAST_WAVE)
     })
 }
 
@@ -75,5 +87,24 @@ pub fn settle(
         let solved = solve(gram.all(), &combos, &ridge, Detail::All);
         model.coefficients = spread(&combos, &solved);
         model.neutral.clone_from(&model.coefficients);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::synthetic::{Made, model};
+    use super::*;
+
+    #[test]
+    fn steps_are_hidden_where_a_random_instant_moves_the_signal_by_a_code() {
+        let made = Made::CLEAN;
+        let (_, mut model) = model(&made.capture(), &made);
+        let mut coefficients = model.coefficients.clone();
+        // Of the drive alone, as a tone of no amplitude is not moved.
+        coefficients[0][SAW] = 1.0;
+        assert!(is_sharp(&coefficients, &model));
+        // Half a code rms of 200 codes.
+        model.variance.jitter = 2.0 * (0.5 / (200.0 * model.tone.angle())).powi(2);
+        assert!(!is_sharp(&coefficients, &model));
     }
 }
