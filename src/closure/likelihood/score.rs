@@ -166,9 +166,9 @@ impl Profile {
         let half = 0.5 * at.contrasts as f64;
         let excited = (0..at.degrees.len()).filter(|p| at.degrees[*p] > 0);
         for point in excited {
-            for signal in 0..signals {
+            for (signal, null) in null.iter().enumerate() {
                 let with = &mut self.with[point * signals + signal];
-                let now = null[signal] + half * at.ratio(point, signal);
+                let now = null + half * at.ratio(point, signal);
                 if now > *with {
                     *with = now;
                     if signal == 0 {
