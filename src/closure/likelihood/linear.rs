@@ -195,7 +195,7 @@ const ROUNDED: f64 = 1e-12;
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Factor {
     /// The columns that are in.
-    pub kept: Vec<usize>,
+    kept: Vec<usize>,
     /// Row k of the factor: k + 1 values.
     rows: Vec<Vec<f64>>,
 }

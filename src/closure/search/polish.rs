@@ -161,39 +161,31 @@ impl Search<'_> {
     /// # Errors
     /// Too few rows.
     pub fn polished(&self, model: Model) -> Result<Model, Unusable> {
-        let given = model.terms.clone();
-        if let Some(points) = self.polishes.get(&given) {
-            let mut terms = given;
+        let polished = self.polished_to(model.clone(), f64::NEG_INFINITY)?;
+        Ok(polished.unwrap_or(model))
+    }
+
+    /// The same, if its net log-likelihood is at least what is due.
+    ///
+    /// # Errors
+    /// Too few rows.
+    pub(super) fn polished_to(&self, model: Model, due: f64) -> Result<Option<Model>, Unusable> {
+        let mut terms = model.terms.clone();
+        let polished = if let Some(points) = self.polishes.get(&terms) {
             for (term, point) in terms.iter_mut().zip(points) {
                 term.point = point;
             }
-            return self.model(&terms);
-        }
-        match self.turned(model, f64::NEG_INFINITY)? {
-            Some(turned) => self.kept(&given, turned),
-            None => self.model(&given),
-        }
-    }
-
-    /// The polished model of some terms, if its net log-likelihood is at least what is due.
-    pub(super) fn polished_to(&self, terms: &[Term], due: f64) -> Result<Option<Model>, Unusable> {
-        let model = self.model(terms)?;
-        let polished = match self.polishes.get(terms) {
-            Some(_) => self.polished(model)?,
-            None => match self.turned(model, due)? {
-                Some(turned) => self.kept(terms, turned)?,
-                None => return Ok(None),
-            },
+            self.model(&terms)?
+        } else {
+            let Some(turned) = self.turned(model, due)? else {
+                return Ok(None);
+            };
+            let polished = self.levelled(self.model(&turned.terms)?)?;
+            let points = polished.terms.iter().map(|t| t.point.clone());
+            self.polishes.keep(&terms, points.collect());
+            polished
         };
         Ok((self.net(&polished) >= due).then_some(polished))
-    }
-
-    /// The model of turned terms, kept as the polish of the given ones.
-    fn kept(&self, given: &[Term], turned: Model) -> Result<Model, Unusable> {
-        let polished = self.levelled(self.model(&turned.terms)?)?;
-        let points = polished.terms.iter().map(|t| t.point.clone());
-        self.polishes.keep(given, points.collect());
-        Ok(polished)
     }
 
     /// One term after the other: once, or, as what acts on the bias and the bias move each other, until all stay where they are.

@@ -64,7 +64,7 @@ impl Search<'_> {
             let doubted = own.candidate.named() && !own.evident;
             if doubted && others.iter().any(|t| t.candidate.named()) {
                 let due = self.net(&model) - EQUAL;
-                if let Some(without) = self.polished_to(&others, due)? {
+                if let Some(without) = self.polished_to(self.model(&others)?, due)? {
                     model = without;
                     k = 0;
                     continue;
