@@ -1,8 +1,8 @@
 //! Dot products, orthonormal bases, products of tall matrices; all in a fixed order of operations,
 //! so that the bits do not depend on the processor.
 
-use super::wide::{Kernel, widest};
 use nalgebra::{DMatrix, DVector};
+use pulp::{Arch, Simd, WithSimd};
 
 /// A pivot that falls below this share of the column's norm is rounding: the column lies in the
 /// span of those before it.
@@ -13,7 +13,7 @@ const SUMS: usize = 16;
 
 /// Sum of products, in interleaved partial sums.
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
-    widest(Dot { a, b })
+    Arch::new().dispatch(Dot { a, b })
 }
 
 struct Dot<'a> {
@@ -21,11 +21,11 @@ struct Dot<'a> {
     b: &'a [f64],
 }
 
-impl Kernel for Dot<'_> {
+impl WithSimd for Dot<'_> {
     type Output = f64;
 
     #[inline(always)]
-    fn run(self) -> f64 {
+    fn with_simd<S: Simd>(self, _: S) -> f64 {
         product(self.a, self.b)
     }
 }
@@ -67,11 +67,11 @@ struct Projection<'a> {
     taken: &'a mut [f64],
 }
 
-impl Kernel for Projection<'_> {
+impl WithSimd for Projection<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run(self) {
+    fn with_simd<S: Simd>(self, _: S) {
         for _ in 0..2 {
             for (q, t) in self.q.iter().zip(self.taken.iter_mut()) {
                 let part = product(q, self.column);
@@ -133,7 +133,7 @@ impl Basis {
     /// Takes the span out of a column, twice; returns what was taken, in coordinates of Q.
     pub fn project_off(&self, column: &mut [f64]) -> Vec<f64> {
         let mut taken = vec![0.0; self.q.len()];
-        widest(Projection {
+        Arch::new().dispatch(Projection {
             q: &self.q,
             column,
             taken: &mut taken,
@@ -263,7 +263,7 @@ pub fn normal(gram: &DMatrix<f64>, with: &DVector<f64>) -> Vec<f64> {
 
 /// All dot products of the columns of `a` with those of `b`: entry [i * b.len() + j].
 pub fn dots<A: AsRef<[f64]>, B: AsRef<[f64]>>(a: &[A], b: &[B]) -> Vec<f64> {
-    widest(Dots { a, b })
+    Arch::new().dispatch(Dots { a, b })
 }
 
 struct Dots<'a, A, B> {
@@ -271,12 +271,12 @@ struct Dots<'a, A, B> {
     b: &'a [B],
 }
 
-impl<A: AsRef<[f64]>, B: AsRef<[f64]>> Kernel for Dots<'_, A, B> {
+impl<A: AsRef<[f64]>, B: AsRef<[f64]>> WithSimd for Dots<'_, A, B> {
     type Output = Vec<f64>;
 
     /// Blocked, so that both stay in the cache.
     #[inline(always)]
-    fn run(self) -> Vec<f64> {
+    fn with_simd<S: Simd>(self, _: S) -> Vec<f64> {
         const BLOCK: usize = 1024;
         let (a, b) = (self.a, self.b);
         let mut out = vec![0.0; a.len() * b.len()];

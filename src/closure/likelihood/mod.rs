@@ -7,13 +7,14 @@
 //! squares; [`reml`] estimates the strengths ([`robust`]: spikes; [`decimate`]: long records);
 //! [`candidates`] measures a dictionary of candidate effects ([`partial`]: beside the declared model); [`score`] says how
 //! often chance alone does as well ([`tail`]: small probabilities); [`blocks`] cuts held-out blocks.
-//! [`linear`], [`random`] and [`wide`] are tools.
+//! [`linear`], [`random`] and `filter` are tools.
 //!
 //! Nothing here is random: surrogates are functions of a seed and a counter ([`random`]).
 
 pub mod blocks;
 pub mod candidates;
 pub mod decimate;
+mod filter;
 pub mod lattice;
 pub mod linear;
 pub mod memory;
@@ -25,7 +26,6 @@ pub mod robust;
 pub mod score;
 pub mod tail;
 pub mod whiten;
-pub mod wide;
 
 #[cfg(test)]
 mod calibration_tests;

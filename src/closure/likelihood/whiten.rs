@@ -7,11 +7,8 @@
 //! data: they are made once ([`Whitener::new`], rows times states^2) and used for any number of
 //! columns (rows times states each).
 
+use super::filter::filter;
 use super::noise::{Shape, State, Timeline};
-use super::wide::{Kernel, widest};
-
-/// Columns that are filtered side by side.
-const LANES: usize = 8;
 
 /// Gains of the filter for one timeline and one shape of the noise, the white variance being 1.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,9 +22,9 @@ pub struct Whitener {
     /// One over the innovation's standard deviation, row by row; 0 for rows that are not used.
     pub inverse_std: Vec<f64>,
     /// Number of states, rounded up to a size that the filter is compiled for.
-    width: usize,
+    pub(super) width: usize,
     /// For each row the `width` decays, then the `width` gains.
-    coefficients: Vec<f64>,
+    pub(super) coefficients: Vec<f64>,
 }
 
 /// Calls a function of the compiled size that holds `$width` states.
@@ -62,9 +59,7 @@ impl Whitener {
             .iter()
             .map(|_| vec![0.0; self.inverse_std.len()])
             .collect();
-        for (inputs, outputs) in columns.chunks(LANES).zip(out.chunks_mut(LANES)) {
-            sized!(self.width, filter(self, inputs, outputs));
-        }
+        sized!(self.width, filter(self, columns, &mut out));
         out
     }
 
@@ -193,88 +188,4 @@ fn gains<const N: usize>(line: &Timeline, shape: Shape, states: &[State]) -> Whi
         }
     }
     out
-}
-
-/// Filters up to [`LANES`] columns side by side.
-fn filter<const N: usize>(
-    whitener: &Whitener,
-    inputs: &[impl AsRef<[f64]>],
-    outputs: &mut [Vec<f64>],
-) {
-    let empty: &[f64] = &[];
-    let mut columns = [empty; LANES];
-    for (c, input) in columns.iter_mut().zip(inputs) {
-        *c = input.as_ref();
-    }
-    widest(Filter::<N> {
-        whitener,
-        columns,
-        outputs,
-    });
-}
-
-/// The recursion of a whitener with N states.
-struct Filter<'a, const N: usize> {
-    whitener: &'a Whitener,
-    columns: [&'a [f64]; LANES],
-    outputs: &'a mut [Vec<f64>],
-}
-
-impl<const N: usize> Kernel for Filter<'_, N> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let mut m = [[0.0f64; LANES]; N];
-        let rows = self.whitener.coefficients.chunks_exact((2 * N).max(1));
-        let n = self.whitener.inverse_std.len();
-        let mut rows = rows.map(|row| row.split_at(N));
-        for row in 0..n {
-            let inverse = self.whitener.inverse_std[row];
-            let (decays, gains) = rows.next().unwrap_or((&[], &[]));
-            let mut v = [0.0f64; LANES];
-            if inverse > 0.0 {
-                for (v, c) in v.iter_mut().zip(&self.columns) {
-                    *v = c.get(row).copied().unwrap_or(0.0);
-                }
-            }
-            for (m, a) in m.iter_mut().zip(decays) {
-                for m in m.iter_mut() {
-                    *m *= a;
-                }
-            }
-            if inverse > 0.0 {
-                let predicted = total(&m);
-                for (v, p) in v.iter_mut().zip(&predicted) {
-                    *v -= p;
-                }
-                for (m, g) in m.iter_mut().zip(gains) {
-                    for (m, v) in m.iter_mut().zip(&v) {
-                        *m += g * v;
-                    }
-                }
-                for (out, v) in self.outputs.iter_mut().zip(&v) {
-                    out[row] = v * inverse;
-                }
-            }
-        }
-    }
-}
-
-/// The sum of the states, by pairs: the filter waits for it in every row.
-#[inline(always)]
-fn total<const N: usize>(m: &[[f64; LANES]; N]) -> [f64; LANES] {
-    let mut sums = *m;
-    let mut count = N;
-    while count > 1 {
-        let half = count.div_ceil(2);
-        let (low, high) = sums.split_at_mut(half);
-        for (low, high) in low.iter_mut().zip(&high[..count - half]) {
-            for (low, high) in low.iter_mut().zip(high) {
-                *low += high;
-            }
-        }
-        count = half;
-    }
-    sums.first().copied().unwrap_or([0.0; LANES])
 }
