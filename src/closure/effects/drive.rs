@@ -10,8 +10,8 @@ use crate::closure::likelihood::linear::Basis;
 use crate::correction::Term;
 
 /// All of this file.
-pub fn all() -> Vec<Box<dyn Candidate>> {
-    vec![Box::new(Damping), Box::new(Coupling)]
+pub fn all(c: &Channels) -> Vec<Box<dyn Candidate>> {
+    vec![Box::new(Damping), Box::new(Coupling::new(c))]
 }
 
 /// Bias through damping, which the drive gain follows.
@@ -233,7 +233,19 @@ fn detuned(g: &[f64], angle_rad: &[f64]) -> Vec<f64> {
 }
 
 /// The drive's amplitude pulls the measured phase.
-struct Coupling;
+struct Coupling {
+    /// By form, the course of the pull and its largest magnitude.
+    pulls: Vec<(Vec<f64>, f64)>,
+}
+
+impl Coupling {
+    fn new(c: &Channels) -> Self {
+        let pulls = |g| (0..PULLS).map(|form| pulls(g, c, form)).collect();
+        Coupling {
+            pulls: c.column("agc").map(pulls).unwrap_or_default(),
+        }
+    }
+}
 
 const COUPLING: Sheet = Sheet {
     id: "amplitude_phase_coupling",
@@ -284,8 +296,10 @@ impl Candidate for Coupling {
     }
 
     fn columns_of(&self, c: &Channels, biases: &[Bias], point: &Point) -> Vec<Vec<Vec<f64>>> {
-        let (pull, most) = pulls(c, point.form);
-        let rows = || c.u.iter().zip(&pull);
+        let Some((pull, most)) = self.pulls.get(point.form) else {
+            return vec![Vec::new(); biases.len()];
+        };
+        let rows = || c.u.iter().zip(pull);
         let Some(most_u) = point.theta.first() else {
             let along = |b: &Bias| vec![rows().map(|(u, d)| -b.slope(*u) * d).collect()];
             return biases.iter().map(along).collect();
@@ -323,7 +337,8 @@ impl Candidate for Coupling {
         let Some(most_u) = e.point.theta.first() else {
             return [gain("pull_rad", e, 0, c.half)].into_iter().collect();
         };
-        let per_unit = c.half / pulls(c, e.point.form).1;
+        let most = self.pulls.get(e.point.form).map_or(1.0, |pull| pull.1);
+        let per_unit = c.half / most;
         let std = e.theta_std.first().copied().unwrap_or(0.0);
         [entry("pull_rad", most_u * per_unit, (std * per_unit).abs())]
             .into_iter()
@@ -341,9 +356,8 @@ const MOST_PULL_U: f64 = 1000.0;
 /// Largest pulls, in units of u, at which the search looks.
 const LARGE: [f64; 6] = [0.15, -0.15, 0.4, -0.4, 1.0, -1.0];
 
-/// The course of a form's pull, and its largest magnitude.
-fn pulls(c: &Channels, form: usize) -> (Vec<f64>, f64) {
-    let g = c.column("agc").unwrap_or(&[]);
+/// The course of a form's pull by the drive gain, and its largest magnitude.
+fn pulls(g: &[f64], c: &Channels, form: usize) -> (Vec<f64>, f64) {
     let source = match form {
         0 | 1 => g.to_vec(),
         _ => without_temperature(g, &c.u),

@@ -191,8 +191,9 @@ fn a_small_pull_is_the_only_name() {
 
 #[test]
 fn a_small_pull_of_a_million_radians_is_none() {
-    assert!(Coupling.admits(&Point::form(0), &[30.0]));
-    assert!(!Coupling.admits(&Point::form(1), &[-3e6]));
+    let coupling = Coupling { pulls: Vec::new() };
+    assert!(coupling.admits(&Point::form(0), &[30.0]));
+    assert!(!coupling.admits(&Point::form(1), &[-3e6]));
     // A large one has its size in its shape.
-    assert!(Coupling.admits(&Point::at(0, &[0.4]), &[1.0]));
+    assert!(coupling.admits(&Point::at(0, &[0.4]), &[1.0]));
 }

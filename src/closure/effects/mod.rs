@@ -354,7 +354,7 @@ pub fn catalogue(c: &Channels) -> Vec<Box<dyn Candidate>> {
     out.extend(time::all());
     out.extend(structure::all());
     out.extend(step::all());
-    out.extend(drive::all());
+    out.extend(drive::all(c));
     out.extend(demodulation::all());
     out.extend(rate::all());
     out.extend(field::all());

@@ -24,9 +24,14 @@ impl Blocks {
     /// The weighted mean of each block; 0 for a block without a used row.
     pub fn means(&self, column: &[f64]) -> Vec<f64> {
         self.each(|rows| {
-            let pairs = column[rows.clone()].iter().zip(&self.weights[rows]);
-            let used = pairs.filter(|(_, w)| **w > 0.0);
-            let (sum, weight) = used.fold((0.0, 0.0), |(s, t), (v, w)| (s + v * w, t + w));
+            let (values, weights) = (&column[rows.clone()], &self.weights[rows]);
+            let add = |(s, t): (f64, f64), (v, w): (&f64, &f64)| (s + v * w, t + w);
+            let pairs = || values.iter().zip(weights);
+            let (mut sum, weight) = pairs().fold((0.0, 0.0), add);
+            if !sum.is_finite() {
+                // Rows that are not used may hold anything.
+                (sum, _) = pairs().filter(|(_, w)| **w > 0.0).fold((0.0, 0.0), add);
+            }
             if weight > 0.0 { sum / weight } else { 0.0 }
         })
     }

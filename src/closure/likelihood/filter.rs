@@ -1,14 +1,14 @@
 //! The recursion of a whitener over many columns, in the widest registers that the processor has.
 //!
-//! What follows one row has to wait for it, and a row is a chain of some thirty cycles: so two registers of columns are
-//! filtered side by side. Every column sees the same operations in the same order whatever the width, and no product and sum are
+//! What follows one row has to wait for it, and a row is a chain of some thirty cycles: so two registers of columns, if there
+//! are as many, are filtered side by side. Every column sees the same operations in the same order whatever the width, and no product and sum are
 //! contracted into one rounding: the bits do not depend on the processor. Loops, no closures: these would be compiled for any
 //! processor.
 
 use super::whiten::Whitener;
 use pulp::{Arch, Simd, WithSimd};
 
-/// Registers of columns that are filtered side by side.
+/// Registers of columns that are filtered side by side, at most.
 const BESIDE: usize = 2;
 
 /// Rows that are turned at once from columns into lanes and back.
@@ -44,22 +44,25 @@ impl<C: AsRef<[f64]>, const N: usize> WithSimd for Filter<'_, C, N> {
         let lanes = BESIDE * S::F64_LANES;
         let columns = self.columns.chunks(lanes);
         for (columns, outputs) in columns.zip(self.outputs.chunks_mut(lanes)) {
-            let states = States::<S, N>::new(simd);
-            states.over(self.whitener, columns, outputs);
+            if columns.len() > S::F64_LANES {
+                States::<S, N, BESIDE>::new(simd).over(self.whitener, columns, outputs);
+            } else {
+                States::<S, N, 1>::new(simd).over(self.whitener, columns, outputs);
+            }
         }
     }
 }
 
 /// What the filter knows of some columns: [state][register].
-struct States<S: Simd, const N: usize> {
+struct States<S: Simd, const N: usize, const B: usize> {
     simd: S,
-    m: [[S::f64s; BESIDE]; N],
+    m: [[S::f64s; B]; N],
 }
 
-impl<S: Simd, const N: usize> States<S, N> {
+impl<S: Simd, const N: usize, const B: usize> States<S, N, B> {
     #[inline(always)]
     fn new(simd: S) -> Self {
-        let m = [[simd.splat_f64s(0.0); BESIDE]; N];
+        let m = [[simd.splat_f64s(0.0); B]; N];
         States { simd, m }
     }
 
@@ -71,7 +74,7 @@ impl<S: Simd, const N: usize> States<S, N> {
         columns: &[impl AsRef<[f64]>],
         outputs: &mut [Vec<f64>],
     ) {
-        let lanes = BESIDE * S::F64_LANES;
+        let lanes = B * S::F64_LANES;
         let mut buffer = [0.0; TILE * BESIDE * WIDEST];
         let buffer = &mut buffer[..TILE * lanes];
         for (tile, inverses) in whitener.inverse_std.chunks(TILE).enumerate() {
@@ -84,7 +87,7 @@ impl<S: Simd, const N: usize> States<S, N> {
             }
             let coefficients = &whitener.coefficients[2 * N * rows.start..];
             let (registers, _) = S::as_mut_simd_f64s(buffer);
-            let (values, _) = pulp::as_arrays_mut::<BESIDE, _>(registers);
+            let (values, _) = pulp::as_arrays_mut::<B, _>(registers);
             for (row, (v, inverse)) in values.iter_mut().zip(inverses).enumerate() {
                 let both = &coefficients[2 * N * row..2 * N * (row + 1)];
                 let (decays, gains) = both.split_at(N);
@@ -103,9 +106,9 @@ impl<S: Simd, const N: usize> States<S, N> {
     #[inline(always)]
     fn row(
         &mut self,
-        v: [S::f64s; BESIDE],
+        v: [S::f64s; B],
         (decays, gains, inverse): (&[f64], &[f64], f64),
-    ) -> [S::f64s; BESIDE] {
+    ) -> [S::f64s; B] {
         let simd = self.simd;
         for (m, a) in self.m.iter_mut().zip(decays) {
             let a = simd.splat_f64s(*a);
@@ -114,7 +117,7 @@ impl<S: Simd, const N: usize> States<S, N> {
             }
         }
         if inverse <= 0.0 {
-            return [simd.splat_f64s(0.0); BESIDE];
+            return [simd.splat_f64s(0.0); B];
         }
         let mut new = v;
         for (k, new) in new.iter_mut().enumerate() {
@@ -178,9 +181,9 @@ mod tests {
                 let mut narrow = [vec![0.0; rows]];
                 let (columns, outputs) = (std::slice::from_ref(column), &mut narrow[..]);
                 match whitener.width {
-                    0 => States::<_, 0>::new(Scalar::new()).over(&whitener, columns, outputs),
-                    1 => States::<_, 1>::new(Scalar::new()).over(&whitener, columns, outputs),
-                    4 => States::<_, 4>::new(Scalar::new()).over(&whitener, columns, outputs),
+                    0 => States::<_, 0, 1>::new(Scalar::new()).over(&whitener, columns, outputs),
+                    1 => States::<_, 1, 1>::new(Scalar::new()).over(&whitener, columns, outputs),
+                    4 => States::<_, 4, 1>::new(Scalar::new()).over(&whitener, columns, outputs),
                     other => panic!("{other} states"),
                 }
                 let bits = |v: &[f64]| v.iter().map(|v| v.to_bits()).collect::<Vec<_>>();

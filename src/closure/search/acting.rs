@@ -50,6 +50,8 @@ pub(super) struct Settled {
     pub bias: Vec<f64>,
     /// Coefficients of the columns of the effect that was tried, beside the declared ones alone.
     pub own: Vec<f64>,
+    /// Those columns with this bias, over the record's rows.
+    pub columns: Vec<Vec<f64>>,
 }
 
 impl<'a> Settling<'a> {
@@ -142,8 +144,8 @@ impl<'a> Settling<'a> {
         start: &[f64],
     ) -> Settled {
         let known = self.columns.len();
-        let (own, columns) = self.affine(candidate, point, known);
-        let columns: Vec<Vec<f64>> = columns.iter().map(|c| self.weighted(c)).collect();
+        let (own, plain) = self.affine(candidate, point, known);
+        let columns: Vec<Vec<f64>> = plain.iter().map(|c| self.weighted(c)).collect();
         let all = known + columns.len();
         let mixed = dots(&columns, &self.columns);
         let further = dots(&columns, &columns);
@@ -161,9 +163,17 @@ impl<'a> Settling<'a> {
             .chain(own.iter().map(|e| e.at(&bias, all)))
             .collect();
         let fitted = fitted(&products, &beside, &unit(self.linear, all));
+        let with_bias = own.iter().map(|effect| {
+            let mut column = plain[effect.still - known].clone();
+            for (k, b) in effect.by_bias.iter().zip(&bias) {
+                add_scaled(&mut column, *b, &plain[k - known]);
+            }
+            column
+        });
         Settled {
-            bias,
+            columns: with_bias.collect(),
             own: fitted.get(self.order..).unwrap_or_default().to_vec(),
+            bias,
         }
     }
 

@@ -2,7 +2,8 @@
 
 use super::judge::{Judged, PRICE, Round};
 use super::memo::Memo;
-use super::{Found, LEVEL, MOST_RIVALS, Model, Search, Term};
+use super::{ACCIDENT, Found, LEVEL, MOST_RIVALS, Model, Search, Term};
+use crate::closure::effects::Candidate;
 use crate::closure::likelihood::{Unusable, reml};
 use std::sync::Arc;
 
@@ -151,7 +152,7 @@ impl Search<'_> {
         {
             return Ok(decided(Term::of(name, round.rivals(name))));
         }
-        if let Some(term) = self.of_spikes(model, &significant)? {
+        if let Some(term) = self.of_spikes(model, round, &significant)? {
             return Ok(Next::Add(term));
         }
         let Some(leader) = leader else {
@@ -173,8 +174,24 @@ impl Search<'_> {
     /// A name that explains rows which would else be spikes, if it explains the record better than all
     /// that this round found. Judged with every row at full weight: a clipped peak or a short
     /// transient is rare, but no accident.
-    fn of_spikes(&self, model: &Model, found: &[&Judged]) -> Result<Option<Term>, Unusable> {
-        if self.spikes(&model.fit) < FEW {
+    fn of_spikes(
+        &self,
+        model: &Model,
+        round: &Round,
+        found: &[&Judged],
+    ) -> Result<Option<Term>, Unusable> {
+        let spikes = self.spikes(&model.fit);
+        if spikes < FEW {
+            return Ok(None);
+        }
+        let may = may_be(round, found.first().copied(), spikes);
+        let leads = |candidate: &dyn Candidate| {
+            let leader = found.first().map(|f| f.candidate.id());
+            !candidate.is_whole() && leader == Some(candidate.id())
+        };
+        let judged = round.judged.iter().map(|j| &j.candidate);
+        let mut all = self.candidates.iter().chain(judged);
+        if !all.any(|k| k.named() && may(k.as_ref()) && !leads(k.as_ref())) {
             return Ok(None);
         }
         let plainly = reml::Options {
@@ -195,17 +212,13 @@ impl Search<'_> {
             Ok(with)
         };
         let value = |j: &Judged| Ok(with(j)?.value - j.gain + j.net);
-        let worth = |j: &Judged| match j.candidate.is_whole() {
-            true => WORTH_WHOLE,
-            false => WORTH,
-        };
         // First without surrogates, which cost most and decide nothing where no name is worth it, or the best
         // one leads without the spikes.
-        let quick = self.judge(&plain, 0);
+        let quick = self.gains_of(&plain, &may);
         let mut worthy: Option<(&Judged, f64)> = None;
         let mut sure: Vec<String> = Vec::new();
         for j in looked(&quick.judged, Judged::is_named) {
-            let above = value(j)? - model.value - worth(j) + MARGIN;
+            let above = value(j)? - model.value - worth(j.candidate.as_ref()) + MARGIN;
             if j.candidate.is_whole() && above > SURELY {
                 sure.push(j.candidate.id());
             }
@@ -213,11 +226,7 @@ impl Search<'_> {
                 worthy = Some((j, above));
             }
         }
-        let leads = |j: &Judged| {
-            let leader = found.first().map(|f| f.candidate.id());
-            !j.candidate.is_whole() && leader == Some(j.candidate.id())
-        };
-        if worthy.is_none_or(|(j, _)| leads(j)) {
+        if worthy.is_none_or(|(j, _)| leads(j.candidate.as_ref())) {
             return Ok(None);
         }
         let all = self.judge(&plain, self.effort.surrogates);
@@ -238,7 +247,7 @@ impl Search<'_> {
         // fit next to the one with it.
         let next_to = self.model_with(&model.terms, &self.near(&*with(best)?))?;
         let without = model.value.max(next_to.value);
-        if reached < without + worth(best) {
+        if reached < without + worth(best.candidate.as_ref()) {
             return Ok(None);
         }
         for j in found.iter().take(2) {
@@ -250,7 +259,7 @@ impl Search<'_> {
         let rivals = others.into_iter().map(|(id, _)| id).collect();
         let mut term = Term::of(best, rivals);
         if is_sure(best) {
-            term.p_value = term.p_value.min((without + worth(best) - reached).exp());
+            term.p_value = term.p_value.min((without + worth(best.candidate.as_ref()) - reached).exp());
         }
         Ok(Some(term))
     }
@@ -304,7 +313,8 @@ impl Search<'_> {
         for j in names() {
             let mut terms = model.terms.clone();
             terms.push(Term::of(j, Vec::new()));
-            let second = self.judge(&self.model_with(&terms, &near)?, 0);
+            let names = |candidate: &dyn Candidate| candidate.named();
+            let second = self.gains_of(&self.model_with(&terms, &near)?, &names);
             let Some(second) = second.judged.iter().find(|j| j.candidate.named()) else {
                 continue;
             };
@@ -327,6 +337,30 @@ impl Search<'_> {
             }
         }
         Ok(None)
+    }
+}
+
+/// Log-likelihood by which a name has to be better than spikes.
+fn worth(candidate: &dyn Candidate) -> f64 {
+    match candidate.is_whole() {
+        true => WORTH_WHOLE,
+        false => WORTH,
+    }
+}
+
+/// Which candidates could be the best if they explained every spike, and all other rows as well as they do without these.
+fn may_be(
+    round: &Round,
+    leader: Option<&Judged>,
+    spikes: usize,
+) -> impl Fn(&dyn Candidate) -> bool {
+    let most = ACCIDENT * spikes as f64 + MARGIN;
+    move |candidate| {
+        let id = candidate.id();
+        let own = round.judged.iter().find(|j| j.candidate.id() == id);
+        let others = leader.filter(|l| l.candidate.id() != id);
+        let due = others.map_or(0.0, |l| l.net).max(worth(candidate));
+        round.at_most(own) + most >= due
     }
 }
 

@@ -1,13 +1,12 @@
 //! One round: all candidates beside those that are taken, each at its best shape.
 
-use super::acting::Settling;
-use super::refine::{self, Bench, Profiled};
+use super::refine::{self, Profiled};
+use super::tones::Tone;
 use super::{LEVEL, MOST_RIVALS, Model, Search, fast, tones};
 use crate::closure::channels::Channels;
 use crate::closure::effects::tone::{Pickup, returns};
-use crate::closure::effects::{Bias, Candidate, Missing, Point, map};
-use crate::closure::likelihood::candidates::Group;
-use crate::closure::likelihood::linear::add_scaled;
+use crate::closure::effects::{Candidate, Missing, Point};
+use crate::closure::likelihood::candidates::{Grid, Group};
 use crate::closure::likelihood::noise::Shape;
 use crate::closure::likelihood::reml::Fit;
 use crate::closure::likelihood::score::{self, Scores};
@@ -29,9 +28,6 @@ pub const EQUAL: f64 = 4.0;
 /// the other way round, so that a catalogue's idealised forms differ by less than the truth from each.
 const EQUAL_ONE_WAY: f64 = 12.0;
 
-/// Sizes from which a shape that moves the bias is climbed where one without a size is the best of those tried.
-const SIZES: usize = 2;
-
 /// No slow noise.
 pub(super) const WHITE: Shape = Shape {
     flicker: 0.0,
@@ -45,6 +41,14 @@ pub fn equal(c: &Channels) -> f64 {
     } else {
         EQUAL
     }
+}
+
+/// What a coarse grid may hide of a small gain.
+const COARSE: f64 = 20.0;
+
+/// Whether a gain is so near the best one that the candidate's shape is looked at finely.
+fn is_near(gain: f64, best: f64) -> bool {
+    gain > 0.5 * best - 10.0
 }
 
 /// A candidate of one round, judged.
@@ -76,15 +80,6 @@ impl Judged {
     }
 }
 
-/// A candidate's best shape.
-struct Top {
-    point: Point,
-    /// The declared bias beside it, where it moves that.
-    bias: Option<Bias>,
-    /// Gain in log-likelihood of a shape that has its size in it.
-    whole: Option<f64>,
-}
-
 /// Candidates with their shapes, in order.
 type Running = Vec<(Arc<dyn Candidate>, Vec<Point>)>;
 
@@ -102,6 +97,19 @@ pub struct Round {
 }
 
 impl Round {
+    /// The net gain that a candidate has at most: of one that is far from the best only the places of a coarse grid are known,
+    /// of one that was not judged nothing.
+    pub fn at_most(&self, judged: Option<&Judged>) -> f64 {
+        let Some(judged) = judged else {
+            return COARSE;
+        };
+        let best = self.judged.iter().map(|j| j.gain).fold(0.0, f64::max);
+        match is_near(judged.gain, best) {
+            true => judged.net,
+            false => judged.net + judged.gain.max(COARSE),
+        }
+    }
+
     /// Names that do as well as the given one, best first; of those that do so only because the
     /// temperature goes one way, no more than a step may have.
     pub fn rivals(&self, chosen: &Judged) -> Vec<String> {
@@ -123,15 +131,32 @@ impl Round {
 impl Search<'_> {
     /// Judges all candidates that are not among the model's terms. `surrogates` = 0: gains alone.
     pub fn judge(&self, model: &Model, surrogates: usize) -> Round {
+        self.judge_among(model, surrogates, &|_| true)
+    }
+
+    /// Gains of some candidates alone.
+    pub fn gains_of(&self, model: &Model, are: &dyn Fn(&dyn Candidate) -> bool) -> Round {
+        self.judge_among(model, 0, are)
+    }
+
+    fn judge_among(
+        &self,
+        model: &Model,
+        surrogates: usize,
+        are: &dyn Fn(&dyn Candidate) -> bool,
+    ) -> Round {
         let c = self.channels;
         let fit = &model.fit;
         let mut missing = Vec::new();
         let mut running: Running = Vec::new();
         let taken: Vec<String> = model.terms.iter().map(|t| t.id()).collect();
         let beginning = self.beginning.borrow();
-        let is_out = |id: String| taken.contains(&id) || beginning.barred.contains(&id);
+        let is_out = |candidate: &dyn Candidate| {
+            let id = candidate.id();
+            taken.contains(&id) || beginning.barred.contains(&id) || !are(candidate)
+        };
         for candidate in &self.candidates {
-            if is_out(candidate.id()) {
+            if is_out(candidate.as_ref()) {
                 continue;
             }
             match candidate.channels(c) {
@@ -154,24 +179,17 @@ impl Search<'_> {
             0 => scores.grid.thinned(),
             _ => scores.grid.clone(),
         };
-        let tone = tones::strongest(c, fit, &grid);
-        let rest = model.residual(c);
-        let fast = fit.decimated.as_ref();
-        let fast = fast.and_then(|b| fast::within_blocks(c, &rest, &b.weights, b.rows));
-        // What blocks leave of a tone that is in is that tone.
-        let fast = fast.filter(|tone| !has_tone(model, tone.frequency_hz, 2.0 / c.span_s()));
-        let both = [tone, fast].into_iter().flatten();
-        let both = both.map(|tone| tones::unaliased(c, fit, &rest, tone));
-        let tone = both.min_by(|a, b| a.p_value.total_cmp(&b.p_value));
+        let taken = taken.iter().any(|id| id == "periodic_pickup");
+        let pickup = |frequency_hz: f64| Pickup {
+            frequency_hz,
+            further: taken || !returns(c, frequency_hz),
+        };
+        let tone = are(&pickup(0.0)).then(|| self.tone(model, &grid)).flatten();
         if let Some(tone) = tone {
-            let taken = taken.iter().any(|id| id == "periodic_pickup");
-            let pickup: Arc<dyn Candidate> = Arc::new(Pickup {
-                frequency_hz: tone.frequency_hz,
-                further: taken || !returns(c, tone.frequency_hz),
-            });
-            if !is_out(pickup.id()) {
+            let pickup = pickup(tone.frequency_hz);
+            if !is_out(&pickup) {
                 let points = pickup.points(c);
-                running.push((pickup, points));
+                running.push((Arc::new(pickup), points));
             }
         }
         // Two tests, the tones' and all others', share the level.
@@ -184,6 +202,21 @@ impl Search<'_> {
             missing,
             leads,
         }
+    }
+
+    /// The likeliest tone beside a model, between the rows of its blocks as well.
+    fn tone(&self, model: &Model, grid: &Grid) -> Option<Tone> {
+        let c = self.channels;
+        let fit = &model.fit;
+        let slow = tones::strongest(c, fit, grid);
+        let rest = model.residual(c);
+        let fast = fit.decimated.as_ref();
+        let fast = fast.and_then(|b| fast::within_blocks(c, &rest, &b.weights, b.rows));
+        // What blocks leave of a tone that is in is that tone.
+        let fast = fast.filter(|tone| !has_tone(model, tone.frequency_hz, 2.0 / c.span_s()));
+        let both = [slow, fast].into_iter().flatten();
+        let both = both.map(|tone| tones::unaliased(c, fit, &rest, tone));
+        both.min_by(|a, b| a.p_value.total_cmp(&b.p_value))
     }
 
     /// The best shape of every group that is near the leader, its non-linear parameters
@@ -210,7 +243,7 @@ impl Search<'_> {
                 None => (points.first(), fit.at.shape, tone_p, best),
             };
             let Some(point) = point else { continue };
-            let near = gain > 0.5 * best - 10.0;
+            let near = is_near(gain, best);
             let top = self.top(model, candidate.as_ref(), (points, point), shape, near);
             starts.push((candidate.clone(), top.point, p_value));
             wholes.push(top.whole);
@@ -244,158 +277,6 @@ impl Search<'_> {
                 },
             )
             .collect()
-    }
-}
-
-impl Search<'_> {
-    /// The best shape of a candidate, of its `points` one of which is best at the noise `shape`; roughly, where it is not
-    /// `near` the leader.
-    fn top(
-        &self,
-        model: &Model,
-        candidate: &dyn Candidate,
-        (points, point): (&[Point], &Point),
-        shape: Shape,
-        near: bool,
-    ) -> Top {
-        let c = self.channels;
-        let fit = &model.fit;
-        let acting = candidate.acts_on_bias() && !candidate.is_last();
-        let mut top = Top {
-            point: point.clone(),
-            bias: None,
-            whole: None,
-        };
-        if !(near || acting || candidate.is_whole()) {
-            return top;
-        }
-        // At one noise; the null hypothesis may choose the one that suits it best.
-        let mut benches = vec![(shape, Bench::new(model, shape))];
-        // A residual with sharp ends looks like a walk without white noise, to which a threshold that is off by a row, or
-        // a form that is not quite the one, is no better than none: it is found where the noise is white.
-        if near && (acting || candidate.is_whole() || candidate.is_local()) {
-            benches.push((WHITE, Bench::new(model, WHITE)));
-        }
-        let best = |point: &Point, bias: &Option<Bias>| {
-            let bias = bias.as_ref().unwrap_or(&model.bias);
-            let at = |(shape, bench): &(Shape, Bench<'_>)| {
-                let there = refine::gain(bench, candidate, c, bias, point);
-                there + fit.problem.evaluate(*shape).loglik - fit.at.loglik
-            };
-            benches
-                .iter()
-                .map(at)
-                .fold(f64::NEG_INFINITY, |m, v| m.max(v))
-        };
-        let mut reached = f64::NEG_INFINITY;
-        for (k, (_, bench)) in benches.iter().enumerate() {
-            let found = match (acting, k) {
-                (true, _) => self.admitted(model, candidate, points, bench),
-                // Where physics gives the coefficient, the best shape is not that of a free one.
-                (false, 0) if !candidate.is_whole() => {
-                    let top = refine::refined(bench, candidate, c, &model.bias, point, 0.5);
-                    Some((top, None))
-                }
-                _ => self.sharpened(model, candidate, points, bench),
-            };
-            let Some((point, bias)) = found else { continue };
-            let net = best(&point, &bias) - price(candidate, c, &point);
-            if net > reached {
-                (reached, top.point, top.bias) = (net, point, bias);
-            }
-        }
-        top.whole = candidate
-            .is_sized(&top.point)
-            .then(|| best(&top.point, &top.bias));
-        top
-    }
-
-    /// The best point of a shape with thresholds on a bench.
-    fn sharpened(
-        &self,
-        model: &Model,
-        candidate: &dyn Candidate,
-        points: &[Point],
-        bench: &Bench<'_>,
-    ) -> Option<(Point, Option<Bias>)> {
-        let c = self.channels;
-        let gain = |p: &Point| refine::gain(bench, candidate, c, &model.bias, p);
-        let each = points.iter().map(|p| (p, &model.bias));
-        let gains = refine::gains(bench, candidate, c, each);
-        let each = points.iter().zip(gains);
-        let each = each.map(|(p, gain)| (gain - price(candidate, c, p), p));
-        let (_, start) = each.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        let steps = map(&candidate.spacing(c, start), |s| 0.5 * s);
-        Some((refine::climbed(start, steps, gain), None))
-    }
-
-    /// The best of `points` whose coefficients physics admits, each with the declared bias that is there beside it: a
-    /// strong effect that acts on the bias bends what the declared model finds without it, and would be judged by
-    /// a bias that it made itself.
-    fn admitted(
-        &self,
-        model: &Model,
-        candidate: &dyn Candidate,
-        points: &[Point],
-        bench: &Bench<'_>,
-    ) -> Option<(Point, Option<Bias>)> {
-        let c = self.channels;
-        let settling = self.settling_beside(model);
-        let start = &model.bias.coefficients_dps;
-        // The bias beside a shape, and what the shape costs, if it is admitted.
-        let beside = |point: &Point| {
-            let settled = settling.beside(candidate, point, start);
-            let paid = PRICE * settled.own.len() as f64 + price(candidate, c, point);
-            let bias = Bias {
-                coefficients_dps: settled.bias,
-                ..model.bias.clone()
-            };
-            candidate
-                .admits(point, &settled.own)
-                .then_some((bias, paid))
-        };
-        let net = |point: &Point| {
-            let (bias, paid) = beside(point)?;
-            Some(refine::gain(bench, candidate, c, &bias, point) - paid)
-        };
-        let admitted = points.iter().filter_map(|p| Some((p, beside(p)?)));
-        let admitted: Vec<(&Point, (Bias, f64))> = admitted.collect();
-        let each = admitted.iter().map(|(point, (bias, _))| (*point, bias));
-        let gains = refine::gains(bench, candidate, c, each);
-        let nets = gains.into_iter().zip(&admitted);
-        let mut places: Vec<(f64, &Point)> = nets
-            .map(|(gain, (point, (_, paid)))| (gain - paid, *point))
-            .collect();
-        places.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let (_, first) = *places.first()?;
-        let mut starts = vec![first];
-        if !candidate.is_sized(first) {
-            // The bias follows closely: between two sizes the top may be far above both, and above what has no size.
-            let sized = places.iter().map(|p| p.1);
-            starts.extend(sized.filter(|p| candidate.is_sized(p)).take(SIZES));
-        }
-        let reached = |p: &Point| net(p).unwrap_or(f64::NEG_INFINITY);
-        let tops = starts.into_iter().map(|start| {
-            let steps = map(&candidate.spacing(c, start), |s| 0.5 * s);
-            let top = refine::climbed(start, steps, reached);
-            (reached(&top), top)
-        });
-        let (_, top) = tops.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        let bias = Bias {
-            coefficients_dps: settling.beside(candidate, &top, start).bias,
-            ..model.bias.clone()
-        };
-        Some((top, Some(bias)))
-    }
-
-    /// For the declared bias with a candidate in, beside what a model has. Ordinary least squares, for the shape alone.
-    fn settling_beside(&self, model: &Model) -> Settling<'_> {
-        let mut rest = self.channels.error_dps.clone();
-        let order = model.bias.coefficients_dps.len();
-        for (column, b) in model.columns.iter().zip(&model.beta).skip(order) {
-            add_scaled(&mut rest, -b, column);
-        }
-        Settling::new(self.channels, (&rest, &model.free_weights()), &[], &[])
     }
 }
 

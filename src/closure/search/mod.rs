@@ -37,6 +37,7 @@ pub mod sweep;
 mod ties;
 mod together;
 pub mod tones;
+mod top;
 pub mod undone;
 pub mod validate;
 

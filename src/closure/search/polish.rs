@@ -6,12 +6,11 @@ use super::refine::{self, Bench};
 use super::reported::WANDER;
 use super::{Model, Search, Term, stairs};
 use crate::closure::channels::Channels;
-use crate::closure::effects::{Bias, Candidate, Point, map};
+use crate::closure::effects::{Candidate, Point, map};
 use crate::closure::likelihood::Unusable;
 use crate::closure::likelihood::linear::add_scaled;
 use crate::closure::likelihood::noise::Shape;
 use crate::closure::likelihood::reml::Fit;
-use std::borrow::Cow;
 
 /// Most turns of a polish.
 const POLISHES: usize = 3;
@@ -65,26 +64,25 @@ struct Place<'a> {
 }
 
 impl Place<'_> {
-    fn bias(&self, point: &Point) -> Cow<'_, Bias> {
-        let Some(settling) = &self.settling else {
-            return Cow::Borrowed(&self.model.bias);
+    /// The term's columns in a shape, and whether their coefficient is 1.
+    fn columns(&self, point: &Point) -> (Vec<Vec<f64>>, bool) {
+        let columns = match &self.settling {
+            Some(settling) => {
+                let from = &self.model.acting.coefficients_dps;
+                settling.beside(self.candidate, point, from).columns
+            }
+            None => self.candidate.columns(self.c, &self.model.bias, point),
         };
-        let acting = &self.model.acting;
-        let settled = settling.beside(self.candidate, point, &acting.coefficients_dps);
-        Cow::Owned(Bias {
-            coefficients_dps: settled.bias,
-            ..acting.clone()
-        })
+        (columns, self.candidate.is_sized(point))
     }
 
     fn gain(&self, point: &Point) -> f64 {
-        let bias = self.bias(point);
-        refine::gain(&self.bench, self.candidate, self.c, &bias, point)
+        let gains = refine::gains(&self.bench, [self.columns(point)]);
+        gains.first().copied().unwrap_or(0.0)
     }
 
     fn gains(&self, points: &[Point]) -> Vec<f64> {
-        let each = points.iter().map(|p| (p, self.bias(p)));
-        refine::gains(&self.bench, self.candidate, self.c, each)
+        refine::gains(&self.bench, points.iter().map(|p| self.columns(p)))
     }
 
     fn with_gains(&self, points: Vec<Point>) -> Vec<(Point, f64)> {

@@ -10,7 +10,6 @@ use crate::closure::likelihood::noise::Shape;
 use crate::closure::likelihood::partial::Partial;
 use crate::closure::likelihood::reml::Fit;
 use crate::closure::likelihood::whiten::Whitener;
-use std::borrow::Borrow;
 
 /// One noise, ready for many columns.
 pub struct Bench<'a> {
@@ -148,30 +147,28 @@ pub fn gain(
     bias: &Bias,
     point: &Point,
 ) -> f64 {
-    let gains = gains(bench, candidate, c, [(point, bias)]);
+    let columns = candidate.columns(c, bias, point);
+    let gains = gains(bench, [(columns, candidate.is_sized(point))]);
     gains.first().copied().unwrap_or(0.0)
 }
 
 /// Shapes whose columns are made, whitened and multiplied side by side.
 const BATCH: usize = 16;
 
-/// Gains of many shapes, each beside its own bias.
-pub fn gains<'p, B: Borrow<Bias>>(
+/// Gains of many shapes, by their columns and whether their coefficient is 1.
+pub fn gains(
     bench: &Bench<'_>,
-    candidate: &dyn Candidate,
-    c: &Channels,
-    points: impl IntoIterator<Item = (&'p Point, B)>,
+    shapes: impl IntoIterator<Item = (Vec<Vec<f64>>, bool)>,
 ) -> Vec<f64> {
-    let mut points = points.into_iter().peekable();
+    let mut shapes = shapes.into_iter().peekable();
     let mut out = Vec::new();
-    while points.peek().is_some() {
+    while shapes.peek().is_some() {
         let (mut all, mut each) = (Vec::new(), Vec::with_capacity(BATCH));
-        for (point, bias) in points.by_ref().take(BATCH) {
-            let mut columns = candidate.columns(c, bias.borrow(), point);
+        for (mut columns, is_sized) in shapes.by_ref().take(BATCH) {
             if let Some(model) = bench.model {
                 columns = model.shown(columns);
             }
-            each.push((columns.len(), candidate.is_sized(point)));
+            each.push((columns.len(), is_sized));
             all.append(&mut columns);
         }
         out.append(&mut bench.gains(&all, &each));
