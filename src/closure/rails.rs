@@ -26,6 +26,10 @@ const SAME: f64 = 1e-9;
 const NEAR: f64 = 3.5;
 const PILED: usize = 4;
 
+/// So are those that near to it that have a row that stands at it within so many rows before them, and after them: of a
+/// stretch that is clipped one row in two stands, and the bias that the output rises with may go anywhere there.
+const BESIDE: usize = 6;
+
 /// Share of the range that such noise may be.
 const SMALL: f64 = 0.05;
 
@@ -39,8 +43,8 @@ pub struct Rails {
     pub upper_dps: Option<f64>,
     /// deg/s.
     pub lower_dps: Option<f64>,
-    /// Rows that stand at one, or are held at one but for noise that came after the clip: they pile up there, or the applied
-    /// rate is far beyond it.
+    /// Rows that stand at one, or are held at one but for noise that came after the clip: they pile up there, or between rows that
+    /// stand, or the applied rate is far beyond it.
     pub rows: Vec<bool>,
     /// Probability that chance makes so many readings agree at the less certain of them.
     pub p_value: f64,
@@ -118,9 +122,20 @@ pub fn of(c: &Channels, rows: &[bool]) -> Option<Rails> {
             && (above(upper_dps, v) && above(upper_dps, due - far - 2.0 * width)
                 || below(lower_dps, v) && below(lower_dps, due + far + 2.0 * width))
     };
+    let beside = |row: usize, v: f64| {
+        let before = &output[row.saturating_sub(BESIDE)..row];
+        let after = &output[row + 1..(row + 1 + BESIDE).min(output.len())];
+        let stands = |level: Option<f64>| {
+            let stands = |rows: &[f64]| rows.iter().any(|v| at(level, *v));
+            stands(before) && stands(after)
+        };
+        small
+            && (above(upper_dps, v) && stands(upper_dps)
+                || below(lower_dps, v) && stands(lower_dps))
+    };
     let pairs = output.iter().zip(&stand).enumerate();
     let held = pairs
-        .map(|(row, (v, stands))| *stands || piled(*v) || driven(row, *v))
+        .map(|(row, (v, stands))| *stands || piled(*v) || driven(row, *v) || beside(row, *v))
         .collect();
     (!coarse).then_some(Rails {
         upper_dps,

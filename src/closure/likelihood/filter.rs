@@ -184,6 +184,7 @@ mod tests {
                     0 => States::<_, 0, 1>::new(Scalar::new()).over(&whitener, columns, outputs),
                     1 => States::<_, 1, 1>::new(Scalar::new()).over(&whitener, columns, outputs),
                     4 => States::<_, 4, 1>::new(Scalar::new()).over(&whitener, columns, outputs),
+                    6 => States::<_, 6, 1>::new(Scalar::new()).over(&whitener, columns, outputs),
                     other => panic!("{other} states"),
                 }
                 let bits = |v: &[f64]| v.iter().map(|v| v.to_bits()).collect::<Vec<_>>();

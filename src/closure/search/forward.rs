@@ -259,7 +259,9 @@ impl Search<'_> {
         let rivals = others.into_iter().map(|(id, _)| id).collect();
         let mut term = Term::of(best, rivals);
         if is_sure(best) {
-            term.p_value = term.p_value.min((without + worth(best.candidate.as_ref()) - reached).exp());
+            term.p_value = term
+                .p_value
+                .min((without + worth(best.candidate.as_ref()) - reached).exp());
         }
         Ok(Some(term))
     }

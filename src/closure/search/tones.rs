@@ -184,6 +184,11 @@ const SEEN: f64 = 10.0;
 /// Share of the square of the temperature's squared rate that a line has which is its pace.
 const PACE: f64 = 0.1;
 
+/// Rows over which the slopes of a temperature have this share of the square of those from row to row, if no rate passes
+/// between its rows.
+const RESOLVED_ROWS: usize = 4;
+const RESOLVED: f64 = 0.9;
+
 /// Most harmonics that are looked at, and the probability that the strongest of them is noise's up to which what repeats is
 /// no sinusoid.
 const HARMONICS: i32 = 9;
@@ -327,11 +332,24 @@ fn waving(c: &Channels, frequency_hz: f64) -> Option<Wave> {
         name: c.thermometer.clone(),
         share: pace(c, frequency_hz),
         // Of rates between rows the readings' slopes over rows show no more than the pace.
-        kept: SMOOTHED.powi(2),
+        kept: if is_resolved(c) {
+            SMOOTHED
+        } else {
+            SMOOTHED.powi(2)
+        },
     };
     waves
         .chain((pace.share > PACE).then_some(pace))
         .max_by(|a, b| a.share.total_cmp(&b.share))
+}
+
+/// Whether the temperature's rate does not change much from row to row: slopes over some rows have almost all of it.
+fn is_resolved(c: &Channels) -> bool {
+    let square = |rows: usize| {
+        let slopes = slope(&c.time_s, &c.u, rows);
+        dot(&slopes, &slopes)
+    };
+    square(RESOLVED_ROWS) > RESOLVED * square(1)
 }
 
 /// Share of the temperature's squared rate that a line at a frequency has, or next to it: that of a staircase of temperatures has

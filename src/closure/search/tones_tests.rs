@@ -103,7 +103,6 @@ fn on_stairs(
     (step, turns): (usize, usize),
     of: impl Fn(f64, usize) -> f64,
 ) -> (Vec<String>, Option<String>) {
-    let mut random = Random::new(seed);
     let quarter = rows / turns;
     let level = |k: usize| {
         let at = (k / step * step) as f64 / quarter as f64;
@@ -123,6 +122,16 @@ fn on_stairs(
             now
         })
         .collect();
+    on_course(seed, degc, of)
+}
+
+/// A record of a course of temperatures, with an output of its rate and of the row.
+fn on_course(
+    seed: u64,
+    degc: Vec<f64>,
+    of: impl Fn(f64, usize) -> f64,
+) -> (Vec<String>, Option<String>) {
+    let (rows, mut random) = (degc.len(), Random::new(seed));
     let rate = |k: usize| degc[k] - degc[k.saturating_sub(1)];
     let output = (0..rows).map(|k| 0.3 - 0.01 * degc[k] + of(rate(k), k) + 0.02 * random.normal());
     let columns = BTreeMap::from([
@@ -159,4 +168,19 @@ fn a_tone_of_twice_the_chambers_frequency_is_a_pickup_where_the_chamber_is_none(
             "{seed}"
         );
     }
+}
+
+/// Two periods of the chamber beat in the square of its rate.
+#[test]
+fn a_tone_at_the_beat_of_a_smooth_chamber_is_a_pickup() {
+    let wave = |periods: f64, k: usize| (std::f64::consts::TAU * periods * k as f64 / 900.0).sin();
+    let degc: Vec<f64> = (0..900)
+        .map(|k| 40.0 + 25.0 * wave(4.0, k) + 10.0 * wave(10.0, k))
+        .collect();
+    let all = (0..12).map(|seed| on_course(seed, degc.clone(), |_, k| 0.3 * wave(6.0, k + 11)));
+    // Where chance leaves something beside it, it may be an answer to the temperature.
+    let (named, others): (Vec<_>, Vec<_>) = all.partition(|(_, left)| left.is_none());
+    assert!(named.len() >= 10, "{others:?}");
+    assert!(named.iter().all(|(names, _)| *names == ["periodic_pickup"]));
+    assert!(others.iter().all(|(names, _)| names.is_empty()));
 }

@@ -167,7 +167,7 @@ impl Search<'_> {
     }
 
     /// For the declared bias with a candidate in, beside what a model has. Ordinary least squares, for the shape alone.
-    fn settling_beside(&self, model: &Model) -> Settling<'_> {
+    pub(super) fn settling_beside(&self, model: &Model) -> Settling<'_> {
         let mut rest = self.channels.error_dps.clone();
         let order = model.bias.coefficients_dps.len();
         for (column, b) in model.columns.iter().zip(&model.beta).skip(order) {
