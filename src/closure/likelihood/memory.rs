@@ -29,6 +29,28 @@ pub struct Memory {
     pub whitened: Vec<f64>,
 }
 
+/// Excess kurtosis of innovations from which on they are not those of a filter's noise, and in units of what chance gives
+/// so many normal numbers, sqrt(24 / rows).
+const PEAKED: f64 = 1.0;
+const BY_CHANCE: f64 = 4.0;
+
+impl Memory {
+    /// Whether the innovations are as good as normal, as a filter leaves them. Those of a level that jumps (burst noise, a
+    /// contact) are not: most are small, and some as large as the jumps.
+    pub fn is_normal(&self) -> bool {
+        let used: Vec<f64> = self
+            .whitened
+            .iter()
+            .copied()
+            .filter(|v| *v != 0.0)
+            .collect();
+        let n = used.len().max(1) as f64;
+        let mean_of = |power: i32| used.iter().map(|v| v.powi(power)).sum::<f64>() / n;
+        let excess = mean_of(4) / mean_of(2).powi(2).max(f64::MIN_POSITIVE) - 3.0;
+        excess <= PEAKED.max(BY_CHANCE * (24.0 / n).sqrt())
+    }
+}
+
 /// The most likely short memory of a residual.
 pub fn short_memory(line: &Timeline, residual: &[f64]) -> Option<Memory> {
     let taus = std::iter::successors(Some(FIRST), |t| Some(LONGER * t));
@@ -130,6 +152,26 @@ mod tests {
             assert!((2.5..9.0).contains(&memory.tau), "{seed}: {}", memory.tau);
             let mean_square = memory.whitened.iter().map(|v| v * v).sum::<f64>() / ROWS as f64;
             assert!((mean_square - 1.0).abs() < 1e-9);
+            assert!(memory.is_normal(), "{seed}");
+        }
+    }
+
+    #[test]
+    fn a_level_that_jumps_is_no_filters_noise() {
+        let mut random = Random::new(33);
+        for jump in [6.0, 10.0] {
+            let mut level = 0.5 * jump;
+            let burst: Vec<f64> = (0..ROWS)
+                .map(|_| {
+                    // On average it stays for eight rows.
+                    if random.normal() > 1.15 {
+                        level = -level;
+                    }
+                    level + random.normal()
+                })
+                .collect();
+            let (above, memory) = above(&burst);
+            assert!(above > 3.0 && !memory.is_normal(), "{jump}: {above}");
         }
     }
 

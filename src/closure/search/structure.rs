@@ -80,7 +80,7 @@ impl Search<'_> {
     }
 
     /// Whether what a model leaves is noise with a short memory: that explains it better than 1/f noise and a walk do, and
-    /// all of it.
+    /// all of it, and its innovations are normal.
     pub(super) fn forgets(&self, model: &Model) -> bool {
         let fit = &model.fit;
         let rest = fit.reduce(&model.residual(self.channels));
@@ -88,6 +88,7 @@ impl Search<'_> {
         let whitener = Whitener::new(line, fit.at.shape);
         let slow = memory::loglik(&whitener.apply(&rest), whitener.used, whitener.log_det);
         let memory = memory::short_memory(line, &rest);
-        memory.is_some_and(|m| m.loglik > slow + BETTER && !is_coloured(&m.whitened))
+        memory
+            .is_some_and(|m| m.loglik > slow + BETTER && !is_coloured(&m.whitened) && m.is_normal())
     }
 }
