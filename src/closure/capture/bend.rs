@@ -1,6 +1,6 @@
 //! The bend that a step fits, as a curve over the codes with its standard deviation.
 
-use super::columns::{HAT, HATS, Model, ONE, POWER, SAW};
+use super::columns::{HAT, HATS, Model, ONE, POWER, SAW, SEGMENT};
 use super::gram::{Combo, Solved};
 use super::search::Search;
 use std::ops::Range;
@@ -29,7 +29,7 @@ pub fn curves(
         let weights: Vec<Vec<f64>> = (0..HATS)
             .map(|knot| {
                 let of = |(k, combo): (usize, &&Combo)| match own.contains(&k) {
-                    true => at(combo, channel, knot),
+                    true => at(model, combo, channel, knot),
                     false => 0.0,
                 };
                 combos.iter().enumerate().map(of).collect()
@@ -52,11 +52,12 @@ fn place(knot: usize) -> f64 {
 }
 
 /// A combo's functions of the code in a channel, at a knot.
-fn at(combo: &Combo, channel: usize, knot: usize) -> f64 {
+fn at(model: &Model, combo: &Combo, channel: usize, knot: usize) -> f64 {
+    let segment = model.segment(model.span_codes * place(knot));
     let value = |column: usize| match column {
         ONE => 1.0,
         k if (POWER..SAW).contains(&k) => place(knot).powi((k - POWER + 1) as i32),
-        k if k == HAT + knot => 1.0,
+        k if k == HAT + knot || k == SEGMENT + segment => 1.0,
         _ => 0.0,
     };
     let parts = combo.parts.iter().filter(|p| p.0 == channel);

@@ -214,7 +214,7 @@ pub fn variants(
     out.extend(super::gain::variants(known, model));
     out.extend(super::latency::variants(known, model, free));
     out.extend(super::feedthrough::variants(known, coupled));
-    out.extend(super::nonlinearity::variants(known, model));
+    out.extend(super::nonlinearity::variants(known, model, free));
     out.extend(super::harmonics::variants(known, model));
     out.extend(super::mains::variants(known, model, rows));
     out.extend(super::spur::variants(known, model, rows));

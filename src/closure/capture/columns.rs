@@ -46,8 +46,12 @@ pub const TRUNCATED: usize = LINE + 2 * LINES;
 pub const HAT: usize = TRUNCATED + 2;
 /// Hat functions.
 pub const HATS: usize = 129;
+/// First of the equal parts of the converter's range -full scale .. full scale: 1 where the signal is in it.
+pub const SEGMENT: usize = HAT + HATS;
+/// Parts: those of a first stage of five bits.
+pub const SEGMENTS: usize = 32;
 /// All columns.
-pub const ALL: usize = HAT + HATS;
+pub const ALL: usize = SEGMENT + SEGMENTS;
 /// Highest harmonic.
 pub const HARMONICS: usize = 5;
 
@@ -96,6 +100,16 @@ pub struct Model {
     pub variance: Variance,
     /// What u is relative to: a little more than the largest code of both channels.
     pub span_codes: f64,
+    /// 2^(bits-1), codes.
+    pub full_scale_codes: f64,
+}
+
+impl Model {
+    /// The part of the converter's range that a signal is in; the outermost ones go on beyond it.
+    pub fn segment(&self, signal: f64) -> usize {
+        let place = (0.5 + 0.5 * signal / self.full_scale_codes) * SEGMENTS as f64;
+        (place.max(0.0) as usize).min(SEGMENTS - 1)
+    }
 }
 
 /// Some rows of all columns.
@@ -103,10 +117,12 @@ pub struct Model {
 pub struct Rows {
     /// First row and the one after the last.
     pub rows: Range<usize>,
-    /// By channel and column; the hat functions are not among them.
+    /// By channel and column; the hat functions and the segments are not among them.
     pub dense: [Vec<Vec<f64>>; 2],
     /// By channel: the first of two hat functions that are not zero, and the second's value.
     pub hats: [Vec<(usize, f64)>; 2],
+    /// By channel: the segment that is 1.
+    pub segments: [Vec<usize>; 2],
     code: [Vec<f64>; 2],
     /// Code less declared tone (and the mean shift by missing codes).
     pub target: [Vec<f64>; 2],
@@ -128,6 +144,7 @@ impl Rows {
             rows: 0..0,
             dense: [dense(), dense()],
             hats: [vec![(0, 0.0); CHUNK], vec![(0, 0.0); CHUNK]],
+            segments: [vec![0; CHUNK], vec![0; CHUNK]],
             code: pair(),
             target: pair(),
             signal: pair(),
@@ -143,8 +160,9 @@ impl Rows {
             .map(|(c, b)| if *b == 0.0 { 0.0 } else { b * c[i] })
             .sum();
         let (at, part) = self.hats[channel][i];
-        let hat = |k: usize| coefficients.get(HAT + k).copied().unwrap_or(0.0);
-        sum + hat(at) * (1.0 - part) + hat(at + 1) * part
+        let own = |k: usize| coefficients.get(k).copied().unwrap_or(0.0);
+        let segment = own(SEGMENT + self.segments[channel][i]);
+        sum + own(HAT + at) * (1.0 - part) + own(HAT + at + 1) * part + segment
     }
 
     /// The code less all that the model makes of row `i`, limits and missing codes among it.
@@ -241,7 +259,7 @@ impl Rows {
         let straight = terms(coefficients, POWER);
         let neutral = &model.neutral[channel];
         let neutral_terms = terms(neutral, SAW);
-        let neutral_hat = |k: usize| neutral.get(HAT + k).copied().unwrap_or(0.0);
+        let neutral_at = |k: usize| neutral.get(k).copied().unwrap_or(0.0);
         // Noise of one code leaves nothing of the wave.
         let with_wave = model.variance.base[channel] < 1.0;
         let bent = (POWER..SAW).chain(HAT..ALL).any(|k| at(k) != 0.0);
@@ -271,18 +289,20 @@ impl Rows {
             }
             let place = ((tone + model.span_codes) * scale).clamp(0.0, (HATS - 1) as f64 - 1e-9);
             self.hats[channel][i] = (place as usize, place - (place as usize) as f64);
+            let segment = SEGMENT + model.segment(tone);
+            self.segments[channel][i] = segment - SEGMENT;
             let bend: f64 = if bent {
                 let (k, part) = self.hats[channel][i];
                 let powers: f64 = (POWER..SAW).map(|k| at(k) * dense[k][i]).sum();
-                powers + at(HAT + k) * (1.0 - part) + at(HAT + k + 1) * part
+                powers + at(HAT + k) * (1.0 - part) + at(HAT + k + 1) * part + at(segment)
             } else {
                 0.0
             };
             let signal = x + bend;
             let (k, part) = self.hats[channel][i];
             let there: f64 = neutral_terms.iter().map(|(k, b)| b * dense[*k][i]).sum();
-            let there =
-                declared + there + neutral_hat(k) * (1.0 - part) + neutral_hat(k + 1) * part;
+            let hats = neutral_at(HAT + k) * (1.0 - part) + neutral_at(HAT + k + 1) * part;
+            let there = declared + there + hats + neutral_at(segment);
             let slope = angle * (sin_all * dense[COS][i] - cos_all * dense[SIN][i]);
             let late = model.variance.jitter * slope * slope;
             let rest = floor(there + 0.5) - there;

@@ -4,7 +4,7 @@
 //! code), latency and feedthrough from the oscillator's phase. What the correction leaves is held
 //! against the declared model.
 
-use super::columns::{ALL, HAT, HATS, Model, ONE, OTHER, POWER, POWERS, Rows, chunks};
+use super::columns::{ALL, HAT, HATS, Model, ONE, OTHER, POWER, POWERS, Rows, SEGMENT, chunks};
 use super::input::{Capture, Part};
 use crate::closure::verdict::FirmwareErrors;
 
@@ -51,7 +51,7 @@ pub fn corrected(
     }
 }
 
-/// Powers and table of the code itself.
+/// Powers, table and staircase of the code itself.
 fn bend(model: &Model, coefficients: &[f64], code: f64) -> f64 {
     let at = |k: usize| coefficients.get(k).copied().unwrap_or(0.0);
     let u = code / model.span_codes;
@@ -60,7 +60,8 @@ fn bend(model: &Model, coefficients: &[f64], code: f64) -> f64 {
         .sum();
     let place = ((u + 1.0) * 0.5 * (HATS - 1) as f64).clamp(0.0, (HATS - 1) as f64 - 1e-9);
     let (k, part) = (place as usize, place.fract());
-    powers + at(HAT + k) * (1.0 - part) + at(HAT + k + 1) * part
+    let segment = at(SEGMENT + model.segment(code));
+    powers + at(HAT + k) * (1.0 - part) + at(HAT + k + 1) * part + segment
 }
 
 /// Constant and tone by the phase.

@@ -90,6 +90,7 @@ pub fn declared(capture: &Capture, known: &Known, tone: Tone) -> Model {
             jitter: 0.0,
         },
         span_codes: 1.02 * f64::from(largest.unwrap_or(1).max(1)),
+        full_scale_codes: known.full_scale_codes,
     }
 }
 

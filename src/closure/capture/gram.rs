@@ -1,6 +1,6 @@
 //! Sums of products of the columns over the training rows, and least squares in them.
 
-use super::columns::{ALL, HAT, LINE, Model, Rows, TRUNCATED, chunks};
+use super::columns::{ALL, HAT, LINE, Model, Rows, SEGMENT, TRUNCATED, chunks};
 use super::input::{Capture, GROUPS, Part};
 use crate::closure::likelihood::linear::dot;
 
@@ -45,9 +45,10 @@ const SIDE: usize = ALL + 1;
 /// What is summed: all columns or some, of all training rows or of every `stride`-th chunk.
 #[derive(Debug, Clone)]
 pub struct Summed {
-    /// By channel, ascending; the hat functions are not among them.
+    /// By channel, ascending; the hat functions and the segments are not among them.
     columns: [Vec<usize>; 2],
     hats: bool,
+    segments: bool,
     stride: usize,
 }
 
@@ -57,6 +58,7 @@ impl Summed {
         Summed {
             columns: [active(model, 0), active(model, 1)],
             hats: true,
+            segments: true,
             stride,
         }
     }
@@ -71,7 +73,8 @@ impl Summed {
         });
         Summed {
             columns,
-            hats: parts().any(|p| p.1 >= HAT),
+            hats: parts().any(|p| (HAT..SEGMENT).contains(&p.1)),
+            segments: parts().any(|p| p.1 >= SEGMENT),
             stride,
         }
     }
@@ -153,9 +156,8 @@ fn add_group(
         for chunk in chunks(segment.rows.clone()).step_by(summed.stride) {
             let n = chunk.len();
             rows.fill(capture, model, chunk);
-            for (channel, used) in summed.columns.iter().enumerate() {
-                let sum = &mut sums[channel];
-                add_chunk(&rows, channel, used, summed.hats, n, &mut weighted, sum);
+            for (channel, sum) in sums.iter_mut().enumerate() {
+                add_chunk(&rows, channel, summed, n, &mut weighted, sum);
             }
         }
     }
@@ -164,16 +166,17 @@ fn add_group(
 fn add_chunk(
     rows: &Rows,
     channel: usize,
-    used: &[usize],
-    with_hats: bool,
+    summed: &Summed,
     n: usize,
     weighted: &mut [f64],
     sum: &mut [f64],
 ) {
+    let used = &summed.columns[channel];
     let dense = &rows.dense[channel];
     let weight = &rows.weight[channel][..n];
     let target = &rows.target[channel][..n];
     let hats = &rows.hats[channel][..n];
+    let segments = &rows.segments[channel][..n];
     for (position, a) in used.iter().enumerate() {
         let column = &dense[*a][..n];
         for ((out, c), w) in weighted.iter_mut().zip(column).zip(weight) {
@@ -184,18 +187,28 @@ fn add_chunk(
             sum[a * SIDE + b] += dot(weighted, &dense[*b][..n]);
         }
         sum[a * SIDE + ALL] += dot(weighted, target);
-        if !with_hats {
-            continue;
+        if summed.hats {
+            for (value, (k, part)) in weighted.iter().zip(hats) {
+                let at = a * SIDE + HAT + k;
+                sum[at] += value * (1.0 - part);
+                sum[at + 1] += value * part;
+            }
         }
-        for (value, (k, part)) in weighted.iter().zip(hats) {
-            let at = a * SIDE + HAT + k;
-            sum[at] += value * (1.0 - part);
-            sum[at + 1] += value * part;
+        if summed.segments {
+            for (value, k) in weighted.iter().zip(segments) {
+                sum[a * SIDE + SEGMENT + k] += value;
+            }
         }
     }
-    for ((w, y), (k, part)) in weight.iter().zip(target).zip(hats) {
+    let sparse = hats.iter().zip(segments);
+    for ((w, y), ((k, part), segment)) in weight.iter().zip(target).zip(sparse) {
         sum[ALL * SIDE + ALL] += w * y * y;
-        if !with_hats {
+        let segment = SEGMENT + segment;
+        if summed.segments {
+            sum[segment * SIDE + segment] += w;
+            sum[segment * SIDE + ALL] += w * y;
+        }
+        if !summed.hats {
             continue;
         }
         let (k, first) = (HAT + k, 1.0 - part);
@@ -204,6 +217,10 @@ fn add_chunk(
         sum[(k + 1) * SIDE + k + 1] += w * part * part;
         sum[k * SIDE + ALL] += w * first * y;
         sum[(k + 1) * SIDE + ALL] += w * part * y;
+        if summed.segments {
+            sum[k * SIDE + segment] += w * first;
+            sum[(k + 1) * SIDE + segment] += w * part;
+        }
     }
 }
 

@@ -1,8 +1,9 @@
 //! `adc_integral_nonlinearity`: code = x + g(x), g a function of the signal alone, not of the phase
-//! (IEEE Std 1241, but for its end-point line): a polynomial, or a table of straight pieces.
+//! (IEEE Std 1241, but for its end-point line): a polynomial, a table of straight pieces, or a staircase: a converter
+//! of several stages has an error of its own in each of the equal parts of its range that the first stage tells apart.
 
 use super::candidates::{Effect, Known, Variant};
-use super::columns::{HAT, HATS, Model, POWER};
+use super::columns::{HAT, HATS, Model, POWER, SEGMENT, SEGMENTS};
 use super::gram::Combo;
 
 /// Gain that a free constant or a free slope costs beyond a column: a bend that needs them is the
@@ -12,13 +13,18 @@ const LINE_TERMS: f64 = 5.0;
 /// Least distance of knots, codes: closer ones would follow the quantiser's own pattern.
 const LEAST_APART_CODES: f64 = 4.0;
 
-/// Power k of the signal in some channels; the parameter is its value at full scale.
-fn power(known: &Known, model: &Model, k: usize, channels: &[usize]) -> Combo {
-    let prefix = match channels {
+/// What the names of parameters of some channels begin with.
+fn prefix(channels: &[usize]) -> &'static str {
+    match channels {
         [0] => "drive_",
         [1] => "sense_",
         _ => "",
-    };
+    }
+}
+
+/// Power k of the signal in some channels; the parameter is its value at full scale.
+fn power(known: &Known, model: &Model, k: usize, channels: &[usize]) -> Combo {
+    let prefix = prefix(channels);
     let parts: Vec<_> = channels.iter().map(|c| (*c, POWER + k - 1, 1.0)).collect();
     let unit = (known.full_scale_codes / model.span_codes).powi(k as i32);
     Combo::new(
@@ -41,11 +47,7 @@ fn hat(model: &Model, at: usize, stride: usize, channels: &[usize]) -> Combo {
             }
         }
     }
-    let prefix = match channels {
-        [0] => "drive_",
-        [1] => "sense_",
-        _ => "",
-    };
+    let prefix = prefix(channels);
     Combo::new(&format!("{prefix}at_code_{code:.0}_codes"), 1.0, &parts)
 }
 
@@ -57,8 +59,28 @@ pub fn table(model: &Model, stride: usize, channels: &[usize]) -> Vec<Combo> {
         .collect()
 }
 
-/// Polynomials and tables; of both channels (the same bend) or of one.
-pub fn variants(known: &Known, model: &Model) -> Vec<Variant> {
+/// Parts of the range that a first stage tells apart.
+const PARTS: [usize; 3] = [8, 16, 32];
+
+/// The errors of those of `parts` equal parts of the range that signals up to `reach` codes visit.
+fn staircase(model: &Model, parts: usize, reach: f64, channels: &[usize]) -> Vec<Combo> {
+    let each = SEGMENTS / parts;
+    let visited = model.segment(-reach) / each..=model.segment(reach) / each;
+    let of = |part: usize| {
+        let fine = part * each..(part + 1) * each;
+        let columns = channels
+            .iter()
+            .flat_map(|c| fine.clone().map(|k| (*c, SEGMENT + k, 1.0)));
+        let code = (2.0 * part as f64 / parts as f64 - 1.0) * model.full_scale_codes;
+        let name = format!("{}from_code_{code:.0}_codes", prefix(channels));
+        Combo::new(&name, 1.0, &columns.collect::<Vec<_>>())
+    };
+    visited.map(of).collect()
+}
+
+/// Polynomials, tables and staircases; of both channels (the same bend) or of one. `free` are sine and cosine of both
+/// tones as they are in the codes.
+pub fn variants(known: &Known, model: &Model, free: [[f64; 2]; 2]) -> Vec<Variant> {
     let mut out = Vec::new();
     for (channels, further) in [(&[0usize, 1][..], 0.0), (&[0][..], 1.0), (&[1][..], 1.0)] {
         for orders in [
@@ -95,6 +117,16 @@ pub fn variants(known: &Known, model: &Model) -> Vec<Variant> {
             let combos = table(model, stride, channels);
             let further = further + 2.0 * LINE_TERMS;
             out.push(Variant::new(Effect::Nonlinearity, combos, further));
+        }
+        let reach = channels.iter().map(|c| free[*c][0].hypot(free[*c][1]));
+        let reach = reach.fold(0.0, f64::max);
+        for parts in PARTS {
+            let combos = staircase(model, parts, reach, channels);
+            // In a single part it is an offset.
+            if combos.len() > 1 {
+                let further = further + 2.0 * LINE_TERMS;
+                out.push(Variant::new(Effect::Nonlinearity, combos, further));
+            }
         }
     }
     out
