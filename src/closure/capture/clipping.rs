@@ -4,7 +4,8 @@
 //! noise is limited with the signal, the outermost code is far more frequent than those next to it.
 //! What is limited is left out of all other fits.
 
-use super::columns::{COS, Model, Rows, SIN, TRUNCATED, chunks};
+use super::columns::{COS, Model, Rows, SIN, chunks};
+use super::flat_top::{Inside, Profile};
 use super::input::{Capture, Part};
 use super::instant::Instant;
 use super::normal;
@@ -68,12 +69,13 @@ pub fn find(capture: &Capture, model: &Model, channel: usize) -> Option<Found> {
     let sigma = model.variance.base[channel].sqrt().max(0.05);
     let profile = Profile::of(capture, model, channel);
     let mut limits = profile.first_guess()?;
-    let mut tone = [0.0; 3];
+    let mut inside = Inside::default();
     for _ in 0..ROUNDS {
-        tone = profile.fit(limits, 3.0 * sigma)?;
-        limits = profile.levels(&tone, limits, 3.0 * sigma);
+        inside = profile.fit(limits, 3.0 * sigma)?;
+        limits = profile.levels(&inside.tone, limits, 3.0 * sigma);
     }
-    let (mut flat, rows) = profile.significant(&tone, limits, sigma);
+    let tone = inside.tone;
+    let (mut flat, rows) = profile.significant(&inside, limits, sigma);
     let (piled, mut pile_gain) = pile(capture, channel, sigma);
     let (cut, cut_gain) = cut(capture, model, channel, &tone);
     pile_gain = pile_gain.max(cut_gain);
@@ -97,139 +99,6 @@ pub fn find(capture: &Capture, model: &Model, channel: usize) -> Option<Found> {
 const LEAST_NOISE: f64 = 0.1;
 /// Rows that have to be missed there: chance makes none of them in one of three million captures.
 const LEAST_CUT: f64 = 15.0;
-
-/// Phases that the mean is taken over.
-const BINS: usize = 1024;
-
-/// The address bits of a channel's tone, if most of it is at truncated phases in the model.
-fn truncated(model: &Model, channel: usize) -> Option<u32> {
-    let coefficients = &model.coefficients[channel];
-    let at = |k: usize| coefficients.get(k).copied().unwrap_or(0.0);
-    let [sin, cos] = model.declared[channel];
-    let tone = (sin + at(SIN)).hypot(cos + at(COS));
-    let replaced = at(TRUNCATED).hypot(at(TRUNCATED + 1));
-    model.truncation.filter(|_| replaced > 0.5 * tone)
-}
-
-/// Means by phase.
-struct Profile {
-    /// Rows, sum of codes, sums of cos and sin by phase.
-    bins: Vec<[f64; 4]>,
-}
-
-impl Profile {
-    fn of(capture: &Capture, model: &Model, channel: usize) -> Self {
-        let mut bins = vec![[0.0; 4]; BINS];
-        // The tone of a truncated oscillator is at the phases of its table.
-        let steps = truncated(model, channel).map(|bits| f64::powi(2.0, bits as i32));
-        for (row, code) in training(capture, channel) {
-            let phase = steps.map_or(model.tone.phase(row), |n| {
-                (model.tone.phase(row) * n).floor() / n
-            });
-            let (sin, cos) = (std::f64::consts::TAU * phase).sin_cos();
-            if let Some(bin) = bins.get_mut((phase * BINS as f64) as usize % BINS) {
-                for (sum, value) in bin.iter_mut().zip([1.0, f64::from(code), sin, cos]) {
-                    *sum += value;
-                }
-            }
-        }
-        for bin in &mut bins {
-            let [n, rest @ ..] = bin;
-            rest.iter_mut().for_each(|v| *v /= n.max(1.0));
-        }
-        Profile { bins }
-    }
-
-    fn filled(&self) -> impl Iterator<Item = &[f64; 4]> {
-        self.bins.iter().filter(|b| b[0] > 0.0)
-    }
-
-    /// Limits a little inside the outermost means.
-    fn first_guess(&self) -> Option<Limits> {
-        let mut means: Vec<f64> = self.filled().map(|b| b[1]).collect();
-        means.sort_by(f64::total_cmp);
-        let n = means.len();
-        if n < 8 {
-            return None;
-        }
-        let at = |share: f64| means.get((share * n as f64) as usize).copied();
-        Some(Limits {
-            low: at(0.02)?,
-            high: at(0.98)?,
-        })
-    }
-
-    /// Least squares of constant, sine and cosine over what is inside the limits by phase; the
-    /// first time by code.
-    fn fit(&self, limits: Limits, margin: f64) -> Option<[f64; 3]> {
-        let mut tone: Option<[f64; 3]> = None;
-        for _ in 0..3 {
-            let inside = |b: &&[f64; 4]| {
-                let x = tone.map_or(b[1], |t| value(&t, b));
-                x < limits.high - margin && x > limits.low + margin
-            };
-            let mut sums = nalgebra::Matrix3::<f64>::zeros();
-            let mut right = nalgebra::Vector3::<f64>::zeros();
-            for b in self.filled().filter(inside) {
-                let row = nalgebra::Vector3::new(1.0, b[2], b[3]);
-                sums += row * row.transpose() * b[0];
-                right += row * (b[0] * b[1]);
-            }
-            let solved = sums.cholesky()?.solve(&right);
-            tone = Some([solved.x, solved.y, solved.z]);
-        }
-        tone
-    }
-
-    /// Means of what the tone puts beyond the limits.
-    fn levels(&self, tone: &[f64; 3], limits: Limits, margin: f64) -> Limits {
-        let mean = |beyond: &dyn Fn(f64) -> bool, old: f64| {
-            let (n, sum) = self
-                .filled()
-                .filter(|b| beyond(value(tone, b)))
-                .fold((0.0, 0.0), |(n, sum), b| (n + b[0], sum + b[0] * b[1]));
-            if n > 0.0 { sum / n } else { old }
-        };
-        Limits {
-            low: mean(&|x| x < limits.low - 0.3 * margin, limits.low),
-            high: mean(&|x| x > limits.high + 0.3 * margin, limits.high),
-        }
-    }
-
-    /// The limits with a flat top: beyond them the mean is the level and not the tone.
-    fn significant(&self, tone: &[f64; 3], limits: Limits, sigma: f64) -> (Limits, usize) {
-        let mut out = Limits::NONE;
-        let mut rows = 0;
-        for upper in [true, false] {
-            let level = if upper { limits.high } else { limits.low };
-            let sign = if upper { 1.0 } else { -1.0 };
-            let (mut n, mut gain, mut deepest) = (0.0, 0.0, 0.0f64);
-            for b in self.filled() {
-                let x = value(tone, b);
-                if sign * (x - level) > 0.0 {
-                    deepest = deepest.max(sign * (x - level));
-                    let (with, without) = (b[1] - level, b[1] - x);
-                    gain += 0.5 * b[0] * (without * without - with * with) / (sigma * sigma);
-                    n += b[0];
-                }
-            }
-            // The quantiser itself is flat for half a code.
-            if gain > 12.0 && n >= 3.0 && deepest > 0.75 {
-                rows += n as usize;
-                if upper {
-                    out.high = level;
-                } else {
-                    out.low = level;
-                }
-            }
-        }
-        (out, rows)
-    }
-}
-
-fn value(tone: &[f64; 3], bin: &[f64; 4]) -> f64 {
-    tone[0] + tone[1] * bin[2] + tone[2] * bin[3]
-}
 
 /// The outermost codes, where noise should have put rows beyond them and there are none: noise is limited
 /// with the signal. Four fifths of the noise, and a quarter of a code less than both the tone and the model (whose
@@ -346,7 +215,10 @@ fn inner_noise(points: &[Near], depth: f64) -> f64 {
 }
 
 /// Row and code of the training rows.
-fn training(capture: &Capture, channel: usize) -> impl Iterator<Item = (usize, i32)> + '_ {
+pub(super) fn training(
+    capture: &Capture,
+    channel: usize,
+) -> impl Iterator<Item = (usize, i32)> + '_ {
     let train = capture.segments.iter().filter(|s| s.part != Part::HeldOut);
     let rows = train.flat_map(|s| s.rows.clone());
     let rows = rows.filter(|row| !capture.is_left_out(*row));

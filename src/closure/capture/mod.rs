@@ -9,7 +9,7 @@
 //! [`wrong_codes`] (wrong codes), both on [`blocks`]; [`tone`] is the phase; [`columns`] are the functions of which effects are made, one
 //! file an effect ([`offset`], [`gain`], [`latency`], [`feedthrough`], [`nonlinearity`],
 //! [`harmonics`], [`mains`], [`spur`] with [`truncation`]); [`gram`] their sums and least squares;
-//! [`search`] chooses. Outside of the linear part are [`clipping`] (with [`instant`]), [`missing`] (the histogram),
+//! [`search`] chooses. Outside of the linear part are [`clipping`] (with [`flat_top`] and [`instant`]), [`missing`] (the histogram),
 //! [`jitter`] (the variance). [`spectrum`] gives noise and lines ([`rounding`]: those that are the quantiser's own),
 //! [`wander`] the slow noise that must not pass for an
 //! effect. [`around`] is the fit with every freedom, [`steps`] where the quantiser's
@@ -32,6 +32,7 @@ pub mod feedthrough;
 pub mod firmware;
 pub mod first_break;
 pub mod fit;
+pub mod flat_top;
 pub mod frequency;
 pub mod gain;
 pub mod gram;
