@@ -53,7 +53,7 @@ impl<C: AsRef<[f64]>, const N: usize> WithSimd for Filter<'_, C, N> {
     }
 }
 
-/// What the filter knows of some columns: [state][register].
+/// What the filter knows of some columns, by state and register.
 struct States<S: Simd, const N: usize, const B: usize> {
     simd: S,
     m: [[S::f64s; B]; N],

@@ -63,3 +63,49 @@ fn a_tone_that_is_the_temperatures_has_to_be_better_than_a_name_by_what_a_strang
     // Its own frequency: as any other name.
     assert_eq!(taken(17.0, 3.0), "periodic_pickup");
 }
+
+#[test]
+fn spikes_are_no_concern_of_names_that_would_not_lead_with_all_of_them_explained() {
+    let tone = |further: bool, net: f64| Judged {
+        candidate: Arc::new(Pickup {
+            frequency_hz: 1e-3,
+            further,
+        }),
+        point: Point::at(0, &[1e-3]),
+        gain: net + 2.0,
+        net,
+        odds_against: 0.0,
+        p_value: 1e-9,
+    };
+    let may = |net: f64, spikes: usize| {
+        let round = Round {
+            judged: vec![tone(false, 1000.0), tone(true, net)],
+            equal: 4.0,
+            missing: Vec::new(),
+            leads: None,
+        };
+        let [leader, other] = &round.judged[..] else {
+            unreachable!()
+        };
+        let may = may_be(&round, Some(leader), spikes);
+        assert!(may(leader.candidate.as_ref()));
+        may(other.candidate.as_ref())
+    };
+    assert!(may(990.0, 2) && !may(970.0, 2) && may(970.0, 6));
+    // Only the places of a coarse grid are known of what is far behind.
+    assert!(!may(480.0, 2) && may(480.0, 10) && !may(300.0, 10));
+    // Nothing is known of what was not judged, and little is enough where nothing leads.
+    let nothing = Round {
+        judged: Vec::new(),
+        equal: 4.0,
+        missing: Vec::new(),
+        leads: None,
+    };
+    assert!(may_be(&nothing, None, 2)(
+        tone(true, 0.0).candidate.as_ref()
+    ));
+    let leader = tone(false, 1000.0);
+    assert!(!may_be(&nothing, Some(&leader), 2)(
+        tone(true, 0.0).candidate.as_ref()
+    ));
+}
