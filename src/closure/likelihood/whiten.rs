@@ -53,7 +53,7 @@ impl Whitener {
         self.apply_all(&[column]).pop().unwrap_or_default()
     }
 
-    /// Several columns, whitened.
+    /// Several columns, each at least as long as the timeline, whitened.
     pub fn apply_all<C: AsRef<[f64]>>(&self, columns: &[C]) -> Vec<Vec<f64>> {
         let mut out: Vec<Vec<f64>> = columns
             .iter()
