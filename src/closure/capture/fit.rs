@@ -13,6 +13,7 @@ use super::steps::{find_steps, is_sharp, settle};
 use super::tone::{Phases, Tone};
 use super::wander::{self, Series};
 use super::{feedthrough, jitter, truncation};
+use std::collections::BTreeMap;
 
 /// Rounds at most.
 const ROUNDS: usize = 6;
@@ -38,6 +39,9 @@ pub struct Fitted {
     pub variants: Vec<Variant>,
     /// The chosen ones.
     pub set: Vec<usize>,
+    /// What each of them gains beyond the others, where that was judged with the quantiser's steps at each set's own
+    /// signal: sums of products at one signal let its tone pass for the steps' own.
+    pub own_gains: BTreeMap<usize, f64>,
     /// Gain less costs of all.
     pub objective: f64,
     /// What clipping gains, if it was taken, the search for its levels taken off.
@@ -54,6 +58,24 @@ pub struct Fitted {
     pub noise: [f64; 2],
     /// Sine and cosine of both tones as they are in the codes, beside whatever else is there.
     pub free: [[f64; 2]; 2],
+}
+
+impl Fitted {
+    /// What the chosen linear effects cost.
+    fn costs(&self) -> f64 {
+        let chosen = self.set.iter().filter_map(|k| self.variants.get(*k));
+        chosen.map(|v| v.cost).sum()
+    }
+}
+
+/// Whether a fit is likelier than another one, its costs taken off, in the units of its noise.
+pub fn is_likelier(capture: &Capture, fit: &Fitted, than: &Fitted) -> bool {
+    let chi = |model: &Model| {
+        let mut model = model.clone();
+        model.variance = fit.model.variance;
+        super::errors::judge(capture, &model).train_chi
+    };
+    0.5 * chi(&fit.model) + fit.costs() < 0.5 * chi(&than.model) + than.costs()
 }
 
 /// Sine and cosine of the tones as they are declared, codes.
@@ -174,12 +196,14 @@ fn round(
     let [drive, sense] = &seen.residuals;
     let coupled = feedthrough::is_coupled(capture, &model, [drive, sense]);
     let variants = variants(known, &model, seen.free, capture.rows(), coupled);
+    let mut own_gains = BTreeMap::new();
     let (set, objective) = match sharp {
         true => {
             let mut search = OwnSteps::new(capture, &model, base, &nuisance, &variants);
             let (set, own) = search.best();
             let wants_all_rows = search.wants_all_rows();
             let free_lines = search.free_lines();
+            own_gains = search.gains(&set, &own);
             model.coefficients = own.coefficients;
             model.neutral.clone_from(&model.coefficients);
             match wants_all_rows {
@@ -216,6 +240,7 @@ fn round(
         nuisance,
         variants,
         set,
+        own_gains,
         objective,
         clipping: None,
         missing: None,
@@ -369,10 +394,6 @@ fn with_limits(
     limited.variance = plain.model.variance;
     let mut other = rounds(capture, known, &limited);
     // Both in the units of the same noise: half the chi-square of all training rows, and the costs.
-    let costs = |fit: &Fitted| -> f64 {
-        let chosen = fit.set.iter().filter_map(|k| fit.variants.get(*k));
-        chosen.map(|v| v.cost).sum()
-    };
     let judged = |model: &Model| {
         let mut model = model.clone();
         model.variance = other.model.variance;
@@ -380,7 +401,7 @@ fn with_limits(
     };
     let limited = judged(&other.model);
     let chi = 0.5 * (judged(&plain.model).train_chi - limited.train_chi);
-    let gain = chi + costs(&plain) - costs(&other) + piled - LEVELS_COST - LEVEL_COST * sides;
+    let gain = chi + plain.costs() - other.costs() + piled - LEVELS_COST - LEVEL_COST * sides;
     if gain > PRIOR && limited.heldout_chi < judged(alone).heldout_chi {
         other.clipping = Some(gain);
         return other;

@@ -61,3 +61,33 @@ pub fn variants(known: &Known, model: &Model, free: [[f64; 2]; 2]) -> Vec<Varian
     }
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::synthetic_rows::{WORDS, codes, judged, meta, names};
+    use std::f64::consts::TAU;
+
+    #[test]
+    fn a_latency_of_a_radian_is_one_effect_whatever_carrier_the_tone_is_near_then() {
+        let word = WORDS[1];
+        let step = TAU * f64::from(word) / 4_294_967_296.0;
+        let signal = |channel: usize, angle: f64| match channel {
+            0 => -1500.0 * angle.cos(),
+            _ => 300.0 * (angle + 0.3).sin() + 90.0 * (angle + 0.3).cos(),
+        };
+        for lag in [-1.2f64, 0.6, 1.2] {
+            let late = codes(1, word, |channel, row, x| {
+                let angle = TAU * f64::from(word.wrapping_mul(row as u32)) / 4_294_967_296.0;
+                x - signal(channel, angle) + signal(channel, angle - lag)
+            });
+            let found = judged(late, meta(word)).2;
+            assert_eq!(names(&found), ["sample_latency"], "{lag}");
+            let seconds = found.steps[0].parameters["latency_s"];
+            assert!(
+                (seconds * 200e3 * step / lag - 1.0).abs() < 1e-3,
+                "{lag} {seconds}"
+            );
+            assert!(!found.structure.left);
+        }
+    }
+}

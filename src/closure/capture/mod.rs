@@ -13,7 +13,7 @@
 //! [`jitter`] (the variance). [`spectrum`] gives noise and lines ([`rounding`]: those that are the quantiser's own),
 //! [`wander`] the slow noise that must not pass for an
 //! effect. [`around`] is the fit with every freedom, [`steps`] where the quantiser's
-//! steps are, [`own_steps`] the search where they show,
+//! steps are, [`own_steps`] the search where they show ([`exact_steps`]: with the steps exactly where the codes say),
 //! [`fit`] runs all in rounds; [`report`] judges on held-out rows, with [`errors`], [`rivals`],
 //! [`structure`] and [`firmware`]; [`bend`] is for the page, which is made in `report::capture`.
 
@@ -25,6 +25,7 @@ pub mod clipping;
 pub mod clock;
 pub mod columns;
 pub mod errors;
+pub mod exact_steps;
 pub mod examine;
 #[cfg(test)]
 mod examine_tests;
@@ -171,15 +172,7 @@ pub fn analyse(capture: &Capture) -> Result<Findings> {
         )
         .into());
     }
-    let (mut known, mut plain) = known(capture, tone);
-    let mut fitted = fit::fit(capture, &known, tone, &plain);
-    // A truncated oscillator turns the sense tone, so that another carrier may be nearer: judged again beside it.
-    let carrier = nearest_carrier(capture, fitted.free[1]);
-    if carrier != known.in_phase {
-        known.in_phase = carrier;
-        plain = baseline(capture, &known, tone);
-        fitted = fit::fit(capture, &known, tone, &plain);
-    }
+    let (known, mut plain, fitted) = likeliest(capture, tone);
     plain.variance = fitted.model.variance;
     plain.variance.jitter = 0.0;
     Ok(report::findings(capture, &known, &plain, &fitted))
@@ -188,6 +181,45 @@ pub fn analyse(capture: &Capture) -> Result<Findings> {
 /// Periods of the tone in a capture, to zero frequency or to half the sample rate.
 fn periods(capture: &Capture, tone: &Tone) -> f64 {
     (0.5 - tone.folded()).min(tone.folded()) * capture.rows() as f64
+}
+
+/// What the keys say, the declared model fitted to the codes, and the effects, with the carrier of the rate that
+/// makes the codes likeliest.
+///
+/// The one that is nearest to the sense tone as it is may not be it: a latency turns the tone, by the angle that the
+/// drive shows, and so does a truncated oscillator.
+fn likeliest(capture: &Capture, tone: Tone) -> (Known, Model, fit::Fitted) {
+    let (first, plain) = known(capture, tone);
+    let fitted = fit::fit(capture, &first, tone, &plain);
+    let mut best = (first, plain, fitted);
+    let mut tried = vec![best.0.in_phase];
+    for turned in [0.0, drive_lag(&best.0, &best.1, best.2.free[0])] {
+        let (sin, cos) = turned.sin_cos();
+        let [s, c] = best.2.free[1];
+        let carrier = nearest_carrier(capture, [s * cos - c * sin, c * cos + s * sin]);
+        if tried.contains(&carrier) {
+            continue;
+        }
+        tried.push(carrier);
+        let mut other = best.0.clone();
+        other.in_phase = carrier;
+        let plain = baseline(capture, &other, tone);
+        let fitted = fit::fit(capture, &other, tone, &plain);
+        // With no latency the nearest is what the contract's freedom leaves, whatever it gains.
+        if turned == 0.0 || fit::is_likelier(capture, &fitted, &best.2) {
+            best = (other, plain, fitted);
+        }
+    }
+    best
+}
+
+/// Radians by which the drive's tone is late, as its declared phase tells; 0 where that is not known.
+fn drive_lag(known: &Known, plain: &Model, free: [f64; 2]) -> f64 {
+    let [s, c] = plain.declared[0];
+    match known.phase && known.amplitude {
+        true => (free[0] * c - free[1] * s).atan2(free[0] * s + free[1] * c),
+        false => 0.0,
+    }
 }
 
 /// What the keys say, and the declared model fitted to the codes.

@@ -12,6 +12,7 @@
 
 use super::candidates::Variant;
 use super::columns::{Model, Rows, chunks};
+use super::exact_steps;
 use super::gram::{Combo, Detail, Gram, Summed, solve, spread};
 use super::input::{Capture, Part};
 use super::search::{Search, combos_of};
@@ -122,8 +123,47 @@ impl<'a> OwnSteps<'a> {
             true => other,
             false => own,
         };
+        let own = self.exact(set, own);
         self.done.insert(key, own.clone());
         own
+    }
+
+    /// A fit with its steps exactly where the codes say, if that makes them likelier.
+    fn exact(&self, set: &[usize], own: Own) -> Own {
+        // A coherent tone tells its steps by few phases, whose errors have a variance of their own.
+        if self.phases.is_some() {
+            return own;
+        }
+        // What the slow noise takes stays: its price is not asked again.
+        let (combos, _) = combos_of(self.base, &[], self.variants, set);
+        let at = |coefficients: &[Vec<f64>; 2]| Model {
+            coefficients: coefficients.clone(),
+            neutral: coefficients.clone(),
+            ..self.model.clone()
+        };
+        let model = at(&own.coefficients);
+        let Some(moved) = exact_steps::moved(self.capture, &model, &combos, self.stride) else {
+            return own;
+        };
+        let gained = self.likelihood(&at(&moved)) - self.likelihood(&model);
+        match gained > 0.0 {
+            true => Own {
+                objective: own.objective + gained,
+                coefficients: moved,
+            },
+            false => own,
+        }
+    }
+
+    /// What each member of a set gains in log-likelihood beyond the others, each set with its own steps.
+    pub fn gains(&mut self, set: &[usize], own: &Own) -> BTreeMap<usize, f64> {
+        let without = |k: usize| set.iter().copied().filter(|s| *s != k).collect::<Vec<_>>();
+        let of = |search: &mut Self, k: usize| {
+            let cost = search.variants.get(k).map_or(0.0, |v| v.cost);
+            let fewer = search.fit(&without(k), &own.coefficients);
+            (k, own.objective - fewer.objective + cost)
+        };
+        set.iter().map(|k| of(self, *k)).collect()
     }
 
     /// Fits on from a set's own fit: the fewer rows are on the wrong side of a step, the better the next fit.

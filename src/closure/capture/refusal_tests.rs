@@ -128,3 +128,28 @@ fn keys_that_cannot_be_true_are_refused_and_unlikely_ones_said() {
         assert_eq!(said(&key(&change).unwrap().1), [code]);
     }
 }
+
+#[test]
+fn a_word_whose_phase_runs_away_is_refused() {
+    // Turns over the capture, in steps of the word.
+    let off = |turns: f64| WORDS[1] + (turns * 4_294_967_296.0 / ROWS as f64) as u32;
+    let message = refused(clean(1, WORDS[1]), meta(off(0.05)));
+    assert!(
+        message.contains("runs away from that of `ftw` by -0.050 turn"),
+        "{message}"
+    );
+    assert!(examined(capture(clean(1, WORDS[1]), meta(off(0.004)))).is_ok());
+    // A phase that steps is no other frequency.
+    let word = WORDS[1];
+    let stepped = super::synthetic_rows::codes(1, word, |channel, row, x| {
+        let angle = TAU * f64::from(word.wrapping_mul(row as u32)) / 4_294_967_296.0;
+        let late = if row > ROWS / 2 { 0.2 } else { 0.0 };
+        let on_time = -1500.0 * angle.cos();
+        if channel == 0 {
+            x - on_time - 1500.0 * (angle - late).cos()
+        } else {
+            x
+        }
+    });
+    assert!(examined(capture(stepped, meta(word))).is_ok());
+}

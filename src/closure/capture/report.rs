@@ -207,7 +207,11 @@ pub(super) fn p_value(
 ) -> Option<f64> {
     let variant = fitted.variants.get(member)?;
     let fewer: Vec<usize> = set.iter().copied().filter(|k| *k != member).collect();
-    let gain = search.gain(set) - search.gain(&fewer);
+    let sums = search.gain(set) - search.gain(&fewer);
+    let gain = fitted
+        .own_gains
+        .get(&member)
+        .map_or(sums, |own| own.max(sums));
     let columns = variant.combos.len();
     let surprise = chi_square_surprise(columns, 2.0 * gain.max(0.0));
     let tried = (fitted.variants.len() as f64).ln() + variant.further.max(0.0);

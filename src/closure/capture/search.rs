@@ -181,28 +181,39 @@ impl<'a> Search<'a> {
         set
     }
 
-    /// Sets with an offset and a gain error in the place of a bend, which a step forward may have taken for both; and
-    /// of a bend beside harmonics, with a gain error beside others: a bend of a tone is its harmonics and the tone.
+    /// Sets of two in the place of a bend that a step forward may have taken for both: an offset and a gain error, or a
+    /// bend of another form or of one channel beside an offset; and where harmonics are beside it, these beside
+    /// a gain error or a polynomial: a bend of a tone is its harmonics and the tone.
     pub fn straightened(&self, set: &[usize]) -> Vec<Vec<usize>> {
-        let is = |k: &usize, effect: Effect| self.effect(*k) == Some(effect);
-        if !set.iter().any(|k| is(k, Effect::Nonlinearity)) {
+        use Effect::{Gain, Harmonics, Nonlinearity, Offset};
+        let is =
+            |k: &usize, effects: &[Effect]| self.effect(*k).is_some_and(|e| effects.contains(&e));
+        if !set.iter().any(|k| is(k, &[Nonlinearity])) {
             return Vec::new();
         }
-        let line = [Effect::Nonlinearity, Effect::Offset, Effect::Gain];
-        let rest = set.iter().filter(|k| !line.iter().any(|e| is(k, *e)));
-        let rest: Vec<usize> = rest.copied().collect();
-        let of = |effect: Effect| (0..self.variants.len()).filter(move |k| is(k, effect));
-        let with = |a: usize, b: usize| rest.iter().copied().chain([a, b]).collect();
-        let mut out: Vec<Vec<usize>> = of(Effect::Offset)
-            .flat_map(|a| of(Effect::Gain).map(move |b| (a, b)))
-            .map(|(a, b)| with(a, b))
-            .collect();
-        if set.iter().any(|k| is(k, Effect::Harmonics)) {
-            let rest = rest.iter().filter(|k| !is(k, Effect::Harmonics));
-            let rest: Vec<usize> = rest.copied().collect();
-            let with = |a: usize, b: usize| rest.iter().copied().chain([a, b]).collect();
-            let pairs = of(Effect::Harmonics).flat_map(|a| of(Effect::Gain).map(move |b| (a, b)));
-            out.extend(pairs.map(|(a, b)| with(a, b)));
+        let of = |effect: Effect| (0..self.variants.len()).filter(move |k| is(k, &[effect]));
+        let is_small = |k: &usize| self.variants.get(*k).is_some_and(is_polynomial);
+        let beside = |first: Effect, with_tables: bool, rest: Vec<usize>| -> Vec<Vec<usize>> {
+            let curves: Vec<usize> = of(Nonlinearity)
+                .filter(|k| with_tables || is_small(k))
+                .chain(of(Gain))
+                .collect();
+            let mut out = Vec::new();
+            for a in of(first) {
+                let allowed = self.others(&[a]);
+                let both = curves.iter().filter(|b| allowed.binary_search(b).is_ok());
+                out.extend(both.map(|b| rest.iter().copied().chain([a, *b]).collect()));
+            }
+            out
+        };
+        let without = |gone: &[Effect]| set.iter().copied().filter(|k| !is(k, gone)).collect();
+        let mut out = beside(Offset, true, without(&[Nonlinearity, Offset, Gain]));
+        if set.iter().any(|k| is(k, &[Harmonics])) {
+            out.extend(beside(
+                Harmonics,
+                false,
+                without(&[Nonlinearity, Offset, Gain, Harmonics]),
+            ));
         }
         out
     }
@@ -243,6 +254,12 @@ fn is_bend(variant: &Variant) -> bool {
 fn has_line(variant: &Variant) -> bool {
     let mut columns = variant.combos.iter().flat_map(|c| &c.parts);
     variant.effect == Effect::Nonlinearity && columns.any(|p| p.1 == POWER || p.1 >= HAT)
+}
+
+/// Whether a variant is a nonlinearity that is a sum of powers of the signal.
+fn is_polynomial(variant: &Variant) -> bool {
+    let mut columns = variant.combos.iter().flat_map(|c| &c.parts);
+    variant.effect == Effect::Nonlinearity && columns.all(|p| p.1 < HAT)
 }
 
 /// Whether a column is a power of the signal.
@@ -331,5 +348,38 @@ mod tests {
             effects == [Effect::Gain, Effect::Harmonics]
         };
         assert!(search.straightened(&set).iter().any(is));
+    }
+
+    #[test]
+    fn a_table_of_both_channels_may_be_one_of_the_drive_beside_an_offset() {
+        let variants = all();
+        let sums = [vec![0.0; (ALL + 1).pow(2)], vec![0.0; (ALL + 1).pow(2)]];
+        let search = Search::new(&sums, &[], &[], &variants);
+        let is_table = |v: &Variant| v.effect == Effect::Nonlinearity && v.combos.len() > 12;
+        let channels = |v: &Variant| -> Vec<usize> {
+            let mut all: Vec<usize> = v
+                .combos
+                .iter()
+                .flat_map(|c| &c.parts)
+                .map(|p| p.0)
+                .collect();
+            all.sort_unstable();
+            all.dedup();
+            all
+        };
+        let of = |wanted: &[usize]| {
+            let is = |v: &Variant| is_table(v) && channels(v) == wanted;
+            variants.iter().position(is).unwrap()
+        };
+        let offset = variants
+            .iter()
+            .position(|v| v.effect == Effect::Offset && channels(v) == [1] && v.combos.len() == 1);
+        let wanted = [offset.unwrap(), of(&[0])];
+        assert!(
+            search
+                .straightened(&[of(&[0, 1])])
+                .iter()
+                .any(|s| *s == wanted)
+        );
     }
 }
