@@ -3,6 +3,7 @@
 use super::input::Capture;
 use crate::error::{InputError, Result};
 use crate::record::Warning;
+use crate::record::capture::COLUMNS;
 use std::f64::consts::TAU;
 
 /// Sample rates, Hz, that an ADC has.
@@ -17,6 +18,8 @@ const FULL_SCALES: f64 = 4.0;
 const LEAST_CODES: f64 = 1.0;
 /// Largest rate of a gyro, deg/s.
 const LARGEST_DPS: f64 = 20_000.0;
+/// Levels of a drive tone from which on codes that are multiples of four are no chance.
+const LEAST_LEVELS: u32 = 8;
 /// Turns of the sense carrier's phase: beyond one it is doubted, beyond two refused.
 const TURNS: [f64; 2] = [1.0, 2.0];
 
@@ -35,6 +38,7 @@ pub fn checked(capture: &Capture) -> Result<Vec<Warning>> {
     keys.drive()?;
     keys.sense(&mut warnings)?;
     keys.phase(&mut warnings)?;
+    keys.alignment()?;
     Ok(warnings)
 }
 
@@ -44,6 +48,11 @@ fn full_scale(capture: &Capture) -> f64 {
     capture
         .full_scale_codes
         .max(f64::from(codes.max().unwrap_or(0)))
+}
+
+/// Low bits that are 0 in all of these codes.
+fn empty_bits(codes: impl Iterator<Item = i32>) -> u32 {
+    codes.fold(0, |all, code| all | code).trailing_zeros()
 }
 
 struct Keys<'a> {
@@ -158,5 +167,25 @@ impl Keys<'_> {
             warnings.push(Warning::on("phase_in_degrees", "sense_phase_rad", message));
         }
         Ok(())
+    }
+
+    /// Refuses codes whose low bits are all 0: one may be a converter's that misses every other code, more are a
+    /// narrower converter's in a wider word.
+    fn alignment(&self) -> Result<()> {
+        let bits = [0, 1].map(|c| empty_bits(self.capture.used_codes(c)));
+        let empty = bits[0].min(bits[1]);
+        let largest = self.capture.used_codes(0).map(i32::unsigned_abs).max();
+        if empty < 2 || empty == 32 || largest.unwrap_or(0) >> empty < LEAST_LEVELS {
+            return Ok(());
+        }
+        let error = InputError::new(format!(
+            "the low {empty} bits of all codes are 0: they are aligned to the left"
+        ))
+        .help(format!(
+            "divide the codes, `drive_amplitude_codes` and `sense_codes_per_dps` by {}, and take {empty} from \
+             `adc_bits`: a capture's codes are aligned to the right",
+            1u64 << empty
+        ));
+        Err(self.capture.places.put(COLUMNS[0], error).into())
     }
 }

@@ -153,3 +153,22 @@ fn a_word_whose_phase_runs_away_is_refused() {
     });
     assert!(examined(capture(stepped, meta(word))).is_ok());
 }
+
+#[test]
+fn codes_aligned_to_the_left_are_refused() {
+    let aligned = clean(1, WORDS[1]).map(|c| c.into_iter().map(|code| code << 4).collect());
+    let wider = CaptureMeta {
+        adc_bits: Some(16),
+        drive_amplitude_codes: Some(16.0 * 1500.0),
+        sense_codes_per_dps: Some(16.0 * 3.0),
+        ..meta(WORDS[1])
+    };
+    let message = refused(aligned, wider);
+    assert!(
+        message.contains("the low 4 bits of all codes are 0"),
+        "{message}"
+    );
+    // Codes that are even by a fault of the converter are codes.
+    let even = clean(1, WORDS[1]).map(|c| c.into_iter().map(|code| code & !1).collect());
+    assert!(examined(capture(even, meta(WORDS[1]))).is_ok());
+}
