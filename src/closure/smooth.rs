@@ -82,12 +82,31 @@ fn half_width(time_s: &[f64], values: &[f64]) -> usize {
     HALF_WIDTHS[HALF_WIDTHS.len() - 1]
 }
 
+/// Of each row, the rows of the stretch around it that has no gap longer than a window of `k` rows to each side: what is
+/// beyond such a gap says nothing of a slope here. A lone row's stretch is the record.
+fn stretches(time_s: &[f64], k: usize) -> Vec<std::ops::Range<usize>> {
+    let n = time_s.len();
+    let mut steps: Vec<f64> = time_s.windows(2).map(|w| w[1] - w[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    let longest = steps.get(steps.len() / 2).copied().unwrap_or(0.0) * (2 * k + 2) as f64;
+    let mut out = Vec::with_capacity(n);
+    let mut start = 0;
+    for end in 1..=n {
+        if end == n || time_s[end] - time_s[end - 1] > longest {
+            let rows = if end - start > 1 { start..end } else { 0..n };
+            out.resize(end, rows);
+            start = end;
+        }
+    }
+    out
+}
+
 /// Local straight line or parabola through `k` rows to each side: (value, slope per second) at each row.
 fn local(time_s: &[f64], values: &[f64], k: usize) -> (Vec<f64>, Vec<f64>) {
     let n = values.len();
     let mut out = (Vec::with_capacity(n), Vec::with_capacity(n));
-    for i in 0..n {
-        let rows = i.saturating_sub(k)..(i + k + 1).min(n);
+    for (i, stretch) in stretches(time_s, k).into_iter().enumerate() {
+        let rows = i.saturating_sub(k).max(stretch.start)..(i + k + 1).min(stretch.end);
         let centre_s = time_s[i];
         let unit = (time_s[rows.end - 1] - time_s[rows.start]).max(f64::MIN_POSITIVE);
         // Normal equations of 1, x, x^2; the parabola only where five rows carry it.
@@ -175,4 +194,28 @@ pub fn averaged(time_s: &[f64], values: &[f64]) -> Vec<f64> {
 /// Rate of change, per second, over `rows` rows to each side.
 pub fn slope(time_s: &[f64], values: &[f64], rows: usize) -> Vec<f64> {
     local(time_s, values, rows.max(1)).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slope_does_not_reach_over_a_long_gap() {
+        // Falling by 1 a second, an hour off, rising by 2 a second; one row lost within.
+        let value = |t: f64| if t < 3000.0 { -t } else { 2.0 * (t - 3600.0) };
+        let times = (0..20).chain(3600..3620).filter(|t| *t != 10);
+        let rows = times.map(|t| (f64::from(t), value(f64::from(t))));
+        let (time_s, values): (Vec<f64>, Vec<f64>) = rows.unzip();
+        for rows in [1, 3] {
+            for (t, slope) in time_s.iter().zip(slope(&time_s, &values, rows)) {
+                let truth = if *t < 3000.0 { -1.0 } else { 2.0 };
+                assert!((slope - truth).abs() < 1e-9, "{rows} {t} {slope}");
+            }
+        }
+        // A row alone between gaps has its neighbours.
+        let times = [0.0, 1.0, 2.0, 100.0, 200.0, 201.0, 202.0];
+        let alone = slope(&times, &[0.0, 0.0, 0.0, 1.0, 2.0, 2.0, 2.0], 1);
+        assert!((alone[3] - 0.0101).abs() < 1e-3, "{}", alone[3]);
+    }
 }

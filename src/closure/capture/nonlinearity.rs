@@ -93,20 +93,23 @@ pub fn variants(known: &Known, model: &Model, free: [[f64; 2]; 2]) -> Vec<Varian
             &[2, 4],
             &[2, 3, 4, 5],
         ] {
-            let of = |lines: usize| {
-                let line = (0..lines).map(|k| match k {
-                    0 => power(known, model, 1, channels),
-                    _ => constant(channels),
-                });
+            let of = |with_slope: bool, with_constant: bool| {
+                let slope = with_slope.then(|| power(known, model, 1, channels));
+                let constant = with_constant.then(|| constant(channels));
+                let line: Vec<Combo> = slope.into_iter().chain(constant).collect();
+                let further = further + LINE_TERMS * line.len() as f64;
                 let bend = orders.iter().map(|k| power(known, model, *k, channels));
-                let combos = line.chain(bend).collect();
-                let further = further + LINE_TERMS * lines as f64;
+                let combos = line.into_iter().chain(bend).collect();
                 Variant::new(Effect::Nonlinearity, combos, further)
             };
-            out.push(of(0));
-            out.push(of(1));
+            out.push(of(false, false));
+            out.push(of(true, false));
+            // Of an odd curve the constant is an offset.
+            if orders.iter().any(|k| k % 2 == 0) {
+                out.push(of(false, true));
+            }
             if orders.len() > 1 || orders == [2] {
-                out.push(of(2));
+                out.push(of(true, true));
             }
         }
         for stride in [8, 4, 1] {
