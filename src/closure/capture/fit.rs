@@ -352,19 +352,35 @@ fn is_same(last: &Fitted, next: &Fitted) -> bool {
 /// The fit with or without limits, with or without missing codes.
 /// `alone` is the declared model, its free carriers fitted.
 pub fn fit(capture: &Capture, known: &Known, tone: Tone, alone: &Model) -> Fitted {
-    let start = declared(capture, known, tone);
-    let plain = rounds(capture, known, &start);
-    let mut best = with_limits(capture, known, &start, plain, alone);
-    if let Some(found) = missing::find(capture, &best.model) {
-        let mut start = start.clone();
-        start.limits = best.model.limits;
+    let mut start = declared(capture, known, tone);
+    let mut plain = rounds(capture, known, &start);
+    // First: codes missing near the crest move its mean as a limit would, but have others beyond them, as no limit has.
+    let found = missing::find(capture, &plain.model);
+    if let Some(found) = &found {
         start.missing = found.missing.clone();
-        let mut again = rounds(capture, known, &start);
-        again.clipping = best.clipping;
-        again.missing = Some(found);
-        best = again;
+        plain = rounds(capture, known, &start);
+        plain.missing = Some(found.clone());
     }
-    best
+    let best = with_limits(capture, known, &start, plain, alone);
+    if best.clipping.is_none() {
+        return best;
+    }
+    // Beside limits the model is another, and so is what it expects of the codes inside of them.
+    let again = missing::find(capture, &best.model);
+    let codes = |found: &Option<missing::Found>| found.as_ref().map(|f| f.missing.clone());
+    if codes(&again) == codes(&found) {
+        return Fitted {
+            missing: again,
+            ..best
+        };
+    }
+    start.limits = best.model.limits;
+    start.missing = codes(&again).unwrap_or_default();
+    Fitted {
+        clipping: best.clipping,
+        missing: again,
+        ..rounds(capture, known, &start)
+    }
 }
 
 /// Takes limits where they explain the codes better than what was found without them, and the held-out rows better

@@ -1,21 +1,22 @@
 //! `adc_missing_codes`: codes that never appear though they should; their inputs go to a neighbour.
 //!
-//! The histogram decides, not the mean. What a code should count is taken as the least that the tone with
-//! its noise makes of it and of three codes to each side, so that an offset or a bend of a few codes,
-//! or a coherent tone that hits few codes, makes no code look missing. Codes in an even spacing count
-//! together: each may be expected too seldom to be missed alone.
+//! The histogram decides, not the mean. What a code should count is what the tone with its noise makes of it, and no
+//! more than what surrounds it bears out ([`super::code_counts`]), so that an offset or a bend, or a coherent tone that
+//! hits few codes, makes no code look missing. Codes in an even spacing count together, as each may be expected too
+//! seldom to be missed alone; adjacent codes are one gap.
 
-use super::columns::{Model, Rows, chunks};
-use super::input::{Capture, Part};
-use super::{normal, steps};
+use super::code_counts::{Counts, Run};
+use super::columns::Model;
+use super::input::Capture;
+use super::{moved, normal};
 
 /// Missing codes of one channel.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Missing {
     /// The codes, ascending.
     pub codes: Vec<i32>,
-    /// -1: their inputs get the code below, 1: the one above.
-    pub toward: f64,
+    /// Of each, the code that its inputs get instead, less itself.
+    pub moves: Vec<f64>,
 }
 
 impl Missing {
@@ -33,18 +34,20 @@ impl Missing {
             .codes
             .partition_point(|c| f64::from(*c) < signal - reach);
         let mut sum = 0.0;
-        for code in self.codes.iter().skip(first) {
+        for (code, by) in self.codes.iter().zip(&self.moves).skip(first) {
             let distance = f64::from(*code) - signal;
             if distance > reach {
                 break;
             }
-            sum += if sigma > 2.0 {
-                normal::density(distance / sigma) / sigma
-            } else {
-                normal::below((distance + 0.5) / sigma) - normal::below((distance - 0.5) / sigma)
-            };
+            sum += by
+                * if sigma > 2.0 {
+                    normal::density(distance / sigma) / sigma
+                } else {
+                    normal::below((distance + 0.5) / sigma)
+                        - normal::below((distance - 0.5) / sigma)
+                };
         }
-        self.toward * sum
+        sum
     }
 }
 
@@ -65,152 +68,6 @@ pub struct Found {
 const LEAST_GAIN: f64 = 12.0;
 /// Largest spacing.
 const SPACING: i64 = 8192;
-/// Codes to each side that share an expectation.
-const SIDE: usize = 3;
-/// Codes on each side whose counts bound an expectation.
-const NEAR: usize = 24;
-/// Widest range of codes that is looked at.
-const WIDEST: i64 = 1 << 20;
-
-/// What a channel's codes count, and should at least count.
-struct Histogram {
-    first: i64,
-    counts: Vec<f64>,
-    expected: Vec<f64>,
-}
-
-impl Histogram {
-    fn of(capture: &Capture, model: &Model, channel: usize) -> Option<Self> {
-        let low = capture.used_codes(channel).min()?;
-        let high = capture.used_codes(channel).max()?;
-        let range = i64::from(high) - i64::from(low);
-        if !(8..WIDEST).contains(&range) {
-            return None;
-        }
-        let sigma2 = model.variance.base[channel] - 1.0 / 12.0;
-        let sigma = sigma2.max(0.0025).sqrt();
-        let pad = (4.0 * sigma).min(1e5) as i64 + 4;
-        let first = i64::from(low) - pad;
-        let size = (range + 2 * pad + 1) as usize;
-        let (mut counts, mut means) = (vec![0.0; size], vec![0.0; size]);
-        let mut rows = Rows::new();
-        let add = |to: &mut Vec<f64>, code: f64, share: f64| {
-            if let Some(v) = to.get_mut((code as i64 - first).max(0) as usize) {
-                *v += share;
-            }
-        };
-        for segment in capture.segments.iter().filter(|s| s.part != Part::HeldOut) {
-            for chunk in chunks(segment.rows.clone()) {
-                let (start, n) = (chunk.start, chunk.len());
-                rows.fill(capture, model, chunk);
-                for i in (0..n).filter(|i| !capture.is_left_out(start + i)) {
-                    let signal = rows.signal[channel][i];
-                    add(&mut counts, rows.code(channel, i), 1.0);
-                    if sigma >= 1.5 {
-                        add(&mut means, (signal + 0.5).floor(), 1.0);
-                        continue;
-                    }
-                    let middle = (signal + 0.5).floor();
-                    let reach = (4.0 * sigma).ceil();
-                    let mut code = middle - reach;
-                    let mut below = normal::below((code - 0.5 - signal) / sigma);
-                    while code <= middle + reach {
-                        let up_to = normal::below((code + 0.5 - signal) / sigma);
-                        add(&mut means, code, up_to - below);
-                        below = up_to;
-                        code += 1.0;
-                    }
-                }
-            }
-        }
-        if sigma >= 1.5 {
-            means = smoothed(&means, sigma);
-        }
-        let expected = (0..size)
-            .map(|k| {
-                let near = means.get(k.saturating_sub(SIDE)..(k + SIDE + 1).min(size));
-                let least = near
-                    .unwrap_or_default()
-                    .iter()
-                    .copied()
-                    .fold(f64::INFINITY, f64::min);
-                least.min(around(&counts, k))
-            })
-            .collect();
-        let repeats = repeats(capture, model, channel);
-        let per_phase = |cells: Vec<f64>| cells.into_iter().map(|n| n / repeats).collect();
-        Some(Histogram {
-            first,
-            counts: per_phase(counts),
-            expected: per_phase(expected),
-        })
-    }
-
-    /// The codes inside the range, without a margin at the ends: index, count, expectation.
-    fn inside(&self, limits: super::clipping::Limits) -> Vec<(i64, f64, f64)> {
-        let occupied = |(k, n): (usize, &f64)| (*n > 0.0).then_some(k);
-        let mut all = self.counts.iter().enumerate();
-        let low = all.clone().find_map(occupied).unwrap_or(0) + 2;
-        let high = all
-            .rfind(|(_, n)| **n > 0.0)
-            .map_or(0, |(k, _)| k)
-            .saturating_sub(2);
-        (low..high.max(low))
-            .filter_map(|k| {
-                let code = self.first + k as i64;
-                let free = limits.is_free(code as f64, 1.0);
-                free.then_some((code, *self.counts.get(k)?, *self.expected.get(k)?))
-            })
-            .collect()
-    }
-}
-
-/// Training rows that fall on the same phase and so on the same code, where noise was added after rounding: they
-/// count once, as all of them miss a code if the tone is a little off.
-fn repeats(capture: &Capture, model: &Model, channel: usize) -> f64 {
-    if !steps::is_undithered(&model.neutral[channel]) {
-        return 1.0;
-    }
-    let Some(word) = model.tone.word else {
-        return 1.0;
-    };
-    let bits = 32 - word.trailing_zeros().min(31);
-    let bits = model.truncation.unwrap_or(32).min(bits);
-    (capture.training_rows() as f64 / f64::powi(2.0, bits as i32)).max(1.0)
-}
-
-/// The smaller of the mean counts of the codes below and above `k`, its neighbours left out: where a
-/// coherent tone or what the model lacks leaves gaps, nothing is expected.
-fn around(counts: &[f64], k: usize) -> f64 {
-    let mean = |from: usize, to: usize| {
-        let cells = counts.get(from..to.min(counts.len())).unwrap_or_default();
-        cells.iter().sum::<f64>() / NEAR as f64
-    };
-    let below = mean(k.saturating_sub(NEAR + 1), k.saturating_sub(1));
-    below.min(mean(k + 2, k + 2 + NEAR))
-}
-
-/// A histogram under Gaussian noise of `sigma` codes, by four passes of a moving mean.
-fn smoothed(means: &[f64], sigma: f64) -> Vec<f64> {
-    let half = (((3.0 * sigma * sigma + 1.0).sqrt() - 1.0) / 2.0).round() as usize;
-    let mut out = means.to_vec();
-    for _ in 0..4 {
-        let mut sums = vec![0.0];
-        let mut sum = 0.0;
-        for v in &out {
-            sum += v;
-            sums.push(sum);
-        }
-        let n = out.len();
-        for (k, v) in out.iter_mut().enumerate() {
-            let (from, to) = (k.saturating_sub(half), (k + half + 1).min(n));
-            let width = (2 * half + 1) as f64;
-            *v = (sums.get(to).unwrap_or(&sum) - sums.get(from).unwrap_or(&sum)) / width;
-        }
-    }
-    out
-}
-
 /// What is gained by `count` instead of `expected` rows.
 fn poisson_gain(count: f64, expected: f64) -> f64 {
     if count >= expected {
@@ -224,80 +81,74 @@ fn poisson_gain(count: f64, expected: f64) -> f64 {
     expected - count + log
 }
 
-/// Looks for missing codes in the training rows: in an even spacing in both channels or one, or code by
-/// code.
+/// Looks for missing codes in the training rows: in an even spacing in both channels or one, or run by
+/// run of adjacent codes.
 pub fn find(capture: &Capture, model: &Model) -> Option<Found> {
-    let histograms: Vec<Option<Vec<(i64, f64, f64)>>> = (0..2)
-        .map(|c| Histogram::of(capture, model, c).map(|h| h.inside(model.limits[c])))
-        .collect();
-    let cells = |c: usize| {
-        histograms
-            .get(c)
-            .and_then(Option::as_deref)
-            .unwrap_or_default()
-    };
+    let counts = [0, 1].map(|c: usize| Counts::of(capture, model, c));
+    let cells: [Vec<Cell>; 2] = [0, 1].map(|c: usize| {
+        let counts = counts.get(c).and_then(Option::as_ref);
+        counts.map(Counts::cells).unwrap_or_default()
+    });
     let mut best: Option<(f64, Vec<usize>, i64, i64)> = None;
     for channels in [vec![0, 1], vec![0], vec![1]] {
-        if let Some((gain, spacing, residue)) =
-            spaced(&channels.iter().map(|c| cells(*c)).collect::<Vec<_>>())
+        let of = channels.iter().filter_map(|c| cells.get(*c));
+        if let Some((gain, spacing, residue)) = spaced(&of.map(Vec::as_slice).collect::<Vec<_>>())
             && best.as_ref().is_none_or(|b| gain > b.0)
         {
             best = Some((gain, channels, spacing, residue));
         }
     }
-    let single = singles([cells(0), cells(1)]);
-    let single_gain = single.1;
-    let mut missing = [Missing::default(), Missing::default()];
-    let (mut gain, mut spacing) = (single_gain, None);
-    match best {
-        Some((even, channels, step, residue)) if even >= single_gain => {
-            (gain, spacing) = (even, Some((step, residue)));
-            for c in channels {
-                let of = |(code, ..): &(i64, f64, f64)| code.rem_euclid(step) == residue;
-                missing[c].codes = cells(c)
-                    .iter()
-                    .filter(|x| of(x))
-                    .map(|x| x.0 as i32)
-                    .collect();
-            }
-        }
-        _ => {
-            let [drive, sense] = single.0;
-            missing[0].codes = drive;
-            missing[1].codes = sense;
+    let all = cells.iter().map(Vec::len).sum::<usize>().max(1) as f64;
+    let mut gaps = [0, 1].map(|c: usize| {
+        let counts = counts.get(c).and_then(Option::as_ref);
+        counts.map(|counts| sure(counts, all)).unwrap_or_default()
+    });
+    let mut gain: f64 = gaps.iter().flatten().map(|(gain, _)| gain).sum();
+    let mut spacing = None;
+    if let Some((even, channels, step, residue)) = best.filter(|b| b.0 >= gain) {
+        (gain, spacing) = (even, Some((step, residue)));
+        for (c, (gaps, cells)) in gaps.iter_mut().zip(&cells).enumerate() {
+            let of = |cell: &&Cell| channels.contains(&c) && cell.0.rem_euclid(step) == residue;
+            let one = |&(code, seen, expected): &Cell| Run {
+                first: code,
+                last: code,
+                seen,
+                expected,
+            };
+            *gaps = cells.iter().filter(of).map(|x| (0.0, one(x))).collect();
         }
     }
     if gain < LEAST_GAIN {
         return None;
     }
-    let mut expected_rows = 0.0;
-    for (c, m) in missing.iter_mut().enumerate() {
-        let of = |code: i64| cells(c).binary_search_by_key(&code, |x| x.0).ok();
-        let count = |code: i64| of(code).and_then(|k| cells(c).get(k)).map_or(0.0, |x| x.1);
-        let side = |step: i64| {
-            m.codes
-                .iter()
-                .map(|k| count(i64::from(*k) + step))
-                .sum::<f64>()
-        };
-        m.toward = if side(1) > side(-1) { 1.0 } else { -1.0 };
-        let expected = |k: &i32| {
-            of(i64::from(*k))
-                .and_then(|k| cells(c).get(k))
-                .map_or(0.0, |x| x.2)
-        };
-        expected_rows += m.codes.iter().map(expected).sum::<f64>();
-    }
-    Some(Found {
-        missing,
+    let mut out = Found {
+        missing: Default::default(),
         gain,
         spacing,
-        expected_rows,
-    })
+        expected_rows: gaps.iter().flatten().map(|(_, run)| run.expected).sum(),
+    };
+    let runs = gaps.map(|gaps| gaps.into_iter().map(|(_, run)| run).collect::<Vec<_>>());
+    let moves = moved::of(&counts, &runs, spacing.is_some());
+    for ((missing, runs), moves) in out.missing.iter_mut().zip(&runs).zip(moves) {
+        let codes = runs.iter().flat_map(|run| run.first..=run.last);
+        missing.codes = codes.map(|code| code as i32).collect();
+        missing.moves = moves;
+    }
+    Some(out)
+}
+
+/// Code, rows, rows that there should at least be.
+type Cell = (i64, f64, f64);
+
+/// The runs that are missing each for itself, with their gain.
+fn sure(counts: &Counts, all: f64) -> Vec<(f64, Run)> {
+    let own = |run: Run| (poisson_gain(run.seen, run.expected) - all.ln(), run);
+    let runs = counts.runs().into_iter().map(own);
+    runs.filter(|(gain, _)| *gain > 3.0).collect()
 }
 
 /// The best even spacing: gain (the search taken off), spacing, residue.
-fn spaced(channels: &[&[(i64, f64, f64)]]) -> Option<(f64, i64, i64)> {
+fn spaced(channels: &[&[Cell]]) -> Option<(f64, i64, i64)> {
     let total: f64 = channels.iter().flat_map(|c| c.iter()).map(|x| x.2).sum();
     let widest = channels.iter().map(|c| c.len()).max().unwrap_or(0);
     let longest = SPACING.min((total / 20.0) as i64).min(widest as i64 / 3);
@@ -328,11 +179,7 @@ fn spaced(channels: &[&[(i64, f64, f64)]]) -> Option<(f64, i64, i64)> {
 }
 
 /// The cells (of ascending, contiguous codes) of a residue.
-fn class(
-    cells: &[(i64, f64, f64)],
-    spacing: i64,
-    residue: i64,
-) -> impl Iterator<Item = &(i64, f64, f64)> + Clone {
+fn class(cells: &[Cell], spacing: i64, residue: i64) -> impl Iterator<Item = &Cell> + Clone {
     let first = cells.first().map_or(0, |x| x.0);
     let skip = (residue - first).rem_euclid(spacing) as usize;
     cells
@@ -342,20 +189,75 @@ fn class(
         .step_by(spacing.max(1) as usize)
 }
 
-/// Codes that are missing each for itself, and their gain together.
-fn singles(channels: [&[(i64, f64, f64)]; 2]) -> ([Vec<i32>; 2], f64) {
-    let all = channels.iter().map(|c| c.len()).sum::<usize>().max(1) as f64;
-    let mut gain = 0.0;
-    let codes = channels.map(|cells| {
-        let mut codes = Vec::new();
-        for (code, count, expected) in cells {
-            let own = expected - all.ln();
-            if *count == 0.0 && own > 3.0 {
-                gain += own;
-                codes.push(*code as i32);
+#[cfg(test)]
+mod tests {
+    use super::super::synthetic::{Made, model};
+    use super::*;
+
+    /// What is found where drive codes go to others (`from`, `to`), with a model that is off by `offset` codes.
+    fn found(made: &Made, moved: &[(i32, i32)], offset: f64) -> Option<Found> {
+        let mut capture = made.capture();
+        for code in &mut capture.codes[0] {
+            let to = moved.iter().find(|(from, _)| from == code);
+            *code = to.map_or(*code, |(_, to)| *to);
+        }
+        let (_, mut model) = model(&capture, made);
+        model.coefficients[0][super::super::columns::ONE] = offset;
+        find(&capture, &model)
+    }
+
+    const QUIET: Made = Made {
+        noise: 0.4,
+        ..Made::CLEAN
+    };
+
+    #[test]
+    fn codes_at_the_crest_are_missed_as_others_are() {
+        // The amplitude is 200.3 codes: the outermost code of the tone itself, and some inside of it, both sides.
+        for code in [200, 199, 198, 195, -200, -199, -197] {
+            for by in [-1, 1] {
+                let found = found(&QUIET, &[(code, code + by)], 0.0).unwrap().missing;
+                assert_eq!(found[0].codes, [code], "{by}");
+                assert_eq!(found[0].moves, [f64::from(by)], "{code}");
+                assert!(found[1].codes.is_empty());
             }
         }
-        codes
-    });
-    (codes, gain)
+    }
+
+    #[test]
+    fn a_gap_is_one_event_and_its_rows_go_where_they_went() {
+        let halves = [(195, 194), (196, 194), (197, 199), (198, 199)];
+        let below = halves.map(|(code, _)| (code, 194));
+        let above = halves.map(|(code, _)| (code, 199));
+        for gap in [halves, below, above] {
+            let found = found(&QUIET, &gap, 0.0).unwrap();
+            assert_eq!(found.missing[0].codes, [195, 196, 197, 198]);
+            let moves = gap.map(|(from, to)| f64::from(to - from));
+            assert_eq!(found.missing[0].moves, moves);
+        }
+    }
+
+    #[test]
+    fn no_code_is_missing_where_none_is() {
+        for noise in [0.05, 0.15, 0.4, 1.0, 3.0] {
+            for offset in [-0.4, 0.0, 0.4] {
+                for word in [0x0734_5679, 1 << 24, 3 << 20] {
+                    let made = Made {
+                        noise,
+                        word,
+                        ..Made::CLEAN
+                    };
+                    assert_eq!(found(&made, &[], offset), None, "{noise} {word:x}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_no_code_is_beyond_is_a_limit_and_not_missing() {
+        for limit in [200.0, 199.0, 195.0] {
+            let made = Made { limit, ..QUIET };
+            assert_eq!(found(&made, &[], 0.0), None, "{limit}");
+        }
+    }
 }

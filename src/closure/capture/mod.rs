@@ -9,7 +9,7 @@
 //! [`wrong_codes`] (wrong codes), both on [`blocks`]; [`tone`] is the phase; [`columns`] are the functions of which effects are made, one
 //! file an effect ([`offset`], [`gain`], [`latency`], [`feedthrough`], [`nonlinearity`],
 //! [`harmonics`], [`mains`], [`spur`] with [`truncation`]); [`gram`] their sums and least squares;
-//! [`search`] chooses. Outside of the linear part are [`clipping`] (with [`flat_top`] and [`instant`]), [`missing`] (the histogram),
+//! [`search`] chooses. Outside of the linear part are [`clipping`] (with [`flat_top`] and [`instant`]), [`missing`] (the histogram: [`code_counts`], [`moved`]),
 //! [`jitter`] (the variance). [`spectrum`] gives noise and lines ([`rounding`]: those that are the quantiser's own),
 //! [`wander`] the slow noise that must not pass for an
 //! effect. [`around`] is the fit with every freedom, [`steps`] where the quantiser's
@@ -23,6 +23,7 @@ pub mod blocks;
 pub mod candidates;
 pub mod clipping;
 pub mod clock;
+pub mod code_counts;
 pub mod columns;
 pub mod errors;
 pub mod exact_steps;
@@ -46,6 +47,7 @@ pub mod keys;
 pub mod latency;
 pub mod mains;
 pub mod missing;
+pub mod moved;
 pub mod nonlinearity;
 pub mod normal;
 pub mod offset;

@@ -110,9 +110,9 @@ impl Histogram {
         if self.width > 1 {
             return;
         }
-        for code in &missing.codes {
+        for (code, by) in missing.codes.iter().zip(&missing.moves) {
             let bar = i64::from(*code) - self.first;
-            let to = usize::try_from(bar + missing.toward as i64);
+            let to = usize::try_from(bar + *by as i64);
             let (Ok(bar), Ok(to)) = (usize::try_from(bar), to) else {
                 continue;
             };
