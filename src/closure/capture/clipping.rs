@@ -348,7 +348,7 @@ mod tests {
             let lost = jitter * jitter * model.tone.angle().powi(2);
             // As the fit finds them: the mean tone, and the peaks' spread in the noise.
             let left = (-0.5 * lost).exp();
-            model.variance.jitter = (1.0 - left * left) / model.tone.angle().powi(2);
+            model.variance.jitter = [(1.0 - left * left) / model.tone.angle().powi(2); 2];
             model.variance.base[0] += 0.5 * (AMPLITUDE * (1.0 - left * left)).powi(2);
             model.declared[0][1] *= left;
             let tone = [0.0, 0.0, -AMPLITUDE * left];

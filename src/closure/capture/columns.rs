@@ -70,8 +70,8 @@ pub const fn line(i: usize) -> (usize, usize) {
 pub struct Variance {
     /// Of each channel, codes squared.
     pub base: [f64; 2],
-    /// Variance of the sampling instant, samples squared.
-    pub jitter: f64,
+    /// Variance of each channel's sampling instant, samples squared.
+    pub jitter: [f64; 2],
 }
 
 /// All that is not a coefficient, and the coefficients of the last fit (for the signal's value).
@@ -304,7 +304,7 @@ impl Rows {
             let hats = neutral_at(HAT + k) * (1.0 - part) + neutral_at(HAT + k + 1) * part;
             let there = declared + there + hats + neutral_at(segment);
             let slope = angle * (sin_all * dense[COS][i] - cos_all * dense[SIN][i]);
-            let late = model.variance.jitter * slope * slope;
+            let late = model.variance.jitter[channel] * slope * slope;
             let rest = floor(there + 0.5) - there;
             // The random instant smoothes the steps where the signal is steep.
             dense[SAW][i] = if late > 0.0 {

@@ -33,7 +33,7 @@ pub fn judge(capture: &Capture, model: &Model) -> Judged {
                     sums[held][0] += 1.0;
                     sums[held][1] += error * error;
                     let slope = rows.slope[channel][i];
-                    let variance = base + model.variance.jitter * slope * slope;
+                    let variance = base + model.variance.jitter[channel] * slope * slope;
                     if held == 0 {
                         out.train_chi += error * error / variance;
                     } else {

@@ -40,7 +40,9 @@ pub fn is_coupled(capture: &Capture, model: &Model, residuals: [&[f64]; 2]) -> b
     let block = LOCAL_ROWS.max(periods as usize + 1);
     // A random instant of variance t leaves cos(a) - (1 - t w^2) cos(b) of two tones, the slopes' product
     // cos(a) - cos(b), the signals' cos(a) + cos(b), as their amplitudes are those that the random instant leaves.
-    let lost = model.variance.jitter * model.tone.angle().powi(2);
+    // Instants that are not of both channels make no product.
+    let [drive, sense] = model.variance.jitter;
+    let lost = (drive * sense).sqrt() * model.tone.angle().powi(2);
     let bent = 0.5 * lost / (1.0 - 0.5 * lost.min(1.0)) * model.tone.angle().powi(2);
     let mut rows = Rows::new();
     let mut points: Vec<Point> = Vec::new();

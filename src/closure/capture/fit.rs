@@ -109,7 +109,7 @@ pub fn declared(capture: &Capture, known: &Known, tone: Tone) -> Model {
         missing: [Missing::default(), Missing::default()],
         variance: Variance {
             base: [1.0; 2],
-            jitter: 0.0,
+            jitter: [0.0; 2],
         },
         span_codes: 1.02 * f64::from(largest.unwrap_or(1).max(1)),
         full_scale_codes: known.full_scale_codes,
@@ -296,11 +296,12 @@ fn follow_jitter(
 ) -> (Option<jitter::Found>, bool) {
     let [drive, sense] = &seen.residuals;
     let squares = jitter::Squares::of(capture, model, [drive, sense], false);
-    let found = squares.fit(seen.noise);
-    let taken = found.filter(|f| f.gain > JITTER_COST + per_column(capture.training_rows()));
+    let column = per_column(capture.training_rows());
+    let found = squares.fit(seen.noise, column);
+    let taken = found.filter(|f| f.gain > JITTER_COST + column);
     model.variance = Variance {
         base: seen.noise,
-        jitter: 0.0,
+        jitter: [0.0; 2],
     };
     if let Some(found) = taken {
         let base = squares.base(found.jitter);
@@ -308,9 +309,12 @@ fn follow_jitter(
             base: base.map(|b| b.max(LEAST_VARIANCE)),
             jitter: found.jitter,
         };
-        // The random instant takes a part of the tones themselves, of both as the instant is common or not.
-        let less = left_by(found.jitter, &model.tone);
-        model.declared = declared_tones(capture, known).map(|tone| tone.map(|part| part * less));
+        // The random instant takes a part of the tones themselves.
+        model.declared = declared_tones(capture, known);
+        for (tone, jitter) in model.declared.iter_mut().zip(found.jitter) {
+            let less = left_by(jitter, &model.tone);
+            tone.iter_mut().for_each(|part| *part *= less);
+        }
     }
     (found, taken.is_some())
 }

@@ -18,7 +18,7 @@ impl Instant {
     /// Of cos(p + t) with Gaussian t of variance v the mean is e^(-v/2) cos p, the variance (1 - m) (1 - m cos 2p) / 2
     /// with m = e^-v: (1 - m)^2 / 2 and the part that goes with the slope squared of the mean tone, 1 - m of it.
     pub fn of(model: &Model, channel: usize) -> Self {
-        let lost = (model.variance.jitter * model.tone.angle().powi(2)).min(0.9);
+        let lost = (model.variance.jitter[channel] * model.tone.angle().powi(2)).min(0.9);
         let [sin, cos] = model.declared[channel];
         let at = |k: usize| model.coefficients[channel].get(k).copied().unwrap_or(0.0);
         let square = (sin + at(SIN)).powi(2) + (cos + at(COS)).powi(2);

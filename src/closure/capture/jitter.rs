@@ -25,12 +25,34 @@ pub struct Squares {
 /// The fit of the variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Found {
-    /// tau^2, samples squared; not below 0.
-    pub jitter: f64,
-    /// Standard deviation of it.
-    pub std: f64,
-    /// Gain in log-likelihood.
+    /// tau^2 of each channel, samples squared; not below 0.
+    pub jitter: [f64; 2],
+    /// Standard deviations of them.
+    pub std: [f64; 2],
+    /// One instant for both channels.
+    pub is_common: bool,
+    /// Gain in log-likelihood, what its form costs beyond a common one taken off.
     pub gain: f64,
+}
+
+/// Instants that are random: of both channels by the same deviation, of one channel, of each by its own. Of a form, the column
+/// of each channel's slope squared.
+const FORMS: [[Option<usize>; 2]; 4] = [
+    [Some(0), Some(0)],
+    [Some(0), None],
+    [None, Some(0)],
+    [Some(0), Some(1)],
+];
+/// What one channel's alone gives away, nats: both converters mostly have one clock.
+const ALONE: f64 = 2.0;
+
+/// Mean square of the residual at a phase of a channel, and what it is made of.
+struct Point {
+    channel: usize,
+    value: f64,
+    variance: f64,
+    slope2: f64,
+    wave: f64,
 }
 
 impl Squares {
@@ -63,9 +85,24 @@ impl Squares {
         Squares { bins }
     }
 
-    /// Weighted least squares of r^2 on 1, slope^2 and, with little noise, the quantiser's wave.
-    pub fn fit(&self, variances: [f64; 2]) -> Option<Found> {
-        let mut points: Vec<(usize, f64, f64, f64, f64)> = Vec::new();
+    /// Weighted least squares of r^2 on 1, slope^2 and, with little noise, the quantiser's wave, in the form of
+    /// [`FORMS`] that gains most; `column` is what a free value costs.
+    pub fn fit(&self, variances: [f64; 2], column: f64) -> Option<Found> {
+        let points = self.points(variances);
+        let with_wave = variances.iter().any(|v| *v < 0.5);
+        let costs = [0.0, ALONE, ALONE, ALONE + column];
+        let found = FORMS.iter().zip(costs).filter_map(|(form, cost)| {
+            let found = fit_form(&points, form, with_wave)?;
+            Some(Found {
+                gain: found.gain - cost,
+                ..found
+            })
+        });
+        found.max_by(|a, b| a.gain.total_cmp(&b.gain))
+    }
+
+    fn points(&self, variances: [f64; 2]) -> Vec<Point> {
+        let mut points = Vec::new();
         for (channel, bins) in self.bins.iter().enumerate() {
             for [n, r, r2, r4, slope2, wave] in bins {
                 if *n < 8.0 {
@@ -75,54 +112,25 @@ impl Squares {
                 let value = (square - mean * mean) * n / (n - 1.0);
                 let spread = (r4 / n - square * square).max(2.0 * value * value / 3.0);
                 let prior = 2.0 * variances[channel] * variances[channel];
-                // Few rows do not tell their own spread.
-                let variance = (spread * n + 30.0 * prior) / (n + 30.0) / n;
-                points.push((channel, value, variance, slope2 / n, wave / n));
+                points.push(Point {
+                    channel,
+                    value,
+                    // Few rows do not tell their own spread.
+                    variance: (spread * n + 30.0 * prior) / (n + 30.0) / n,
+                    slope2: slope2 / n,
+                    wave: wave / n,
+                });
             }
         }
-        let with_wave = variances.iter().any(|v| *v < 0.5);
-        let columns = |p: &(usize, f64, f64, f64, f64)| {
-            let own = |c: usize| if p.0 == c { 1.0 } else { 0.0 };
-            let wave = |c: usize| if with_wave { own(c) * p.4 } else { 0.0 };
-            [own(0), own(1), wave(0), wave(1), p.3]
-        };
-        let mut sums = nalgebra::SMatrix::<f64, 5, 5>::identity() * 1e-12;
-        let mut right = nalgebra::SVector::<f64, 5>::zeros();
-        let scale = points.iter().map(|p| p.3).fold(0.0, f64::max);
-        if scale <= 0.0 || points.len() < 24 {
-            return None;
-        }
-        let row = |p: &(usize, f64, f64, f64, f64)| {
-            let mut row = nalgebra::SVector::<f64, 5>::from(columns(p));
-            row[4] /= scale;
-            row
-        };
-        for p in &points {
-            sums += row(p) * row(p).transpose() / p.2;
-            right += row(p) * (p.1 / p.2);
-        }
-        // Without the wave its two columns are empty: a prior holds them at 0.
-        for k in 2..4 {
-            sums[(k, k)] += 1e-9 * (sums[(0, 0)] + sums[(1, 1)]);
-        }
-        let inverse = sums.try_inverse()?;
-        let solved = inverse * right;
-        let misfit = |p: &(usize, f64, f64, f64, f64)| (p.1 - row(p).dot(&solved)).powi(2) / p.2;
-        let excess = points.iter().map(misfit).sum::<f64>() / (points.len() as f64 - 5.0);
-        let std = (inverse[(4, 4)] * excess.max(1.0)).sqrt();
-        let z = (solved[4] / std).max(0.0);
-        Some(Found {
-            jitter: solved[4].max(0.0) / scale,
-            std: std / scale,
-            gain: 0.5 * z * z,
-        })
+        points
     }
 
     /// Mean squares of the channels' noise without the jitter, given it. A mean square is known to a share of itself:
     /// weights one over the square of what is expected of it, or, where the slope is steep, a jitter that is a few per
     /// cent off would be most of what is left.
-    pub fn base(&self, jitter: f64) -> [f64; 2] {
+    pub fn base(&self, jitter: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|c: usize| {
+            let jitter = jitter[c];
             let mut base = 0.0;
             for turn in 0..BASE_TURNS {
                 let (mut n, mut sum) = (0.0, 0.0);
@@ -143,9 +151,9 @@ impl Squares {
     }
 
     /// Log-likelihood of Gaussian noise with these variances.
-    pub fn likelihood(&self, base: [f64; 2], jitter: f64) -> f64 {
+    pub fn likelihood(&self, base: [f64; 2], jitter: [f64; 2]) -> f64 {
         let mut sum = 0.0;
-        for (bins, base) in self.bins.iter().zip(base) {
+        for ((bins, base), jitter) in self.bins.iter().zip(base).zip(jitter) {
             for [n, _, r2, _, slope2, _] in bins {
                 if *n > 0.0 {
                     let v = (base + jitter * slope2 / n).max(1e-9);
@@ -155,6 +163,66 @@ impl Squares {
         }
         sum
     }
+}
+
+/// Least squares with the slopes squared in one or two columns.
+fn fit_form(points: &[Point], form: &[Option<usize>; 2], with_wave: bool) -> Option<Found> {
+    let slopes = form.iter().flatten().max()? + 1;
+    let of = |p: &Point, column: usize| form[p.channel] == Some(column);
+    let scales: Vec<f64> = (0..slopes)
+        .map(|k| {
+            points
+                .iter()
+                .filter(|p| of(p, k))
+                .map(|p| p.slope2)
+                .fold(0.0, f64::max)
+        })
+        .collect();
+    if scales.iter().any(|s| *s <= 0.0) || points.len() < 24 {
+        return None;
+    }
+    let row = |p: &Point| {
+        let own = |c: usize| f64::from(u8::from(p.channel == c));
+        let wave = |c: usize| if with_wave { own(c) * p.wave } else { 0.0 };
+        let slope = |k: usize| if of(p, k) { p.slope2 / scales[k] } else { 0.0 };
+        let fixed = [own(0), own(1), wave(0), wave(1)];
+        nalgebra::DVector::from_iterator(
+            4 + slopes,
+            fixed.into_iter().chain((0..slopes).map(slope)),
+        )
+    };
+    let mut sums = nalgebra::DMatrix::<f64>::identity(4 + slopes, 4 + slopes) * 1e-12;
+    let mut right = nalgebra::DVector::<f64>::zeros(4 + slopes);
+    for p in points {
+        let row = row(p);
+        right.axpy(p.value / p.variance, &row, 1.0);
+        sums.ger(1.0 / p.variance, &row, &row, 1.0);
+    }
+    // Without the wave its two columns are empty: a prior holds them at 0.
+    for k in 2..4 {
+        sums[(k, k)] += 1e-9 * (sums[(0, 0)] + sums[(1, 1)]);
+    }
+    let inverse = sums.try_inverse()?;
+    let solved = &inverse * right;
+    let misfit = |p: &Point| (p.value - row(p).dot(&solved)).powi(2) / p.variance;
+    let degrees = points.len() as f64 - 4.0 - slopes as f64;
+    let excess = (points.iter().map(misfit).sum::<f64>() / degrees).max(1.0);
+    let covariance = inverse.view((4, 4), (slopes, slopes)) * excess;
+    let values = solved.rows(4, slopes).map(|v| v.max(0.0));
+    let weighed = covariance.clone().try_inverse()? * &values;
+    let mut found = Found {
+        jitter: [0.0; 2],
+        std: [0.0; 2],
+        is_common: form[0] == form[1],
+        gain: 0.5 * values.dot(&weighed),
+    };
+    for (channel, column) in form.iter().enumerate() {
+        if let Some(k) = *column {
+            found.jitter[channel] = values[k] / scales[k];
+            found.std[channel] = covariance[(k, k)].sqrt() / scales[k];
+        }
+    }
+    Some(found)
 }
 
 #[cfg(test)]
@@ -188,9 +256,52 @@ mod tests {
         let [drive, sense] = [residual(0, (1.0 - lost).sqrt()), residual(1, 1.0)];
         let squares = Squares::of(&capture, &model, [&drive, &sense], false);
         // A jitter some per cent too small, as the rows leave it open.
-        let base = squares.base(0.94 * lost / angle.powi(2))[0];
+        let base = squares.base([0.94 * lost / angle.powi(2); 2])[0];
         // Noise, rounding, and what the bend of the tone at its peaks makes of the random instant.
         let exact = 0.4f64.powi(2) + 1.0 / 12.0 + 0.5 * (lost * AMPLITUDE).powi(2);
         assert!((base / exact - 1.0).abs() < 0.15, "{base} {exact}");
+    }
+
+    #[test]
+    fn an_instant_is_random_in_the_channels_in_which_it_is() {
+        let fit = |jitter: [f64; 2]| {
+            let mut points = Vec::new();
+            for channel in 0..2 {
+                for k in 0..BINS {
+                    let slope2 = 90.0 * (TAU * k as f64 / BINS as f64).cos().powi(2);
+                    let value = 0.5 + jitter[channel] * slope2;
+                    let ripple = 1.0 + 0.02 * (2.4 * k as f64).sin();
+                    let variance = 2.0 * value * value / 300.0;
+                    points.push(Point {
+                        channel,
+                        value: value * ripple,
+                        variance,
+                        slope2,
+                        wave: 0.0,
+                    });
+                }
+            }
+            let found = FORMS
+                .iter()
+                .map(|form| fit_form(&points, form, false).unwrap());
+            found.map(|f| (f.gain, f.jitter)).collect::<Vec<_>>()
+        };
+        // Of the drive alone: that form gains as much as one of each, and more than a common one.
+        let [common, drive, sense, own] = fit([0.01, 0.0]).try_into().unwrap();
+        assert!(drive.0 > common.0 + 20.0 && drive.0 > sense.0 + 100.0 && own.0 < drive.0 + 1.0);
+        assert!(
+            (drive.1[0] / 0.01 - 1.0).abs() < 0.05 && drive.1[1] == 0.0,
+            "{drive:?}"
+        );
+        // Of both by one clock.
+        let [common, drive, _, own] = fit([0.01, 0.01]).try_into().unwrap();
+        assert!(
+            common.0 > drive.0 + 20.0 && own.0 < common.0 + 1.0,
+            "{common:?} {own:?}"
+        );
+        // Each its own.
+        let [common, _, _, own] = fit([0.04, 0.005]).try_into().unwrap();
+        assert!(own.0 > common.0 + 20.0);
+        assert!((own.1[1] / 0.005 - 1.0).abs() < 0.1, "{own:?}");
     }
 }

@@ -176,7 +176,7 @@ pub fn analyse(capture: &Capture) -> Result<Findings> {
     }
     let (known, mut plain, fitted) = likeliest(capture, tone);
     plain.variance = fitted.model.variance;
-    plain.variance.jitter = 0.0;
+    plain.variance.jitter = [0.0; 2];
     Ok(report::findings(capture, &known, &plain, &fitted))
 }
 

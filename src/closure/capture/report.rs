@@ -323,7 +323,7 @@ fn jitter_holds(capture: &Capture, fitted: &Fitted) -> bool {
     let held = jitter::Squares::of(capture, &fitted.model, [drive, sense], true);
     let variance = fitted.model.variance;
     // Without jitter its mean part is in the base of each channel.
-    held.likelihood(variance.base, variance.jitter) > held.likelihood(fitted.noise, 0.0)
+    held.likelihood(variance.base, variance.jitter) > held.likelihood(fitted.noise, [0.0; 2])
 }
 
 /// The bend that a member of the set fits, if one does.

@@ -176,14 +176,22 @@ pub(super) fn missing_step(fitted: &Fitted) -> Step {
 pub(super) fn jitter_step(known: &Known, fitted: &Fitted) -> Step {
     let mut step = empty(Effect::Jitter);
     if let Some(found) = fitted.jitter {
-        let samples = found.jitter.sqrt();
-        let std = found.std / (2.0 * samples.max(1e-12));
         let (name, unit) = match known.fs_hz {
             Some(fs) => ("jitter_rms_s", 1.0 / fs),
             None => ("jitter_rms_samples", 1.0),
         };
-        step.parameters.insert(name.to_owned(), samples * unit);
-        step.parameter_std.insert(name.to_owned(), std * unit);
+        let of: &[(usize, &str)] = match found.is_common {
+            true => &[(0, "")],
+            false => &[(0, "drive_"), (1, "sense_")],
+        };
+        for (channel, prefix) in of.iter().filter(|(c, _)| found.jitter[*c] > 0.0) {
+            let samples = found.jitter[*channel].sqrt();
+            let std = found.std[*channel] / (2.0 * samples.max(1e-12));
+            step.parameters
+                .insert(format!("{prefix}{name}"), samples * unit);
+            step.parameter_std
+                .insert(format!("{prefix}{name}"), std * unit);
+        }
         step.p_value = (3.0 - chi_square_surprise(1, 2.0 * found.gain).min(1e6))
             .exp()
             .min(1.0);

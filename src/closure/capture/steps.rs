@@ -27,7 +27,7 @@ pub fn is_sharp(coefficients: &[Vec<f64>; 2], model: &Model) -> bool {
         let at = |k: usize| c.get(k).copied().unwrap_or(0.0);
         let [sin, cos] = model.declared[channel];
         let slope = model.tone.angle() * (sin + at(SIN)).hypot(cos + at(COS));
-        let late = 0.5 * model.variance.jitter * slope * slope;
+        let late = 0.5 * model.variance.jitter[channel] * slope * slope;
         model.variance.base[channel] < 16.0
             && late < HIDING
             && (at(SAW).abs() > LEAST_SAW || at(WAVE).abs() > LEAST_WAVE)
@@ -104,7 +104,7 @@ mod tests {
         coefficients[0][SAW] = 1.0;
         assert!(is_sharp(&coefficients, &model));
         // Half a code rms of 200 codes.
-        model.variance.jitter = 2.0 * (0.5 / (200.0 * model.tone.angle())).powi(2);
+        model.variance.jitter = [2.0 * (0.5 / (200.0 * model.tone.angle())).powi(2); 2];
         assert!(!is_sharp(&coefficients, &model));
     }
 }

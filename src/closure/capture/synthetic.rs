@@ -91,6 +91,6 @@ pub fn model(capture: &Capture, made: &Made) -> (super::candidates::Known, Model
     let (known, mut model) = known(capture, tone);
     assert_eq!(declared(capture, &known, tone).declared, model.declared);
     model.variance.base = [made.noise.powi(2) + 1.0 / 12.0; 2];
-    model.variance.jitter = made.jitter.powi(2);
+    model.variance.jitter = [made.jitter.powi(2); 2];
     (known, model)
 }

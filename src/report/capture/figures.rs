@@ -335,7 +335,7 @@ fn against_slope(view: &View) -> Figure {
             .collect()
     };
     let curve =
-        |c: usize, slope: f64| model.variance.base[c] + model.variance.jitter * slope * slope;
+        |c: usize, slope: f64| model.variance.base[c] + model.variance.jitter[c] * slope * slope;
     let x: Vec<Axis> = (0..2)
         .map(|c: usize| {
             let ends = Interval::of([0.0, view.after[c].steepest]);
@@ -378,10 +378,14 @@ fn against_slope(view: &View) -> Figure {
         frame.markers("after dots", Shape::Dot, 1.0, &dots);
         frame
     });
-    let samples = model.variance.jitter.sqrt();
-    let amount = match view.closed.capture.meta.fs_hz {
+    let [drive, sense] = model.variance.jitter.map(f64::sqrt);
+    let told = |samples: f64| match view.closed.capture.meta.fs_hz {
         Some(fs) => format!("{} s rms", significant(samples / fs, 3)),
         None => format!("{} samples rms", significant(samples, 3)),
+    };
+    let amount = match drive == sense {
+        true => told(drive),
+        false => format!("{} (drive) and {} (sense)", told(drive), told(sense)),
     };
     figure(
         svg,
