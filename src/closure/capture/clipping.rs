@@ -262,6 +262,7 @@ fn pile(capture: &Capture, channel: usize, sigma: f64) -> (Limits, f64) {
 #[cfg(test)]
 mod tests {
     use super::super::synthetic::{AMPLITUDE, Made, model};
+    use super::super::truncation::Truncation;
     use super::*;
 
     /// The limits that the missing rows beyond the outermost drive codes tell.
@@ -291,7 +292,10 @@ mod tests {
         };
         let capture = made.capture();
         let (_, mut model) = model(&capture, &made);
-        model.truncation = Some(4);
+        model.truncation = Some(Truncation {
+            bits: 4,
+            half_up: false,
+        });
         let found = find(&capture, &model, 0).map_or(Limits::NONE, |f| f.limits);
         assert!((found.high - 195.0).abs() < 0.1, "{found:?}");
     }

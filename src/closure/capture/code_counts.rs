@@ -248,7 +248,7 @@ fn repeats(capture: &Capture, model: &Model, channel: usize, sigma: f64) -> f64 
         return 1.0;
     };
     let bits = 32 - word.trailing_zeros().min(31);
-    let bits = model.truncation.unwrap_or(32).min(bits);
+    let bits = model.truncation.map_or(32, |t| t.bits).min(bits);
     (capture.training_rows() as f64 / f64::powi(2.0, bits as i32)).max(1.0)
 }
 

@@ -11,6 +11,7 @@ use super::missing::Missing;
 use super::normal;
 use super::steps;
 use super::tone::{Phases, Tone};
+use super::truncation::Truncation;
 use crate::numeric::turn;
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -90,8 +91,8 @@ pub struct Model {
     pub neutral: [Vec<f64>; 2],
     /// Frequencies of the lines, turns a sample.
     pub lines: Vec<f64>,
-    /// Address bits of a truncated oscillator.
-    pub truncation: Option<u32>,
+    /// Address of a truncated oscillator.
+    pub truncation: Option<Truncation>,
     /// Limits of each channel.
     pub limits: [Limits; 2],
     /// Missing codes of each channel.
@@ -221,10 +222,8 @@ impl Rows {
                 dense[at_cos][i] = c;
                 (s, c) = (s * cos + c * sin, c * cos - s * sin);
             }
-            if let Some(bits) = model.truncation {
-                let steps = f64::powi(2.0, bits as i32);
-                let phase = model.tone.phase(row);
-                let (ts, tc) = (TAU * (phase * steps).floor() / steps).sin_cos();
+            if let Some(truncation) = model.truncation {
+                let (ts, tc) = (TAU * truncation.phase(model.tone.phase(row))).sin_cos();
                 dense[TRUNCATED][i] = ts - sin;
                 dense[TRUNCATED + 1][i] = tc - cos;
             }
@@ -473,15 +472,17 @@ mod tests {
         };
         let capture = made.capture();
         let (_, mut model) = model(&capture, &made);
-        model.truncation = made.bits;
         model.coefficients[0][TRUNCATED + 1] = -AMPLITUDE;
-        let mut rows = Rows::new();
-        rows.fill(&capture, &model, 0..CHUNK);
-        for row in 0..CHUNK {
-            let phase = (model.tone.phase(row) * 16.0).floor() / 16.0;
-            let u = -AMPLITUDE * (TAU * phase).cos() / model.span_codes;
-            let power = rows.dense[0][POWER][row];
-            assert!((power - u).abs() < 1e-9, "{row}: {power} {u}");
+        for (half_up, added) in [(false, 0.0), (true, 0.5)] {
+            model.truncation = Some(Truncation { bits: 4, half_up });
+            let mut rows = Rows::new();
+            rows.fill(&capture, &model, 0..CHUNK);
+            for row in 0..CHUNK {
+                let phase = (model.tone.phase(row) * 16.0 + added).floor() / 16.0;
+                let u = -AMPLITUDE * (TAU * phase).cos() / model.span_codes;
+                let power = rows.dense[0][POWER][row];
+                assert!((power - u).abs() < 1e-9, "{row}: {power} {u}");
+            }
         }
     }
 }

@@ -171,7 +171,7 @@ fn placed(capture: &Capture, model: &mut Model, base: &[Combo]) -> Around {
     let seen = around(capture, model, base, !sharp);
     let [drive, sense] = &seen.training;
     let spectrum = seen.spectrum(capture);
-    model.truncation = truncation::best(capture, model, [drive, sense], &spectrum);
+    model.truncation = truncation::best(capture, model, [drive, sense], seen.free, &spectrum);
     around(capture, model, base, false)
 }
 

@@ -3,13 +3,14 @@
 use super::clipping::{Limits, training};
 use super::columns::{COS, Model, SIN, TRUNCATED};
 use super::input::Capture;
+use super::truncation::Truncation;
 use nalgebra::{Matrix3, Vector3};
 
 /// Phases that the mean is taken over.
 const BINS: usize = 1024;
 
-/// The address bits of a channel's tone, if most of it is at truncated phases in the model.
-fn truncated(model: &Model, channel: usize) -> Option<u32> {
+/// The address of a channel's tone, if most of it is at truncated phases in the model.
+fn truncated(model: &Model, channel: usize) -> Option<Truncation> {
     let coefficients = &model.coefficients[channel];
     let at = |k: usize| coefficients.get(k).copied().unwrap_or(0.0);
     let [sin, cos] = model.declared[channel];
@@ -38,11 +39,10 @@ impl Profile {
     pub fn of(capture: &Capture, model: &Model, channel: usize) -> Self {
         let mut bins = vec![[0.0; 4]; BINS];
         // The tone of a truncated oscillator is at the phases of its table.
-        let steps = truncated(model, channel).map(|bits| f64::powi(2.0, bits as i32));
+        let truncated = truncated(model, channel);
         for (row, code) in training(capture, channel) {
-            let phase = steps.map_or(model.tone.phase(row), |n| {
-                (model.tone.phase(row) * n).floor() / n
-            });
+            let phase = model.tone.phase(row);
+            let phase = truncated.map_or(phase, |t| t.phase(phase));
             let (sin, cos) = (std::f64::consts::TAU * phase).sin_cos();
             if let Some(bin) = bins.get_mut((phase * BINS as f64) as usize % BINS) {
                 for (sum, value) in bin.iter_mut().zip([1.0, f64::from(code), sin, cos]) {

@@ -10,10 +10,13 @@ use super::columns::{COS, Model, SIN, TRUNCATED};
 use super::gram::Combo;
 use super::mains;
 use super::tone::{Tone, fold};
+use super::truncation::Truncation;
 use std::f64::consts::TAU;
 
 /// Address bits that an oscillator may have.
 pub const ADDRESS_BITS: std::ops::RangeInclusive<u32> = 3..=16;
+/// What the search among the address bits and their two roundings costs: the logarithm of their number.
+const WAYS_COST: f64 = 3.3;
 /// What the search among the places costs.
 const PLACES_COST: f64 = 5.0;
 /// Orders k of single lines.
@@ -63,8 +66,10 @@ pub fn is_spur(known: &Known, model: &Model, i: usize, rows: usize) -> bool {
 }
 
 /// What truncation makes of the tone itself, beyond 1: sin(p - d) is (1 + a) sin p + b cos p in the mean over the
-/// error d of the phase, which is 0 and all multiples of the phase's own step below that of the address.
-fn of_the_tone(tone: &Tone, bits: u32) -> [f64; 2] {
+/// error d of the phase, which is 0 and all multiples of the phase's own step below that of the address, less half an
+/// address step where that is added before truncation.
+fn of_the_tone(tone: &Tone, truncation: Truncation) -> [f64; 2] {
+    let bits = truncation.bits;
     let word = tone.word.unwrap_or(1);
     let lost = (32 - bits.min(32)).saturating_sub(word.trailing_zeros());
     let count = f64::powi(2.0, lost as i32);
@@ -72,15 +77,16 @@ fn of_the_tone(tone: &Tone, bits: u32) -> [f64; 2] {
     // Sum of exp(-i d): a geometric series, by its closed form.
     let half = 0.5 * step;
     let size = (count * half).sin() / (count * half.sin());
-    let middle = (count - 1.0) * half;
+    let middle = (count - 1.0) * half - truncation.added() * count * step;
     [size * middle.cos() - 1.0, -size * middle.sin()]
 }
 
 /// The truncated tone with or without what truncation does to the tone itself, or lines at the places of spurs.
 pub fn variants(known: &Known, model: &Model, rows: usize) -> Vec<Variant> {
     let mut out = Vec::new();
-    if let Some(bits) = model.truncation {
-        let [along, across] = of_the_tone(&model.tone, bits);
+    if let Some(truncation) = model.truncation {
+        let bits = truncation.bits;
+        let [along, across] = of_the_tone(&model.tone, truncation);
         for channels in [&[0usize][..], &[1], &[0, 1]] {
             for with_tone in [true, false] {
                 let mut combos = Vec::new();
@@ -102,7 +108,7 @@ pub fn variants(known: &Known, model: &Model, rows: usize) -> Vec<Variant> {
                         combos.push(Combo::new(&name, 1.0, &parts));
                     }
                 }
-                out.push(Variant::new(Effect::Spur, combos, 2.6));
+                out.push(Variant::new(Effect::Spur, combos, WAYS_COST));
             }
         }
     }
@@ -112,4 +118,34 @@ pub fn variants(known: &Known, model: &Model, rows: usize) -> Vec<Variant> {
     // A hundred places instead of all frequencies.
     out.extend(mains::groups(model, &own, Effect::Spur, &|_| PLACES_COST));
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_mean_of_a_truncated_tone_is_that_over_all_phases() {
+        // The phase is a multiple of 2^-10 turn, its address one of 2^-7.
+        let word = 5 << 22;
+        let tone = Tone {
+            word: Some(word),
+            turns: f64::from(word) / 4_294_967_296.0,
+            offset_turns: 0.0,
+        };
+        for half_up in [false, true] {
+            let truncation = Truncation { bits: 7, half_up };
+            let mut mean = [0.0; 2];
+            for row in 0..1024 {
+                let phase = tone.phase(row);
+                let (sin, cos) = (TAU * phase).sin_cos();
+                let read = (TAU * truncation.phase(phase)).sin();
+                mean[0] += read * sin / 512.0;
+                mean[1] += read * cos / 512.0;
+            }
+            let [along, across] = of_the_tone(&tone, truncation);
+            let off = (mean[0] - 1.0 - along).abs() + (mean[1] - across).abs();
+            assert!(off < 1e-12, "{half_up}: {mean:?} {along} {across}");
+        }
+    }
 }

@@ -1,4 +1,5 @@
-//! How many phase bits the oscillator's table is addressed with, if truncation shows in the codes.
+//! How many phase bits the oscillator's table is addressed with and how they are rounded, if truncation shows in the
+//! codes (`table_address_bits` and `address_rounding` of the contract's oscillator).
 
 use super::around::LEAST_VARIANCE;
 use super::columns::Model;
@@ -8,23 +9,58 @@ use super::spur::ADDRESS_BITS;
 use super::tone::fold;
 use std::f64::consts::TAU;
 
+/// How an oscillator comes from its phase to an address of its table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Truncation {
+    /// Address bits.
+    pub bits: u32,
+    /// Half an address step is added to the phase before the bits below the address are dropped
+    /// (`address_rounding = "half_up"`); nothing is with `"floor"`.
+    pub half_up: bool,
+}
+
+impl Truncation {
+    /// Both roundings of some address bits.
+    fn both(bits: u32) -> [Truncation; 2] {
+        [false, true].map(|half_up| Truncation { bits, half_up })
+    }
+
+    /// Addresses a turn.
+    pub fn steps(self) -> f64 {
+        f64::powi(2.0, self.bits as i32)
+    }
+
+    /// What is added before truncation, in address steps.
+    pub fn added(self) -> f64 {
+        if self.half_up { 0.5 } else { 0.0 }
+    }
+
+    /// The phase (turns) of the table's entry that is read at a phase (turns in 0 .. 1); 1 is entry 0 again.
+    pub fn phase(self, phase: f64) -> f64 {
+        let steps = self.steps();
+        (phase * steps + self.added()).floor() / steps
+    }
+}
+
 /// Least gain in log-likelihood for a number of bits to be looked at.
 const LEAST_GAIN: f64 = 8.0;
 
 /// Least surprise of the two strongest lines together.
 const LEAST_SURPRISE: f64 = 12.0;
 
-/// The number of address bits whose truncated tone explains most of the residuals (zero where rows are
-/// left out; constant and tone already taken off); `None` if none does, or the tuning word is not known.
+/// The address bits and their rounding whose truncated tone explains most of the residuals (zero where rows are
+/// left out; constant and tone already taken off); `None` if none does, or the tuning word is not known. `tones` are
+/// sine and cosine of both tones as they are in the codes.
 pub fn best(
     capture: &Capture,
     model: &Model,
     residuals: [&[f64]; 2],
+    tones: [[f64; 2]; 2],
     spectrum: &Spectrum,
-) -> Option<u32> {
+) -> Option<Truncation> {
     let word = model.tone.word?;
     let variances = [0, 1].map(|c: usize| spectrum.variance(c).max(LEAST_VARIANCE));
-    let mut best: Option<(f64, u32)> = None;
+    let mut best: Option<(f64, Truncation)> = None;
     for bits in ADDRESS_BITS {
         let modulus = 1u64 << (32 - bits);
         if u64::from(word) % modulus == 0 {
@@ -44,29 +80,32 @@ pub fn best(
         if near(1) || near(-1) || seen(1) + seen(-1) < LEAST_SURPRISE {
             continue;
         }
-        let gain = gain(capture, model, residuals, variances, bits);
-        if gain > LEAST_GAIN && best.is_none_or(|b| gain > b.0) {
-            best = Some((gain, bits));
+        for way in Truncation::both(bits) {
+            let gain = gain(capture, model, residuals, tones, variances, way);
+            if gain > LEAST_GAIN && best.is_none_or(|b| gain > b.0) {
+                best = Some((gain, way));
+            }
         }
     }
     best.map(|b| b.1)
 }
 
+/// Gain in log-likelihood of the truncated tone in the channel or channels that have it.
 fn gain(
     capture: &Capture,
     model: &Model,
     residuals: [&[f64]; 2],
+    tones: [[f64; 2]; 2],
     variances: [f64; 2],
-    bits: u32,
+    way: Truncation,
 ) -> f64 {
-    let steps = f64::powi(2.0, bits as i32);
-    // Phase error a turn, 0 .. 2^-bits: its constant half is the tone itself, late.
-    let half = 0.5 / steps;
+    // The mean error of the phase, turns: that of the tone itself, late or not.
+    let mean = (0.5 - way.added()) / way.steps();
     let mut with = [[0.0; 2]; 2];
     let mut energy = 0.0;
     for row in 0..capture.rows() {
         let phase = model.tone.phase(row);
-        let late = (phase * steps).floor() / steps - phase + half;
+        let late = way.phase(phase) - phase + mean;
         let (sin, cos) = model.phases.at(row);
         let small = TAU * late;
         energy += 0.5 * small * small;
@@ -79,6 +118,56 @@ fn gain(
     if energy <= 0.0 {
         return 0.0;
     }
-    let of = |c: usize| with[c].iter().map(|w| w * w).sum::<f64>() / (2.0 * energy * variances[c]);
+    let of = |c: usize| {
+        // Where a single bit is lost, one rounding is early where the other is late: only the tone's sign tells them.
+        let along: f64 = with[c].iter().zip(tones[c]).map(|(w, t)| w * t).sum();
+        if along <= 0.0 {
+            return 0.0;
+        }
+        with[c].iter().map(|w| w * w).sum::<f64>() / (2.0 * energy * variances[c])
+    };
     of(0).max(of(1)).max(of(0) + of(1) - 2.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::report::Findings;
+    use super::super::synthetic_rows::{WORDS, codes, judged, meta, names};
+    use super::*;
+
+    /// What is found in codes of 12 bits whose tones are read at truncated phases, `added` steps early.
+    fn found(word: u32, bits: u32, added: f64) -> Findings {
+        let steps = f64::powi(2.0, bits as i32);
+        let codes = codes(5, word, |channel, row, x| {
+            let turns = f64::from(word.wrapping_mul(row as u32)) / 4_294_967_296.0;
+            let read = (turns * steps + added).floor() / steps;
+            let tone = |turns: f64| match channel {
+                0 => -1500.0 * (TAU * turns).cos(),
+                _ => 300.0 * (TAU * turns + 0.3).sin() + 90.0 * (TAU * turns + 0.3).cos(),
+            };
+            x + tone(read) - tone(turns)
+        });
+        judged(codes, meta(word)).2
+    }
+
+    #[test]
+    fn both_roundings_of_the_address_are_named_and_explained() {
+        for (bits, half_up) in [(7, false), (7, true), (9, false), (9, true)] {
+            let found = found(WORDS[1], bits, if half_up { 0.5 } else { 0.0 });
+            let told = (names(&found), found.structure.left);
+            assert_eq!(told, (vec!["nco_spur"], false), "{bits} {half_up}");
+            let truncation = found.models[1].truncation;
+            assert_eq!(truncation, Some(Truncation { bits, half_up }));
+        }
+    }
+
+    #[test]
+    fn where_one_bit_is_lost_the_sign_tells_the_rounding() {
+        for (half_up, added) in [(false, 0.0), (true, 0.5)] {
+            // 3/1024 turn: with 9 bits every second phase is between two addresses.
+            let found = found(3 << 22, 9, added);
+            let truncation = found.models[1].truncation;
+            assert_eq!(truncation, Some(Truncation { bits: 9, half_up }));
+        }
+    }
 }

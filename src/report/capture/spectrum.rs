@@ -52,8 +52,8 @@ fn marks(view: &View) -> Vec<(&'static str, Shape, String, Vec<f64>)> {
     let mut spurs = lines(Effect::Spur);
     let truncated = spurs.is_empty()
         && (view.closed.closure.steps.iter()).any(|s| s.effect == Effect::Spur.id());
-    if truncated && let Some(bits) = model.truncation {
-        spurs = spur::places_of(&model.tone, bits);
+    if truncated && let Some(truncation) = model.truncation {
+        spurs = spur::places_of(&model.tone, truncation.bits);
     }
     out.push(("fixed", Shape::Cross, "spur found".to_owned(), spurs));
     out.retain(|m| !m.3.is_empty());
