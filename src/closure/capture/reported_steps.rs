@@ -7,6 +7,7 @@ use super::input::Capture;
 use super::report::p_value;
 use super::rivals;
 use super::search::Search;
+use super::spur;
 use crate::closure::likelihood::tail::chi_square_surprise;
 use crate::closure::verdict::Step;
 use std::collections::BTreeMap;
@@ -41,6 +42,9 @@ pub(super) fn linear_step(
             step.parameter_std.insert(name.clone(), std * unit);
             step.parameters.insert(name, turns * unit);
         }
+    }
+    if let Some(truncation) = fitted.model.truncation {
+        spur::describe(&mut step, &fitted.model.tone, truncation);
     }
     step.selection_frequency = rivals::selection_frequency(fitted, &fewer, member);
     step.indistinguishable_from = rivals::alike(capture, known, fitted, search, set, member);

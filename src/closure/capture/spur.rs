@@ -11,10 +11,13 @@ use super::gram::Combo;
 use super::mains;
 use super::tone::{Tone, fold};
 use super::truncation::Truncation;
-use std::f64::consts::TAU;
+use crate::closure::verdict::Step;
+use std::f64::consts::PI;
 
 /// Address bits that an oscillator may have.
 pub const ADDRESS_BITS: std::ops::RangeInclusive<u32> = 3..=16;
+/// Names the parameters that are sine, cosine and amplitude of a tone at truncated phases, which is the whole tone.
+const TRUNCATED_TONE: &str = "truncated_tone";
 /// What the search among the address bits and their two roundings costs: the logarithm of their number.
 const WAYS_COST: f64 = 3.3;
 /// What the search among the places costs.
@@ -65,27 +68,65 @@ pub fn is_spur(known: &Known, model: &Model, i: usize, rows: usize) -> bool {
     at || pair
 }
 
+/// The number of errors that a truncated phase has, and half the step between them, rad.
+fn errors(tone: &Tone, truncation: Truncation) -> (f64, f64) {
+    let word = tone.word.unwrap_or(1);
+    let lost = (32 - truncation.bits.min(32)).saturating_sub(word.trailing_zeros());
+    let count = f64::powi(2.0, lost as i32);
+    (count, PI / truncation.steps() / count)
+}
+
 /// What truncation makes of the tone itself, beyond 1: sin(p - d) is (1 + a) sin p + b cos p in the mean over the
 /// error d of the phase, which is 0 and all multiples of the phase's own step below that of the address, less half an
 /// address step where that is added before truncation.
 fn of_the_tone(tone: &Tone, truncation: Truncation) -> [f64; 2] {
-    let bits = truncation.bits;
-    let word = tone.word.unwrap_or(1);
-    let lost = (32 - bits.min(32)).saturating_sub(word.trailing_zeros());
-    let count = f64::powi(2.0, lost as i32);
-    let step = TAU / f64::powi(2.0, bits as i32) / count;
+    let (count, half) = errors(tone, truncation);
     // Sum of exp(-i d): a geometric series, by its closed form.
-    let half = 0.5 * step;
     let size = (count * half).sin() / (count * half.sin());
-    let middle = (count - 1.0) * half - truncation.added() * count * step;
+    let middle = (count - 1.0) * half - truncation.added() * count * 2.0 * half;
     [size * middle.cos() - 1.0, -size * middle.sin()]
+}
+
+/// Amplitude of the largest line that truncation makes of a tone, relative to the exact tone: order k of the sawtooth
+/// of phase errors d has the mean of exp(-i d (1 + k 2^P)), a geometric series, and k = -1 is the largest; 2^-P where
+/// the phase has many more bits than the address (Nicholas and Samueli 1987).
+fn largest_line(tone: &Tone, truncation: Truncation) -> f64 {
+    let (count, half) = errors(tone, truncation);
+    ((count * half).sin() / (count * (PI / count - half).sin())).abs()
+}
+
+/// Adds to a step that has a truncated tone which oscillator that is (`address_bits`; `address_rounding_half_up`: 1 if
+/// half an address step is added before truncation, 0 if none) and by channel the largest line it makes, codes.
+pub fn describe(step: &mut Step, tone: &Tone, truncation: Truncation) {
+    let relative = largest_line(tone, truncation);
+    let mut is_truncated = false;
+    for channel in ["drive", "sense"] {
+        let whole = format!("{channel}_{TRUNCATED_TONE}_amplitude_codes");
+        let Some(amplitude) = step.parameters.get(&whole).copied() else {
+            continue;
+        };
+        let std = step.parameter_std.get(&whole).copied().unwrap_or(0.0);
+        let name = format!("{channel}_largest_spur_codes");
+        step.parameters.insert(name.clone(), amplitude * relative);
+        step.parameter_std.insert(name, std * relative);
+        is_truncated = true;
+    }
+    if is_truncated {
+        let half_up = f64::from(u8::from(truncation.half_up));
+        let bits = f64::from(truncation.bits);
+        let counts = [
+            ("address_bits", bits),
+            ("address_rounding_half_up", half_up),
+        ];
+        step.parameters
+            .extend(counts.map(|(name, value)| (name.to_owned(), value)));
+    }
 }
 
 /// The truncated tone with or without what truncation does to the tone itself, or lines at the places of spurs.
 pub fn variants(known: &Known, model: &Model, rows: usize) -> Vec<Variant> {
     let mut out = Vec::new();
     if let Some(truncation) = model.truncation {
-        let bits = truncation.bits;
         let [along, across] = of_the_tone(&model.tone, truncation);
         for channels in [&[0usize][..], &[1], &[0, 1]] {
             for with_tone in [true, false] {
@@ -101,7 +142,7 @@ pub fn variants(known: &Known, model: &Model, rows: usize) -> Vec<Variant> {
                         ("cos", [(COS, -along), (SIN, across)]),
                     ];
                     for (k, (part, tone)) in parts.into_iter().enumerate() {
-                        let name = format!("{name}_{part}_of_{bits}_bit_address_codes");
+                        let name = format!("{name}_{TRUNCATED_TONE}_{part}_codes");
                         let mut parts = vec![(*channel, TRUNCATED + k, 1.0)];
                         let tone = tone.into_iter().filter(|p| p.1 != 0.0);
                         parts.extend(tone.map(|(column, factor)| (*channel, column, factor)));
@@ -123,6 +164,35 @@ pub fn variants(known: &Known, model: &Model, rows: usize) -> Vec<Variant> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::TAU;
+
+    #[test]
+    fn the_largest_line_is_that_of_the_spectrum() {
+        let word = 5 << 22;
+        let tone = Tone {
+            word: Some(word),
+            turns: f64::from(word) / 4_294_967_296.0,
+            offset_turns: 0.0,
+        };
+        for (bits, half_up) in [(3, false), (7, true), (9, false), (9, true)] {
+            let truncation = Truncation { bits, half_up };
+            let read: Vec<f64> = (0..1024)
+                .map(|row| (TAU * truncation.phase(tone.phase(row))).sin())
+                .collect();
+            let amplitude = |bin: usize| {
+                let sum = |wave: fn(f64) -> f64| -> f64 {
+                    let at = |row: usize| TAU * (bin * row % 1024) as f64 / 1024.0;
+                    let terms = read.iter().enumerate();
+                    terms.map(|(row, v)| v * wave(at(row))).sum::<f64>() / 512.0
+                };
+                sum(f64::sin).hypot(sum(f64::cos))
+            };
+            let lines = (1..512).filter(|bin| *bin != 5).map(amplitude);
+            let largest = lines.fold(0.0, f64::max);
+            let found = largest_line(&tone, truncation);
+            assert!((found - largest).abs() < 1e-9, "{bits}: {found} {largest}");
+        }
+    }
 
     #[test]
     fn the_mean_of_a_truncated_tone_is_that_over_all_phases() {

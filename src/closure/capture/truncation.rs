@@ -162,6 +162,20 @@ mod tests {
     }
 
     #[test]
+    fn a_step_tells_the_address_and_the_largest_spur_from_the_tone() {
+        let step = &found(WORDS[1], 7, 0.5).steps[0];
+        let of = |name: &str| (step.parameters[name], step.parameter_std[name]);
+        assert_eq!(of("address_bits"), (7.0, 0.0));
+        assert_eq!(of("address_rounding_half_up"), (1.0, 0.0));
+        let (tone, _) = of("drive_truncated_tone_amplitude_codes");
+        assert!((tone - 1500.0).abs() < 5.0, "{tone}");
+        // 2^-7 of the tone.
+        let (spur, std) = of("drive_largest_spur_codes");
+        assert!((spur - 1500.0 / 127.0).abs() < 0.1, "{spur}");
+        assert!(std > 0.0 && std < 0.01, "{std}");
+    }
+
+    #[test]
     fn where_one_bit_is_lost_the_sign_tells_the_rounding() {
         for (half_up, added) in [(false, 0.0), (true, 0.5)] {
             // 3/1024 turn: with 9 bits every second phase is between two addresses.
