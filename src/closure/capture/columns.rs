@@ -43,8 +43,10 @@ pub const LINE: usize = OTHER + 1;
 pub const LINES: usize = 6;
 /// Sine and cosine of the truncated phase, less those of the phase.
 pub const TRUNCATED: usize = LINE + 2 * LINES;
+/// The tone at the exact phase less that at the truncated one, over the span: makes a bend's line one of the exact tone.
+pub const EXACT: usize = TRUNCATED + 2;
 /// First hat function of the signal over -span .. span.
-pub const HAT: usize = TRUNCATED + 2;
+pub const HAT: usize = EXACT + 1;
 /// Hat functions.
 pub const HATS: usize = 129;
 /// First of the equal parts of the converter's range -full scale .. full scale: 1 where the signal is in it.
@@ -269,17 +271,19 @@ impl Rows {
         for (i, row) in rows.enumerate() {
             let dense = &mut self.dense[channel];
             let declared = sin * dense[SIN][i] + cos * dense[COS][i];
-            let added: f64 = straight.iter().map(|(k, b)| b * dense[*k][i]).sum();
-            let x = declared + added;
             // The bend is a function of the tone, truncated if it is: a line or a harmonic in it is of second order.
             let tone = declared + at(ONE) + at(SIN) * dense[SIN][i] + at(COS) * dense[COS][i];
             let tone = match model.truncation {
                 Some(_) => {
                     let (sin, cos) = (dense[TRUNCATED][i], dense[TRUNCATED + 1][i]);
-                    tone + at(TRUNCATED) * sin + at(TRUNCATED + 1) * cos
+                    let moved = at(TRUNCATED) * sin + at(TRUNCATED + 1) * cos;
+                    dense[EXACT][i] = -moved / model.span_codes;
+                    tone + moved
                 }
                 None => tone,
             };
+            let added: f64 = straight.iter().map(|(k, b)| b * dense[*k][i]).sum();
+            let x = declared + added;
             let u = tone / model.span_codes;
             let mut power = 1.0;
             for k in 0..POWERS {

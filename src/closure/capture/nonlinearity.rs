@@ -3,7 +3,7 @@
 //! of several stages has an error of its own in each of the equal parts of its range that the first stage tells apart.
 
 use super::candidates::{Effect, Known, Variant};
-use super::columns::{HAT, HATS, Model, POWER, SEGMENT, SEGMENTS};
+use super::columns::{EXACT, HAT, HATS, Model, POWER, SEGMENT, SEGMENTS};
 use super::gram::Combo;
 
 /// Gain that a free constant or a free slope costs beyond a column: a bend that needs them is the
@@ -22,10 +22,14 @@ fn prefix(channels: &[usize]) -> &'static str {
     }
 }
 
-/// Power k of the signal in some channels; the parameter is its value at full scale.
+/// Power k of the signal in some channels; the parameter is its value at full scale. The first is of the exact tone, see
+/// [`knot_line`].
 fn power(known: &Known, model: &Model, k: usize, channels: &[usize]) -> Combo {
     let prefix = prefix(channels);
-    let parts: Vec<_> = channels.iter().map(|c| (*c, POWER + k - 1, 1.0)).collect();
+    let mut parts: Vec<_> = channels.iter().map(|c| (*c, POWER + k - 1, 1.0)).collect();
+    if k == 1 {
+        parts.extend(channels.iter().map(|c| (*c, EXACT, 1.0)));
+    }
     let unit = (known.full_scale_codes / model.span_codes).powi(k as i32);
     Combo::new(
         &format!("{prefix}order{k}_at_full_scale_codes"),
@@ -34,18 +38,31 @@ fn power(known: &Known, model: &Model, k: usize, channels: &[usize]) -> Combo {
     )
 }
 
+/// What [`EXACT`] has to be added to hat function k so that a table's line, of which the knots are -1 to 1, is one of the
+/// exact tone. Bends are functions of the truncated tone; but a line of that beside a carrier that is free (no declared
+/// amplitude) is all that truncation makes, so that a bend would stand for it.
+fn knot_line(k: usize) -> f64 {
+    // A line is 1 of itself: over the sum of the squares of all knots.
+    let last = (HATS - 1) as f64;
+    let squares = HATS as f64 * (HATS + 1) as f64 / (3.0 * last);
+    (2.0 * k as f64 / last - 1.0) / squares
+}
+
 /// A hat of `stride` fine intervals in some channels.
 fn hat(model: &Model, at: usize, stride: usize, channels: &[usize]) -> Combo {
     let fine = 2.0 * model.span_codes / (HATS - 1) as f64;
     let code = at as f64 * fine - model.span_codes;
     let mut parts = Vec::new();
     for channel in channels {
+        let mut line = 0.0;
         for k in 0..HATS {
             let value = 1.0 - k.abs_diff(at) as f64 / stride as f64;
             if value > 0.0 {
                 parts.push((*channel, HAT + k, value));
+                line += value * knot_line(k);
             }
         }
+        parts.push((*channel, EXACT, line));
     }
     let prefix = prefix(channels);
     Combo::new(&format!("{prefix}at_code_{code:.0}_codes"), 1.0, &parts)
@@ -141,4 +158,68 @@ fn constant(channels: &[usize]) -> Combo {
         .map(|c| (*c, super::columns::ONE, 1.0))
         .collect();
     Combo::new("order0_codes", 1.0, &parts)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::candidates::{base, variants};
+    use super::super::columns::{COS, TRUNCATED};
+    use super::super::gram::Gram;
+    use super::super::search::Search;
+    use super::super::synthetic::{AMPLITUDE, Made, model};
+    use super::super::truncation::Truncation;
+    use super::*;
+
+    #[test]
+    fn the_line_of_a_table_is_one_of_itself() {
+        let knots = (0..HATS).map(|k| (2.0 * k as f64 / (HATS - 1) as f64 - 1.0) * knot_line(k));
+        assert!((knots.sum::<f64>() - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_bend_does_not_stand_for_truncation_where_the_amplitude_is_not_declared() {
+        let made = Made {
+            bits: Some(7),
+            ..Made::CLEAN
+        };
+        let mut capture = made.capture();
+        capture.meta.drive_amplitude_codes = None;
+        let (known, mut model) = model(&capture, &made);
+        // As the fit leaves it: the truncated tone was taken, beside a free carrier.
+        model.truncation = Some(Truncation {
+            bits: 7,
+            half_up: false,
+        });
+        model.coefficients[0][COS] = -AMPLITUDE;
+        model.coefficients[0][TRUNCATED + 1] = -AMPLITUDE;
+        let mut all = variants(
+            &known,
+            &model,
+            [[0.0, -AMPLITUDE], [61.7, 20.2]],
+            20_000,
+            false,
+        );
+        // The control: a line of the truncated tone.
+        let line = vec![Combo::one("", 0, POWER)];
+        all.push(Variant::new(Effect::Gain, line, 0.0));
+        let gram = Gram::of(&capture, &model);
+        let base = base(&known);
+        let mut search = Search::new(gram.all(), &base, &[], &all);
+        let none = search.gain(&[]);
+        let mut most = |is: &dyn Fn(&Variant) -> bool| -> f64 {
+            let own = (0..all.len()).filter(|k| is(&all[*k]));
+            own.map(|k| search.gain(&[k]) - none).fold(0.0, f64::max)
+        };
+        let spur = most(&|v| v.effect == Effect::Spur);
+        assert!(spur > 1000.0, "{spur}");
+        let control = most(&|v| v.combos.len() == 1 && v.combos[0].name.is_empty());
+        assert!(control > 0.9 * spur, "{control} {spur}");
+        let has_line = |v: &Variant| {
+            let mut columns = v.combos.iter().flat_map(|c| &c.parts);
+            v.effect == Effect::Nonlinearity
+                && columns.any(|p| p.0 == 0 && (p.1 == POWER || (HAT..SEGMENT).contains(&p.1)))
+        };
+        let bend = most(&has_line);
+        assert!(bend < 0.5 * spur, "{bend} {spur}");
+    }
 }
