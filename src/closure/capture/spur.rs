@@ -46,6 +46,14 @@ pub fn places_of(tone: &Tone, bits: u32) -> Vec<f64> {
         .to_vec()
 }
 
+/// Whether a frequency (turns a sample) is such a place, by its resolution; what is near the tone is none.
+pub fn is_place(tone: &Tone, turns: f64, resolution: f64) -> bool {
+    let apart = |place: &f64| (place - tone.folded()).abs();
+    places(tone)
+        .iter()
+        .any(|p| (p - turns).abs() < 0.3 * resolution && apart(p) > 2.0 * resolution)
+}
+
 /// Whether line i is at such a place, or has a partner at the same distance from the tone. Mains itself,
 /// and places within a resolution of the tone, are none.
 pub fn is_spur(known: &Known, model: &Model, i: usize, rows: usize) -> bool {
@@ -57,9 +65,7 @@ pub fn is_spur(known: &Known, model: &Model, i: usize, rows: usize) -> bool {
         return false;
     }
     let tone = model.tone.folded();
-    let at = places(&model.tone)
-        .iter()
-        .any(|p| (p - turns).abs() < 0.3 * resolution && (p - tone).abs() > 2.0 * resolution);
+    let at = is_place(&model.tone, turns, resolution);
     let mirrored = fold(2.0 * tone - turns);
     let others = model.lines.iter().enumerate().filter(|(k, _)| *k != i);
     let pair = others
