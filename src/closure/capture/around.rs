@@ -129,6 +129,7 @@ pub fn add_lines(capture: &Capture, known: &Known, model: &mut Model, around: &A
             && rounding::explains(&model.tone, tones, line.turns, resolution, line.amplitudes)
     };
     let lines = spectrum.lines(&model.tone, 12, 3.0, [LEAST_VARIANCE; 2]);
+    let lines = without_wander(model, around, lines);
     let refined =
         |line: &spectrum::Line| spectrum::refine([drive, sense], around.noise, line.turns);
     // A bin tells the frequency to half a resolution, its surroundings to a tenth of one where it stands out at all.
@@ -174,13 +175,69 @@ pub fn add_lines(capture: &Capture, known: &Known, model: &mut Model, around: &A
     model.lines.len() > before
 }
 
+/// The lines, without the slow ones that a wander makes as well as the others do.
+fn without_wander(
+    model: &Model,
+    around: &Around,
+    lines: Vec<spectrum::Line>,
+) -> Vec<spectrum::Line> {
+    let rows = around.residuals[0].len();
+    let series = block_series(model, around);
+    let slowest = slowest(&series);
+    let is_slow = |line: &&spectrum::Line| line.turns * (rows as f64) < slowest;
+    // Together, or each would be part of the wander that the others are looked for in; not more than can be solved.
+    let slow: Vec<f64> = lines
+        .iter()
+        .filter(is_slow)
+        .map(|l| l.turns)
+        .take(LINES)
+        .collect();
+    if slow.is_empty() {
+        return lines;
+    }
+    let all = wander::slow_line_gain(&series, rows, &slow);
+    let stands_out = |line: &spectrum::Line| {
+        let others: Vec<f64> = slow.iter().copied().filter(|t| *t != line.turns).collect();
+        let gain = match others.is_empty() {
+            true => all,
+            false => all - wander::slow_line_gain(&series, rows, &others),
+        };
+        let places = (2.0 * slowest).max(1.0).ln();
+        others.len() < slow.len() && chi_square_surprise(4, 2.0 * gain) > 1000f64.ln() + places
+    };
+    let is_kept = |line: &spectrum::Line| !is_slow(&line) || stands_out(line);
+    lines.into_iter().filter(is_kept).collect()
+}
+
+/// Constant and tone of what is left, block by block.
+pub fn block_series(model: &Model, around: &Around) -> [Option<Series>; 2] {
+    [0, 1].map(|c: usize| {
+        let residual = around.residuals.get(c)?;
+        wander::series(residual, around.noise[c], &model.tone, &model.phases)
+    })
+}
+
+/// Periods in the record up to which a line is slow, by blocks of the series.
+fn slowest(series: &[Option<Series>; 2]) -> f64 {
+    let blocks = series.iter().flatten().map(|s| s.values[0].len()).max();
+    SLOW_PERIODS_OF_A_BLOCK * blocks.unwrap_or(0) as f64
+}
+
 /// Periods a block of the series up to which a line is slow: the spectrum's floor there is made of its own skirts, and
 /// the blocks' means leave four fifths of it.
 const SLOW_PERIODS_OF_A_BLOCK: f64 = 0.375;
 
 /// Multiples of the mains that are looked for together where they are slow: the mains alone or with the strongest
-/// overtones of a power line, or one of these alone, so that a line at 100 Hz does not come with one at 50 Hz.
-const SLOW_MULTIPLES: [&[f64]; 5] = [&[1.0], &[2.0], &[3.0], &[1.0, 2.0], &[1.0, 3.0]];
+/// overtones of a power line, or one of these alone, so that a line at 100 Hz does not come with one at 50 Hz. An overtone
+/// that is left is as steep a wander as there is.
+const SLOW_MULTIPLES: [&[f64]; 6] = [
+    &[1.0],
+    &[2.0],
+    &[3.0],
+    &[1.0, 2.0],
+    &[1.0, 3.0],
+    &[1.0, 3.0, 5.0],
+];
 
 /// Sine and cosine in both channels of some lines, of several sets of them: less than one in a thousand by chance.
 fn surplus(lines: usize, gain: f64) -> f64 {
@@ -197,8 +254,7 @@ pub fn add_slow_mains(
 ) -> bool {
     let Some(fs) = known.fs_hz else { return false };
     let rows = capture.rows();
-    let blocks = series.iter().flatten().map(|s| s.values[0].len()).max();
-    let slowest = SLOW_PERIODS_OF_A_BLOCK * blocks.unwrap_or(0) as f64;
+    let slowest = slowest(series);
     let mut best: Option<(f64, Vec<f64>)> = None;
     for hz in mains::MAINS_HZ {
         for multiples in SLOW_MULTIPLES {

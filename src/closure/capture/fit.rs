@@ -1,6 +1,6 @@
 //! The rounds of the fit: noise, lines and nonlinear parts around the model, then the set of effects.
 
-use super::around::{Around, LEAST_VARIANCE, add_lines, add_slow_mains, around};
+use super::around::{Around, LEAST_VARIANCE, add_lines, add_slow_mains, around, block_series};
 use super::candidates::{Effect, Known, PRIOR, Variant, base, base_ridge, per_column, variants};
 use super::clipping::{self, Limits};
 use super::columns::{ALL, Model, Variance};
@@ -273,18 +273,6 @@ fn follow_lines(
     }
     *seen = around(capture, model, base, false);
     block_series(model, seen)
-}
-
-/// Constant and tone of what is left, block by block.
-fn block_series(model: &Model, seen: &Around) -> [Option<Series>; 2] {
-    [0, 1].map(|c: usize| {
-        wander::series(
-            &seen.residuals[c],
-            seen.noise[c],
-            &model.tone,
-            &model.phases,
-        )
-    })
 }
 
 /// Sets the model's variance, with jitter where it earns its place; what was found of it, and whether it did.

@@ -22,8 +22,9 @@ fn prefix(channels: &[usize]) -> &'static str {
     }
 }
 
-/// Power k of the signal in some channels; the parameter is its value at full scale. The first is of the exact tone, see
-/// [`knot_line`].
+/// Power k of the signal in some channels; the parameter is its value at full scale. The first is of the exact tone: that
+/// of the truncated tone beside a carrier that is free (no declared amplitude) is all that truncation makes, so that a
+/// bend would stand for it. A table, which has such a line too, costs more than the spur.
 fn power(known: &Known, model: &Model, k: usize, channels: &[usize]) -> Combo {
     let prefix = prefix(channels);
     let mut parts: Vec<_> = channels.iter().map(|c| (*c, POWER + k - 1, 1.0)).collect();
@@ -38,31 +39,18 @@ fn power(known: &Known, model: &Model, k: usize, channels: &[usize]) -> Combo {
     )
 }
 
-/// What [`EXACT`] has to be added to hat function k so that a table's line, of which the knots are -1 to 1, is one of the
-/// exact tone. Bends are functions of the truncated tone; but a line of that beside a carrier that is free (no declared
-/// amplitude) is all that truncation makes, so that a bend would stand for it.
-fn knot_line(k: usize) -> f64 {
-    // A line is 1 of itself: over the sum of the squares of all knots.
-    let last = (HATS - 1) as f64;
-    let squares = HATS as f64 * (HATS + 1) as f64 / (3.0 * last);
-    (2.0 * k as f64 / last - 1.0) / squares
-}
-
 /// A hat of `stride` fine intervals in some channels.
 fn hat(model: &Model, at: usize, stride: usize, channels: &[usize]) -> Combo {
     let fine = 2.0 * model.span_codes / (HATS - 1) as f64;
     let code = at as f64 * fine - model.span_codes;
     let mut parts = Vec::new();
     for channel in channels {
-        let mut line = 0.0;
         for k in 0..HATS {
             let value = 1.0 - k.abs_diff(at) as f64 / stride as f64;
             if value > 0.0 {
                 parts.push((*channel, HAT + k, value));
-                line += value * knot_line(k);
             }
         }
-        parts.push((*channel, EXACT, line));
     }
     let prefix = prefix(channels);
     Combo::new(&format!("{prefix}at_code_{code:.0}_codes"), 1.0, &parts)
@@ -171,12 +159,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_line_of_a_table_is_one_of_itself() {
-        let knots = (0..HATS).map(|k| (2.0 * k as f64 / (HATS - 1) as f64 - 1.0) * knot_line(k));
-        assert!((knots.sum::<f64>() - 1.0).abs() < 1e-12);
-    }
-
-    #[test]
     fn a_bend_does_not_stand_for_truncation_where_the_amplitude_is_not_declared() {
         let made = Made {
             bits: Some(7),
@@ -216,8 +198,7 @@ mod tests {
         assert!(control > 0.9 * spur, "{control} {spur}");
         let has_line = |v: &Variant| {
             let mut columns = v.combos.iter().flat_map(|c| &c.parts);
-            v.effect == Effect::Nonlinearity
-                && columns.any(|p| p.0 == 0 && (p.1 == POWER || (HAT..SEGMENT).contains(&p.1)))
+            v.effect == Effect::Nonlinearity && columns.any(|p| p.0 == 0 && p.1 == POWER)
         };
         let bend = most(&has_line);
         assert!(bend < 0.5 * spur, "{bend} {spur}");

@@ -86,6 +86,17 @@ pub fn findings(capture: &Capture, known: &Known, plain: &Model, fitted: &Fitted
                 _ => {}
             }
         }
+        // Weighted by a variance that goes with the slope the held-out rows may be nearer while their error is larger.
+        let is_larger = judged
+            .last()
+            .is_some_and(|j| j.errors.heldout_rms > before.errors.heldout_rms);
+        let linear = |turn: &Turn| match turn {
+            Turn::Linear(k) => Some(*k),
+            _ => None,
+        };
+        if is_larger {
+            failed = failed.or(order.iter().rev().find_map(linear));
+        }
         match failed {
             Some(k) => set.retain(|s| *s != k),
             None => break (order, judged),

@@ -75,22 +75,43 @@ fn likelihood(modes: &[f64], white: f64, slow: f64) -> f64 {
     modes.iter().enumerate().map(term).sum()
 }
 
-/// Strengths that are looked at, 0.15 decades apart from a tenth of the white noise up.
-const STEPS: i32 = 64;
+/// Slopes of wanders that a slow line must stand out of: the variance of mode j is w + h / j^slope. From 1/f noise to
+/// a random walk (2), and somewhat steeper, as few modes may show it.
+const SLOPES: [f64; 4] = [1.0, 1.5, 2.0, 2.5];
 
-/// The likeliest strength, and how much likelier it is than none.
-pub fn strength(modes: &[f64], white: f64) -> (f64, f64) {
-    let none = likelihood(modes, white, 0.0);
-    let mut best = (0.0, 0.0);
-    for k in 0..STEPS {
-        let slow = white * f64::powf(10.0, -1.0 + 0.15 * f64::from(k));
-        let gain = likelihood(modes, white, slow) - none;
-        if gain > best.1 {
-            best = (slow, gain);
+/// Variances of modes beside which a line is looked for, of all slopes and strengths; the first without any wander.
+fn wanders(modes: usize, white: f64) -> Vec<Vec<f64>> {
+    let mut out = vec![vec![white; modes]];
+    for slope in SLOPES {
+        let fall: Vec<f64> = (1..=modes).map(|j| (j as f64).powf(-slope)).collect();
+        for k in 0..STEPS {
+            let slow = white * f64::powf(10.0, -1.0 + 0.15 * f64::from(k));
+            out.push(fall.iter().map(|f| white + slow * f).collect());
+        }
+    }
+    out
+}
+
+/// Log-likelihood of modes of these variances.
+fn likelihood_of(modes: &[f64], variances: &[f64]) -> f64 {
+    let term = |(z, v): (&f64, &f64)| -0.5 * (v.ln() + z * z / v);
+    modes.iter().zip(variances).map(term).sum()
+}
+
+/// The likeliest of some wanders and its log-likelihood.
+fn likeliest<'a>(modes: &[f64], wanders: &'a [Vec<f64>]) -> (&'a [f64], f64) {
+    let mut best: (&[f64], f64) = (&[], f64::NEG_INFINITY);
+    for variances in wanders {
+        let likelihood = likelihood_of(modes, variances);
+        if likelihood > best.1 {
+            best = (variances, likelihood);
         }
     }
     best
 }
+
+/// Strengths that are looked at, 0.15 decades apart from a tenth of the white noise up.
+const STEPS: i32 = 64;
 
 /// The strength to be expected of a wander, the modes given: none at all is as likely as some, and of
 /// that every order of magnitude from a tenth of the white noise up as likely as the others. The likeliest strength
@@ -163,7 +184,8 @@ pub fn of_harmonics(
 }
 
 /// What slow sinusoids of these `turns` a sample gain together in the constant's series of both channels, the wander
-/// fitted with and without them: a wander and a part of a period look alike.
+/// fitted with and without them, whatever its slope: a wander and a few periods of a line look alike, and the steeper
+/// it is, the more of them.
 pub fn slow_line_gain(series: &[Option<Series>; 2], rows: usize, turns: &[f64]) -> f64 {
     let mut sum = 0.0;
     for series in series.iter().flatten() {
@@ -180,26 +202,23 @@ pub fn slow_line_gain(series: &[Option<Series>; 2], rows: usize, turns: &[f64]) 
             .iter()
             .flat_map(|t| [wave(*t, 0.0), wave(*t, PI / 2.0)])
             .collect();
-        let (slow, before) = strength(&plain, white);
-        let mut rest = plain.clone();
-        let (mut after, mut used) = (before, slow);
+        let wanders = wanders(plain.len(), white);
+        let (mut used, before) = likeliest(&plain, &wanders);
+        let mut after = before;
         for _ in 0..3 {
-            rest = without(&plain, &waves, white, used);
-            (used, after) = strength(&rest, white);
+            let rest = without(&plain, &waves, used);
+            (used, after) = likeliest(&rest, &wanders);
         }
-        let base = likelihood(&plain, white, 0.0) + before;
-        sum += likelihood(&rest, white, 0.0) + after - base;
+        sum += after - before;
     }
     sum
 }
 
-/// The modes less their weighted projection on others.
-fn without(modes: &[f64], others: &[Vec<f64>], white: f64, slow: f64) -> Vec<f64> {
+/// The modes, of these variances, less their weighted projection on others.
+fn without(modes: &[f64], others: &[Vec<f64>], variances: &[f64]) -> Vec<f64> {
     let dot = |x: &[f64], y: &[f64]| -> f64 {
-        let products = x.iter().zip(y).enumerate();
-        products
-            .map(|(k, (x, y))| x * y / (white + slow / (k + 1) as f64))
-            .sum()
+        let products = x.iter().zip(y).zip(variances);
+        products.map(|((x, y), v)| x * y / v).sum()
     };
     let less = |from: &mut [f64], other: &[f64], size: f64| {
         let share = dot(from, other) / size;
@@ -301,6 +320,29 @@ mod tests {
     }
 
     #[test]
+    fn a_random_walk_is_no_slow_line() {
+        // 1.5 and 4.5 cycles in the record: 8 free numbers in both channels.
+        let line = [1.5 / 6400.0, 4.5 / 6400.0];
+        for stream in 0..12 {
+            let noise = Noise::new(3, stream);
+            let walk = |at: u64| -> Option<Series> {
+                let mut sum = 0.0;
+                let value = |m: u64| {
+                    let (white, step) = noise.gaussian_pair(64 * at + m);
+                    sum += 3.0 * step;
+                    sum + white
+                };
+                Some(Series {
+                    values: [(0..64).map(value).collect(), Vec::new(), Vec::new()],
+                    white: [1.0; 3],
+                })
+            };
+            let gain = slow_line_gain(&[walk(0), walk(1)], 6400, &line);
+            assert!(gain < 17.0, "{stream} {gain}");
+        }
+    }
+
+    #[test]
     fn what_is_projected_out_is_not_left() {
         let waves: Vec<Vec<f64>> = [[1.0, 0.5, 0.2, 0.1], [0.9, 0.7, 0.1, -0.3]]
             .map(Vec::from)
@@ -308,7 +350,7 @@ mod tests {
         let sum: Vec<f64> = (0..4)
             .map(|k| 3.0 * waves[0][k] - 2.0 * waves[1][k])
             .collect();
-        let rest = without(&sum, &waves, 1.0, 5.0);
+        let rest = without(&sum, &waves, &[6.0, 3.5, 2.7, 2.25]);
         assert!(rest.iter().all(|r| r.abs() < 1e-9), "{rest:?}");
     }
 }
