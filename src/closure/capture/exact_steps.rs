@@ -42,7 +42,7 @@ struct Search {
 
 /// The coefficients of a model with its own steps, by channel and column, moved to where the codes are likeliest:
 /// those of `combos` but for the quantiser's own error. Every `stride`-th chunk of the training rows is looked at.
-/// `None` where no channel shows its steps undithered, or more is free than [`DIRECTIONS`].
+/// `None` where no channel shows its steps undithered, or more than sixteen values are free.
 pub fn moved(
     capture: &Capture,
     model: &Model,

@@ -86,7 +86,7 @@ impl Squares {
     }
 
     /// Weighted least squares of r^2 on 1, slope^2 and, with little noise, the quantiser's wave, in the form of
-    /// [`FORMS`] that gains most; `column` is what a free value costs.
+    /// `FORMS` that gains most; `column` is what a free value costs.
     pub fn fit(&self, variances: [f64; 2], column: f64) -> Option<Found> {
         let points = self.points(variances);
         let with_wave = variances.iter().any(|v| *v < 0.5);
@@ -266,10 +266,10 @@ mod tests {
     fn an_instant_is_random_in_the_channels_in_which_it_is() {
         let fit = |jitter: [f64; 2]| {
             let mut points = Vec::new();
-            for channel in 0..2 {
+            for (channel, jitter) in jitter.into_iter().enumerate() {
                 for k in 0..BINS {
                     let slope2 = 90.0 * (TAU * k as f64 / BINS as f64).cos().powi(2);
-                    let value = 0.5 + jitter[channel] * slope2;
+                    let value = 0.5 + jitter * slope2;
                     let ripple = 1.0 + 0.02 * (2.4 * k as f64).sin();
                     let variance = 2.0 * value * value / 300.0;
                     points.push(Point {
