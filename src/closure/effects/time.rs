@@ -60,7 +60,7 @@ impl Candidate for Warmup {
 
     fn points(&self, c: &Channels) -> Vec<Point> {
         let (_, longest) = range(&c.on_s);
-        let fastest = FASTEST * c.period_s();
+        let fastest = 1.5 * c.period_s();
         let taus = spaced(fastest, (longest / 1.5).max(2.0 * fastest), 16);
         let mut out: Vec<Point> = taus.iter().map(|t| Point::at(0, &[t.ln()])).collect();
         if c.on_known && c.restarts() {
@@ -160,14 +160,10 @@ fn rested(c: &Channels, tau_s: f64, cooling_s: f64) -> Vec<f64> {
 /// Periods of the rows below which a time constant is doubted: what the first rows have of their own (a rate of change
 /// that is known from one side) looks like it.
 const RESOLVED: f64 = 4.0;
-/// Least time constant, periods of the rows: what is over before the second reading is an accident of the first.
-const FASTEST: f64 = 1.5;
-
 /// The time constant of a warm-up: one that goes on for longer than the power is on is a drift.
 fn warm_s(c: &Channels, point: &Point) -> f64 {
     let (_, longest) = range(&c.on_s);
-    let fastest = FASTEST * c.period_s();
-    point.theta[0].exp().clamp(fastest, longest.max(fastest))
+    point.theta[0].exp().min(longest.max(c.period_s()))
 }
 
 /// Slow drift in time, linear or logarithmic.
