@@ -1,11 +1,11 @@
 //! Coefficients at which the quantiser's steps are where the codes say, where the noise was added after rounding.
 //!
 //! Such a code is a whole number that jumps where the signal passes a step: each row near a step says on which side of
-//! it the signal is, which tells the signal to a code over the number of rows, and least squares, for which the jumps
-//! are a given column, to the noise over the root of that number. Between its answer and the truth some rows in a hundred are
-//! on the wrong side, and their likelihood would be what sets of effects are judged by.
+//! it the signal is. All of them tell it to a code over the number of rows; least squares, for which the jumps are a
+//! given column, to the noise over the root of that number. At its answer some rows in a hundred are on the wrong side,
+//! and their likelihood would be what sets of effects are judged by.
 
-use super::columns::{HAT, Model, Rows, SEGMENT, chunks};
+use super::columns::{HAT, Model, Rows, SAW, SEGMENT, chunks};
 use super::gram::Combo;
 use super::input::{Capture, Part};
 use super::steps::is_undithered;
@@ -17,14 +17,16 @@ const DIRECTIONS: usize = 16;
 const REACH: f64 = 6.0;
 /// Steps of the search, deviations of least squares.
 const STRIDES: [f64; 8] = [2.0, 1.0, 0.5, 0.25, 0.125, 0.06, 0.03, 0.015];
+/// Eigenvalue of the sums of products, each column of length one, below which a direction is none.
+const LEAST_EIGENVALUE: f64 = 1e-8;
 /// Times that all directions are tried with one stride.
 const SWEEPS: usize = 4;
 
-/// A row that may come to the other side of a step.
-struct Near {
-    /// Of each direction, codes.
-    moves: Vec<f64>,
+/// A row of a channel, at the model.
+struct Row {
+    /// Before the quantiser, codes.
     signal: f64,
+    /// Of the code, codes.
     error: f64,
     weight: f64,
     /// Share of the quantiser's error in the codes.
@@ -34,8 +36,9 @@ struct Near {
 /// The search: coefficients are `coefficients + directions z`.
 struct Search {
     directions: DMatrix<f64>,
-    near: Vec<Near>,
-    /// What the other rows and the prior make of z: -2 slope z + z' curve z.
+    /// Rows that may come to the other side of a step, with what each direction moves them by, codes.
+    near: Vec<(DVector<f64>, Row)>,
+    /// What the other rows make of z: -2 slope z + z' curve z.
     slope: DVector<f64>,
     curve: DMatrix<f64>,
 }
@@ -90,66 +93,80 @@ fn value(rows: &Rows, combo: &Combo, channel: usize, i: usize) -> f64 {
     parts.map(|p| p.2 * of(p.1)).sum()
 }
 
-impl Search {
-    fn over(capture: &Capture, model: &Model, combos: &[&Combo], stride: usize) -> Option<Self> {
-        let count = combos.len();
-        let mut sums = DMatrix::<f64>::zeros(count, count);
-        let mut all: Vec<(DVector<f64>, [f64; 4])> = Vec::new();
-        let mut rows = Rows::new();
-        for segment in capture.segments.iter().filter(|s| s.part != Part::HeldOut) {
-            for chunk in chunks(segment.rows.clone()).step_by(stride) {
-                let n = chunk.len();
-                rows.fill(capture, model, chunk);
-                for channel in 0..2 {
-                    let saw = model.coefficients[channel][super::columns::SAW];
-                    for i in (0..n).filter(|i| rows.weight[channel][*i] > 0.0) {
-                        let x = DVector::from_iterator(
-                            count,
-                            combos.iter().map(|c| value(&rows, c, channel, i)),
-                        );
-                        let weight = rows.weight[channel][i];
-                        sums.syger(weight, &x, &x, 1.0);
-                        let error = rows.target[channel][i]
-                            - rows.value(channel, i, &model.coefficients[channel]);
-                        all.push((x, [rows.signal[channel][i], error, weight, saw]));
-                    }
+/// Where the quantiser puts a signal, less the signal.
+fn rest(signal: f64) -> f64 {
+    (signal + 0.5).floor() - signal
+}
+
+/// The training rows of both channels, with what each combo makes of them.
+fn rows_of(
+    capture: &Capture,
+    model: &Model,
+    combos: &[&Combo],
+    stride: usize,
+) -> Vec<(DVector<f64>, Row)> {
+    let mut out = Vec::new();
+    let mut rows = Rows::new();
+    for segment in capture.segments.iter().filter(|s| s.part != Part::HeldOut) {
+        for chunk in chunks(segment.rows.clone()).step_by(stride) {
+            let n = chunk.len();
+            rows.fill(capture, model, chunk);
+            for channel in 0..2 {
+                let coefficients = &model.coefficients[channel];
+                for i in (0..n).filter(|i| rows.weight[channel][*i] > 0.0) {
+                    let values = combos.iter().map(|c| value(&rows, c, channel, i));
+                    let row = Row {
+                        signal: rows.signal[channel][i],
+                        error: rows.target[channel][i] - rows.value(channel, i, coefficients),
+                        weight: rows.weight[channel][i],
+                        saw: coefficients[SAW],
+                    };
+                    out.push((DVector::from_iterator(combos.len(), values), row));
                 }
             }
         }
-        sums.fill_upper_triangle_with_lower_triangle();
-        let scale = DVector::from_fn(count, |k, _| 1.0 / sums[(k, k)].max(1e-300).sqrt());
-        let unit = DMatrix::from_fn(count, count, |a, b| scale[a] * scale[b] * sums[(a, b)]);
-        let eigen = unit.symmetric_eigen();
-        let kept: Vec<usize> = (0..count)
-            .filter(|k| eigen.eigenvalues[*k] > 1e-8)
-            .collect();
-        let directions = DMatrix::from_fn(count, kept.len(), |a, k| {
-            scale[a] * eigen.eigenvectors[(a, kept[k])] / eigen.eigenvalues[kept[k]].sqrt()
-        });
-        let dims = kept.len();
+    }
+    out
+}
+
+/// Independent directions of the coefficients, each of one deviation of least squares, as columns.
+fn directions(rows: &[(DVector<f64>, Row)], count: usize) -> DMatrix<f64> {
+    let mut sums = DMatrix::<f64>::zeros(count, count);
+    for (x, row) in rows {
+        sums.syger(row.weight, x, x, 1.0);
+    }
+    sums.fill_upper_triangle_with_lower_triangle();
+    let scale = DVector::from_fn(count, |k, _| 1.0 / sums[(k, k)].max(1e-300).sqrt());
+    let unit = DMatrix::from_fn(count, count, |a, b| scale[a] * scale[b] * sums[(a, b)]);
+    let eigen = unit.symmetric_eigen();
+    let is_free = |k: &usize| eigen.eigenvalues[*k] > LEAST_EIGENVALUE;
+    let kept: Vec<usize> = (0..count).filter(is_free).collect();
+    DMatrix::from_fn(count, kept.len(), |a, k| {
+        scale[a] * eigen.eigenvectors[(a, kept[k])] / eigen.eigenvalues[kept[k]].sqrt()
+    })
+}
+
+impl Search {
+    fn over(capture: &Capture, model: &Model, combos: &[&Combo], stride: usize) -> Option<Self> {
+        let all = rows_of(capture, model, combos, stride);
+        let directions = directions(&all, combos.len());
+        let dims = directions.ncols();
         if dims == 0 {
             return None;
         }
         let mut slope = DVector::zeros(dims);
         let mut curve = DMatrix::zeros(dims, dims);
         let mut near = Vec::new();
-        for (x, [signal, error, weight, saw]) in all {
+        for (x, row) in all {
             let moves = directions.tr_mul(&x);
             let reach = REACH * moves.norm();
-            let rest = (signal + 0.5).floor() - signal;
-            if saw != 0.0 && 0.5 - rest.abs() < reach {
-                let moves = moves.iter().copied().collect();
-                near.push(Near {
-                    moves,
-                    signal,
-                    error,
-                    weight,
-                    saw,
-                });
+            if row.saw != 0.0 && 0.5 - rest(row.signal).abs() < reach {
+                near.push((moves, row));
             } else {
-                let share = 1.0 - saw;
-                slope.axpy(weight * error * share, &moves, 1.0);
-                curve.syger(weight * share * share, &moves, &moves, 1.0);
+                // Its code stays: what is not the quantiser's moves with the signal.
+                let share = 1.0 - row.saw;
+                slope.axpy(row.weight * row.error * share, &moves, 1.0);
+                curve.syger(row.weight * share * share, &moves, &moves, 1.0);
             }
         }
         curve.fill_upper_triangle_with_lower_triangle();
@@ -163,20 +180,16 @@ impl Search {
 
     /// Chi-square at z, less what it is at 0 in the rows that are not near.
     fn chi(&self, z: &DVector<f64>) -> f64 {
-        let near: f64 = self
-            .near
-            .iter()
-            .map(|row| {
-                let change: f64 = row.moves.iter().zip(z.iter()).map(|(m, z)| m * z).sum();
-                let signal = row.signal + change;
-                let rest = |x: f64| (x + 0.5).floor() - x;
-                let e = row.error - change - row.saw * (rest(signal) - rest(row.signal));
-                row.weight * e * e
-            })
-            .sum();
+        let error = |(moves, row): &(DVector<f64>, Row)| {
+            let change = moves.dot(z);
+            let moved = rest(row.signal + change) - rest(row.signal);
+            row.weight * (row.error - change - row.saw * moved).powi(2)
+        };
+        let near: f64 = self.near.iter().map(error).sum();
         near - 2.0 * self.slope.dot(z) + z.dot(&(&self.curve * z))
     }
 
+    /// The best z that steps along one direction at a time find, smaller and smaller.
     fn best(&self) -> DVector<f64> {
         let mut z = DVector::zeros(self.directions.ncols());
         let mut chi = self.chi(&z);
@@ -205,7 +218,7 @@ impl Search {
 #[cfg(test)]
 mod tests {
     use super::super::candidates::{base, base_ridge, variants};
-    use super::super::columns::{COS, SAW};
+    use super::super::columns::COS;
     use super::super::gram::{Detail, Gram, Summed, solve, spread};
     use super::super::synthetic::{AMPLITUDE, Made, model};
     use super::*;

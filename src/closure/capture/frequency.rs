@@ -14,6 +14,8 @@ const LEAST_POWER: f64 = 14.0;
 
 /// Blocks over which the tone's phase is followed, at most.
 const BLOCKS: usize = 16;
+/// The same, at least: with fewer a course is always nearly straight.
+const LEAST_BLOCKS: usize = 6;
 /// Periods of a block, at least: with fewer its phase depends on where it begins.
 const LEAST_PERIODS_OF_A_BLOCK: f64 = 4.0;
 /// Drift of the phase over the capture from which on the word is wrong, turns: less is a few per cent of the tone.
@@ -89,7 +91,7 @@ fn drift(capture: &Capture, mean: f64, tone: &Tone) -> Option<f64> {
     let rows = capture.rows();
     let periods = tone.folded() * rows as f64;
     let count = BLOCKS.min((periods / LEAST_PERIODS_OF_A_BLOCK) as usize);
-    if count < 6 {
+    if count < LEAST_BLOCKS {
         return None;
     }
     let mut sums = vec![[0.0; 2]; count];

@@ -91,7 +91,6 @@ mod tests {
         for (width, both) in [(15.0, false), (15.0, true), (30.0, true), (60.0, true)] {
             let found = judged(soft(width, both), meta(193_280_571)).2;
             let names = names(&found);
-            println!("{width} {both} {names:?} {:?}", found.structure);
             let lines = ["nco_spur", "mains_pickup"];
             assert!(
                 !names.iter().any(|n| lines.contains(n)),

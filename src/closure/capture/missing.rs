@@ -8,7 +8,7 @@
 use super::code_counts::{Counts, Run};
 use super::columns::Model;
 use super::input::Capture;
-use super::{moved, normal};
+use super::{missing_moves, normal};
 
 /// Missing codes of one channel.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -128,7 +128,7 @@ pub fn find(capture: &Capture, model: &Model) -> Option<Found> {
         expected_rows: gaps.iter().flatten().map(|(_, run)| run.expected).sum(),
     };
     let runs = gaps.map(|gaps| gaps.into_iter().map(|(_, run)| run).collect::<Vec<_>>());
-    let moves = moved::of(&counts, &runs, spacing.is_some());
+    let moves = missing_moves::of(&counts, &runs, spacing.is_some());
     for ((missing, runs), moves) in out.missing.iter_mut().zip(&runs).zip(moves) {
         let codes = runs.iter().flat_map(|run| run.first..=run.last);
         missing.codes = codes.map(|code| code as i32).collect();

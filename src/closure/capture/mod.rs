@@ -9,7 +9,7 @@
 //! [`wrong_codes`] (wrong codes), both on [`blocks`]; [`tone`] is the phase; [`columns`] are the functions of which effects are made, one
 //! file an effect ([`offset`], [`gain`], [`latency`], [`feedthrough`], [`nonlinearity`],
 //! [`harmonics`], [`mains`], [`spur`] with [`truncation`]); [`gram`] their sums and least squares;
-//! [`search`] chooses. Outside of the linear part are [`clipping`] (with [`flat_top`] and [`instant`]), [`missing`] (the histogram: [`code_counts`], [`moved`]),
+//! [`search`] chooses. Outside of the linear part are [`clipping`] (with [`flat_top`] and [`instant`]), [`missing`] (the histogram: [`code_counts`], [`missing_moves`]),
 //! [`jitter`] (the variance). [`spectrum`] gives noise and lines ([`rounding`]: those that are the quantiser's own),
 //! [`wander`] the slow noise that must not pass for an
 //! effect. [`around`] is the fit with every freedom, [`steps`] where the quantiser's
@@ -47,7 +47,7 @@ pub mod keys;
 pub mod latency;
 pub mod mains;
 pub mod missing;
-pub mod moved;
+pub mod missing_moves;
 pub mod nonlinearity;
 pub mod normal;
 pub mod offset;
@@ -191,37 +191,44 @@ fn periods(capture: &Capture, tone: &Tone) -> f64 {
 /// The one that is nearest to the sense tone as it is may not be it: a latency turns the tone, by the angle that the
 /// drive shows, and so does a truncated oscillator.
 fn likeliest(capture: &Capture, tone: Tone) -> (Known, Model, fit::Fitted) {
-    let (first, plain) = known(capture, tone);
-    let fitted = fit::fit(capture, &first, tone, &plain);
-    let mut best = (first, plain, fitted);
+    let (known, plain) = known(capture, tone);
+    let fitted = fit::fit(capture, &known, tone, &plain);
+    let with = |known: &Known, carrier| {
+        let known = Known {
+            in_phase: carrier,
+            ..known.clone()
+        };
+        let plain = baseline(capture, &known, tone);
+        let fitted = fit::fit(capture, &known, tone, &plain);
+        (known, plain, fitted)
+    };
+    let mut best = (known, plain, fitted);
     let mut tried = vec![best.0.in_phase];
-    for turned in [0.0, drive_lag(&best.0, &best.1, best.2.free[0])] {
-        let (sin, cos) = turned.sin_cos();
+    // Beside what was found the tone is known better: what is nearest then is what the contract's freedom leaves.
+    let nearest = nearest_carrier(capture, best.2.free[1]);
+    if !tried.contains(&nearest) {
+        tried.push(nearest);
+        best = with(&best.0, nearest);
+    }
+    if let Some(lag) = drive_lag(&best.0, &best.1, best.2.free[0]) {
+        let (sin, cos) = lag.sin_cos();
         let [s, c] = best.2.free[1];
-        let carrier = nearest_carrier(capture, [s * cos - c * sin, c * cos + s * sin]);
-        if tried.contains(&carrier) {
-            continue;
-        }
-        tried.push(carrier);
-        let mut other = best.0.clone();
-        other.in_phase = carrier;
-        let plain = baseline(capture, &other, tone);
-        let fitted = fit::fit(capture, &other, tone, &plain);
-        // With no latency the nearest is what the contract's freedom leaves, whatever it gains.
-        if turned == 0.0 || fit::is_likelier(capture, &fitted, &best.2) {
-            best = (other, plain, fitted);
+        let turned_back = nearest_carrier(capture, [s * cos - c * sin, c * cos + s * sin]);
+        if !tried.contains(&turned_back) {
+            let other = with(&best.0, turned_back);
+            if fit::is_likelier(capture, &other.2, &best.2) {
+                best = other;
+            }
         }
     }
     best
 }
 
-/// Radians by which the drive's tone is late, as its declared phase tells; 0 where that is not known.
-fn drive_lag(known: &Known, plain: &Model, free: [f64; 2]) -> f64 {
+/// Radians by which the drive's tone is late, as its declared phase tells; `None` where that is not known.
+fn drive_lag(known: &Known, plain: &Model, free: [f64; 2]) -> Option<f64> {
     let [s, c] = plain.declared[0];
-    match known.phase && known.amplitude {
-        true => (free[0] * c - free[1] * s).atan2(free[0] * s + free[1] * c),
-        false => 0.0,
-    }
+    let lag = (free[0] * c - free[1] * s).atan2(free[0] * s + free[1] * c);
+    (known.phase && known.amplitude).then_some(lag)
 }
 
 /// What the keys say, and the declared model fitted to the codes.

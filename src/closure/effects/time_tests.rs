@@ -113,3 +113,21 @@ fn a_warm_up_after_a_short_rest_starts_smaller() {
         assert!(!reported.contains_key("cooling_tau_s"), "{reported:?}");
     }
 }
+
+#[test]
+fn a_warm_up_at_the_pace_of_the_rows_is_doubted() {
+    let time_s: Vec<f64> = (0..ROWS).map(|k| 10.0 * k as f64).collect();
+    let columns = BTreeMap::from([
+        ("rate_out_dps".to_owned(), vec![0.0; ROWS]),
+        (
+            "die_degc".to_owned(),
+            [triangle(ROWS / 2), triangle(ROWS / 2)].concat(),
+        ),
+    ]);
+    let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+    let odds = |tau_s: f64| Warmup.odds_against(&c, &Point::at(0, &[tau_s.ln()]));
+    assert_eq!([odds(40.0), odds(400.0)], [0.0, 0.0]);
+    // A factor of e is two of what is unusual.
+    let faster = odds(40.0 / 1f64.exp());
+    assert!((faster - 2.0 * UNUSUAL).abs() < 1e-9, "{faster}");
+}
