@@ -42,14 +42,17 @@ pub fn declared_by(u: &[f64], error_dps: &[f64]) -> (Bias, Vec<f64>) {
 const INSIDE: f64 = 0.01;
 
 impl Search<'_> {
+    /// The rows of a column that take part in the fit.
+    pub(super) fn of_used(&self, column: &[f64]) -> Vec<f64> {
+        let rows = column.iter().zip(&self.used).filter(|(_, u)| **u);
+        rows.map(|(v, _)| *v).collect()
+    }
+
     /// Whether next to all of a shape is in the declared model: what makes it goes with the temperature in this record, and
     /// what it does was taken for the temperature's doing.
     pub fn is_declared(&self, judged: &Judged) -> bool {
         let c = self.channels;
-        let of_used = |column: &Vec<f64>| -> Vec<f64> {
-            let rows = column.iter().zip(&self.used).filter(|(_, u)| **u);
-            rows.map(|(v, _)| *v).collect()
-        };
+        let of_used = |column: &Vec<f64>| self.of_used(column);
         let declared: Vec<Vec<f64>> = declared(c).iter().map(of_used).collect();
         let (constant, all) = (Basis::new(&declared[..1]), Basis::new(&declared));
         let left = |basis: &Basis, column: &[f64]| {

@@ -72,10 +72,7 @@ impl Search<'_> {
         if !own.candidate.is_local() || own.point == own.found_at {
             return false;
         }
-        let of_used = |column: &Vec<f64>| -> Vec<f64> {
-            let rows = column.iter().zip(&self.used).filter(|(_, u)| **u);
-            rows.map(|(v, _)| *v).collect()
-        };
+        let of_used = |column: &Vec<f64>| self.of_used(column);
         let declared: Vec<Vec<f64>> = super::declared(c).iter().map(of_used).collect();
         let then = own.candidate.columns(c, &model.acting, &own.found_at);
         let then = then.iter().map(of_used).collect::<Vec<_>>();

@@ -38,8 +38,7 @@ impl Search<'_> {
             for (b, column) in beta.iter().zip(&declared) {
                 add_scaled(&mut sum, -b, column);
             }
-            let used = sum.iter().zip(&self.used).filter(|(_, u)| **u);
-            stats::rms(&used.map(|(s, _)| *s).collect::<Vec<_>>())
+            stats::rms(&self.of_used(&sum))
         };
         model.contributions(c).into_iter().map(own).collect()
     }

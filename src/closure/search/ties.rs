@@ -4,14 +4,16 @@
 //! noise explains less than it does, and of two forms that are both off a little one is better in one part of the record, the other
 //! in the next.
 
+use super::declared::declared;
 use super::judge::{EQUAL, Judged};
 use super::sweep::BETTER;
 use super::{Found, LEVEL, MOST_RIVALS, Model, Search, Term};
 use crate::closure::likelihood::Unusable;
+use crate::closure::likelihood::linear::{Basis, dot};
 use crate::closure::smooth::reading_noise;
 
 /// Net gain behind a step's within which names are looked at, and how many of them.
-const BEHIND: f64 = 25.0;
+const BEHIND: f64 = 50.0;
 const LOOKED: usize = 3;
 
 /// Share of the record's halves in which an equal name is better.
@@ -19,6 +21,15 @@ const OFTEN: f64 = 0.3;
 
 /// Most log-likelihood that the noise of a channel accounts for.
 const MOST_BLUR: f64 = 12.0;
+
+/// The same of a channel that is the step's shape and noise, in deviations of what the noise takes away.
+const CHANCE: f64 = 3.0;
+
+/// Deviations of a channel's course beside the declared model, in those of its noise, from which on it has a course at all.
+const MOSTLY_COURSE: f64 = 3.0;
+
+/// What a channel's noise may be of its white part, by third differences, in variance: a noise has slow parts too.
+const SLOW_TOO: f64 = 1.5;
 
 /// A step that another name is tried in the place of.
 struct Place<'a> {
@@ -100,9 +111,35 @@ impl Search<'_> {
     /// Whether a model with another name in a step's place is as good.
     fn is_tie(&self, of: &Place<'_>, with: &Model, rival: &Judged) -> bool {
         let behind = self.net(of.model) - self.net(with) - rival.odds_against;
-        let blur = self.blur_of(with, of.k) - self.blur_of(of.model, of.k);
-        behind < EQUAL + blur.clamp(0.0, MOST_BLUR)
+        let blur = (self.blur_of(with, of.k) - self.blur_of(of.model, of.k)).max(0.0);
+        // What the noise takes away is itself by chance: its variance is twice its mean.
+        let allowed = match self.is_shape_and_noise(of, with) {
+            true => blur + CHANCE * (2.0 * blur).sqrt(),
+            false => blur.min(MOST_BLUR),
+        };
+        behind < EQUAL + allowed
             || self.selection_frequency(with, of.k, of.without, [of.same]) >= OFTEN
+    }
+
+    /// Whether a rival's contribution is, beside the declared model, that of the step and the noise of its reading: no part of it
+    /// that could speak for or against it is left.
+    fn is_shape_and_noise(&self, of: &Place<'_>, with: &Model) -> bool {
+        let c = self.channels;
+        let of_used = |column: &Vec<f64>| self.of_used(column);
+        let rival = &with.contributions(c)[of.k];
+        let step = &of.model.contributions(c)[of.k];
+        let noise_dps = reading_noise(&c.time_s, rival);
+        let mut basis = Basis::new(&declared(c).iter().map(of_used).collect::<Vec<_>>());
+        let mut rest = of_used(rival);
+        let rows = rest.len() as f64;
+        let mut off = |basis: &Basis| {
+            basis.project_off(&mut rest);
+            dot(&rest, &rest) / rows
+        };
+        let course = off(&basis);
+        basis.push(&of_used(step));
+        let left = off(&basis);
+        course > (MOSTLY_COURSE * noise_dps).powi(2) && left < SLOW_TOO * noise_dps.powi(2)
     }
 
     /// Names next to a step's, best first.

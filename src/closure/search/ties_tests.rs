@@ -8,15 +8,15 @@ use std::collections::BTreeMap;
 const ROWS: usize = 600;
 const NOISE_DPS: f64 = 0.02;
 
-/// Of a record whose supply follows the cube of the temperature, is read with a noise (in parts of its course) and acts on the output: the
+/// Of a record whose supply follows the cube of the temperature, is read with a noise (in parts of its course) and acts on the output, which has a noise of `noise_dps`: the
 /// names and what is as good.
-fn found(seed: u64, reading: f64) -> (Vec<String>, Vec<String>) {
+fn found(seed: u64, reading: f64, noise_dps: f64) -> (Vec<String>, Vec<String>) {
     let mut random = Random::new(seed);
     let degc = [triangle(ROWS / 2), triangle(ROWS - ROWS / 2)].concat();
     let of = |degc: f64| ((degc - 20.0) / 40.0).powi(3);
     let output = degc
         .iter()
-        .map(|t| 0.3 - 0.01 * t + 0.3 * of(*t) + NOISE_DPS * random.normal());
+        .map(|t| 0.3 - 0.01 * t + 0.3 * of(*t) + noise_dps * random.normal());
     let output: Vec<f64> = output.collect();
     let supply = degc
         .iter()
@@ -38,7 +38,7 @@ fn found(seed: u64, reading: f64) -> (Vec<String>, Vec<String>) {
 #[test]
 fn a_cause_that_was_read_with_noise_is_named_or_listed() {
     for seed in 0..6 {
-        let (names, rivals) = found(seed, 0.014);
+        let (names, rivals) = found(seed, 0.014, NOISE_DPS);
         assert_eq!(names.len(), 1, "{seed} {names:?}");
         let mut both = [names, rivals].concat();
         both.sort();
@@ -49,8 +49,18 @@ fn a_cause_that_was_read_with_noise_is_named_or_listed() {
 #[test]
 fn a_channel_of_which_most_is_noise_is_no_equal() {
     for seed in 0..6 {
-        let (names, rivals) = found(seed, 0.3);
+        let (names, rivals) = found(seed, 0.3, NOISE_DPS);
         assert_eq!(names, ["bias_third_order"], "{seed}");
         assert!(rivals.is_empty(), "{seed} {rivals:?}");
+    }
+}
+
+#[test]
+fn a_channel_that_is_the_steps_shape_and_noise_is_listed_however_much_the_noise_takes_away() {
+    for seed in 0..6 {
+        let (names, rivals) = found(seed, 0.014, 0.5 * NOISE_DPS);
+        let mut both = [names, rivals].concat();
+        both.sort();
+        assert_eq!(both, ["bias_third_order", "supply_sensitivity"], "{seed}");
     }
 }

@@ -216,8 +216,7 @@ impl Search<'_> {
             return false;
         };
         let all = model.contributions(c);
-        let used = all[own].iter().zip(&self.used).filter(|(_, used)| **used);
-        let square: f64 = used.map(|(v, _)| v * v).sum();
+        let square: f64 = self.of_used(&all[own]).iter().map(|v| v * v).sum();
         let beyond = square * (1.0 - wave.share) / wave.share * wave.kept;
         let white = model.fit.noise.white_rms_dps.max(f64::MIN_POSITIVE);
         0.5 * beyond > SEEN * white * white && self.is_clean(model)

@@ -328,10 +328,7 @@ impl Search<'_> {
             let least_dps = model.fit.noise.white_rms_dps.min(0.5 * most_dps);
             return off_dps.iter().filter(|v| **v > least_dps).count() < 2;
         }
-        let of_used = |column: &Vec<f64>| -> Vec<f64> {
-            let rows = column.iter().zip(&self.used).filter(|(_, u)| **u);
-            rows.map(|(v, _)| *v).collect()
-        };
+        let of_used = |column: &Vec<f64>| self.of_used(column);
         // A step after the first row is that row's accident and a constant.
         let declared: Vec<Vec<f64>> = declared(self.channels).iter().map(of_used).collect();
         let declared = Basis::new(&declared);
