@@ -33,6 +33,9 @@ const BESIDE: usize = 6;
 /// Share of the range that such noise may be.
 const SMALL: f64 = 0.05;
 
+/// Steps beyond a rail within which an output in steps has no readings.
+const JUST_BEYOND: f64 = 10.0;
+
 /// Probability of as many equal readings by chance up to which they are a rail.
 const LEVEL: f64 = 1e-4;
 
@@ -48,6 +51,8 @@ pub struct Rails {
     pub rows: Vec<bool>,
     /// Probability that chance makes so many readings agree at the less certain of them.
     pub p_value: f64,
+    /// Least distance of two readings, deg/s: what a level is known to.
+    pub resolution_dps: f64,
 }
 
 impl Rails {
@@ -77,9 +82,10 @@ pub fn of(c: &Channels, rows: &[bool]) -> Option<Rails> {
     }
     let gaps: Vec<f64> = readings.windows(2).map(|w| w[1].0 - w[0].0).collect();
     let resolution = gaps.iter().copied().reduce(f64::min)?;
-    let lower = rail(&readings, resolution);
+    let steps = in_steps(&gaps, resolution);
+    let lower = rail(&readings, resolution, steps);
     readings.reverse();
-    let upper = rail(&readings, resolution);
+    let upper = rail(&readings, resolution, steps);
     let p_value = [lower, upper]
         .iter()
         .flatten()
@@ -102,7 +108,7 @@ pub fn of(c: &Channels, rows: &[bool]) -> Option<Rails> {
         free.map(|((v, _), _)| *v).collect()
     };
     let free = not_at_one(&c.error_dps);
-    let coarse = in_steps(&gaps, resolution) && stats::difference_noise(&free) < resolution;
+    let coarse = steps && stats::difference_noise(&free) < resolution;
     let short = not_at_one(&output);
     // The bias may go far from row to row.
     let width = NEAR * stats::curvature_noise(&free);
@@ -142,6 +148,7 @@ pub fn of(c: &Channels, rows: &[bool]) -> Option<Rails> {
         lower_dps,
         rows: held,
         p_value,
+        resolution_dps: resolution,
     })
 }
 
@@ -163,7 +170,7 @@ fn in_steps(gaps: &[f64], step: f64) -> bool {
 }
 
 /// The level of a rail at the beginning of readings in order, and its probability.
-fn rail(readings: &[Reading], resolution: f64) -> Option<(f64, f64)> {
+fn rail(readings: &[Reading], resolution: f64, in_steps: bool) -> Option<(f64, f64)> {
     let rows: usize = readings.iter().map(|r| r.1).sum();
     let mut counts: Vec<usize> = readings.iter().map(|r| r.1).collect();
     counts.sort_unstable_by(|a, b| b.cmp(a));
@@ -185,6 +192,12 @@ fn rail(readings: &[Reading], resolution: f64) -> Option<(f64, f64)> {
     }
     let (k, (level, count)) = best?;
     if count < FEWEST + OFTENER * (usual - 1) {
+        return None;
+    }
+    // What noise that came later puts beyond is spread as that noise is: a reading a few steps beyond, of an output in steps, is
+    // one of this output.
+    let steps = |r: &Reading| (r.0 - level).abs() / resolution;
+    if in_steps && readings[..k].iter().any(|r| steps(r) < JUST_BEYOND) {
         return None;
     }
     let mut within = 0;

@@ -460,3 +460,21 @@ fn an_output_that_is_stuck_but_for_two_rows_has_no_rails() {
     let lower_dps = of_all(&channels(&output, None)).and_then(|rails| rails.lower_dps);
     assert_eq!(lower_dps, None);
 }
+
+#[test]
+fn readings_a_few_steps_beyond_a_level_deny_it_where_the_output_has_steps() {
+    // A dwell at the lowest output, where a step is two thirds of the noise.
+    let step = 0.01;
+    let record = |beyond: f64| {
+        let mut random = Random::new(3);
+        let mut output: Vec<f64> = (0..240)
+            .map(|k| 7.0 + 0.7 * f64::from(k) + 0.4 * random.normal())
+            .collect();
+        output.extend([6.5; 7]);
+        output.extend([6.5 - beyond; 2]);
+        output.iter().map(|v| (v / step).round() * step).collect()
+    };
+    let lower = |output: Vec<f64>| of_all(&channels(&output, None)).and_then(|r| r.lower_dps);
+    assert!(lower(record(-step)).is_some_and(|l| (l - 6.5).abs() < 1e-9));
+    assert_eq!(lower(record(2.0 * step)), None);
+}

@@ -37,8 +37,15 @@ impl Told<'_> {
         let listed: Vec<String> = out.iter().map(|e| e.effect.clone()).collect();
         for candidate in self.search.candidates() {
             if candidate.named() && !listed.contains(&candidate.id()) {
-                let remark = "what it does lies within the declared model in this record";
-                out.push(unjudged(candidate, Fate::NotExcited, remark.to_owned()));
+                // What has no free coefficient may be worse than nothing at every size.
+                let (fate, remark) = match candidate.is_whole() {
+                    true => (Fate::Rejected, "no size of it does better than none"),
+                    false => (
+                        Fate::NotExcited,
+                        "what it does lies within the declared model in this record",
+                    ),
+                };
+                out.push(unjudged(candidate, fate, remark.to_owned()));
             }
         }
         out

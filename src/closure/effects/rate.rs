@@ -6,6 +6,7 @@ use super::{
 };
 use crate::closure::channels::{Channels, range};
 use crate::closure::firmware::Words;
+use crate::closure::search::declared_by;
 use crate::correction::Term;
 use crate::record::stats;
 
@@ -369,7 +370,9 @@ impl Candidate for Deadband {
         // Half widths between neighbouring magnitudes that were applied.
         let sizes = magnitudes(c.column("rate_dps").unwrap_or(&[]).iter().copied());
         let least = sizes.first().copied().unwrap_or(0.0).max(1e-4 * top(c));
-        let small = 0.3 * stats::difference_noise(&c.error_dps);
+        // Of what the declared bias leaves: its own course would pass for noise that hides a small zone.
+        let (_, rest) = declared_by(&c.u, &c.error_dps);
+        let small = 0.3 * stats::difference_noise(&rest);
         let mut out = Vec::new();
         for form in 0..2 {
             // What subtracts shows at every rate, however small it is; what jumps only at rates within the zone.

@@ -41,6 +41,34 @@ fn a_dead_band_of_a_hundred_thousandth_of_the_rate_shows_by_what_it_subtracts() 
 }
 
 #[test]
+fn a_small_dead_band_shows_beside_a_bias_that_goes_far_from_row_to_row() {
+    for (seed, bias_dps) in [(1, 1.0), (2, 10.0), (3, 30.0)] {
+        let mut random = Random::new(seed);
+        let (rows, half_width_dps) = (400, 0.01);
+        let degc: Vec<f64> = (0..rows).map(|_| 60.0 * random.uniform()).collect();
+        let rate = |k: usize| 40.0 * (0.17 * k as f64 + 0.05).sin();
+        let output = (0..rows).map(|k| {
+            let through = (rate(k).abs() - half_width_dps).max(0.0) * rate(k).signum();
+            let u = degc[k] / 30.0 - 1.0;
+            through + bias_dps * (u + 0.3 * u * u) + 0.004 * random.normal()
+        });
+        let columns = BTreeMap::from([
+            ("rate_out_dps".to_owned(), output.collect()),
+            ("rate_dps".to_owned(), (0..rows).map(rate).collect()),
+            ("die_degc".to_owned(), degc.clone()),
+        ]);
+        let time_s: Vec<f64> = (0..rows).map(|k| 20.0 * k as f64).collect();
+        let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+        let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+        let found = search.run().unwrap();
+        let names: Vec<String> = found.terms.iter().map(Step::id).collect();
+        assert_eq!(names, ["output_deadband"], "{bias_dps}");
+        let width = found.terms[0].point.theta[0].exp();
+        assert!((width - half_width_dps).abs() < 1e-3, "{bias_dps}: {width}");
+    }
+}
+
+#[test]
 fn a_hard_dead_band_is_found_where_a_sweep_passes_its_edge_row_by_row() {
     for (seed, half_dps) in [(1, 0.174), (2, 0.071), (3, 0.22)] {
         let (rows, mut random) = (1800, Random::new(seed));

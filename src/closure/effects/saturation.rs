@@ -100,7 +100,7 @@ impl Candidate for Saturation {
         let (low, high) = limits(point);
         let total = total(c, bias);
         let beyond = total.iter().filter(|x| **x < low || **x > high).count();
-        if 2 * beyond > total.len() {
+        if 5 * beyond > 4 * total.len() {
             // An output that clips most of the time is no output.
             return vec![vec![0.0; total.len()]];
         }

@@ -149,15 +149,26 @@ impl Search<'_> {
                     point: term.point.clone(),
                     beta_std: (0..tangent.own.len()).map(own).collect(),
                     theta_std: steps
-                        .map(|(k, step)| match covariance.std(of_theta + k) {
-                            s if s > 0.0 => s.max(between(k)),
-                            _ => step.max(between(k)),
+                        .map(|(k, step)| match self.rail_std(term, k) {
+                            Some(std) => std,
+                            None => match covariance.std(of_theta + k) {
+                                s if s > 0.0 => s.max(between(k)),
+                                _ => step.max(between(k)),
+                            },
                         })
                         .collect(),
                     beta: model.beta.get(tangent.own).unwrap_or(&[]).to_vec(),
                 }
             })
             .collect()
+    }
+
+    /// Standard deviation of a level at which readings stand: that of a rounding to what tells two readings apart.
+    fn rail_std(&self, term: &Term, k: usize) -> Option<f64> {
+        let rails = self.rails.as_ref().filter(|_| term.evident)?;
+        let level = *term.point.theta.get(k)?;
+        let stands = [rails.lower_dps, rails.upper_dps].contains(&Some(level));
+        stands.then(|| rails.resolution_dps / 12f64.sqrt())
     }
 
     /// Standard deviation of a threshold that may lie anywhere where no row of the fit tells: it moves there without moving the

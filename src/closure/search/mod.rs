@@ -38,7 +38,8 @@ mod ties;
 mod together;
 pub mod tones;
 mod top;
-pub mod undone;
+pub mod unclipped;
+mod undone;
 pub mod validate;
 
 use super::channels::Channels;
@@ -280,6 +281,7 @@ impl<'a> Search<'a> {
         }
         if terms.iter().any(|t| t.candidate.is_last()) {
             // Which rows are clipped depends on everything: the bias of one fit after the other.
+            bias = self.unclipped(terms, &bias).unwrap_or(bias);
             let passes = if terms.len() == 1 { 2 } else { 3 };
             let mut passing = *options;
             for _ in 0..passes {

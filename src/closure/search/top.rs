@@ -47,7 +47,9 @@ impl Search<'_> {
         let mut benches = vec![(shape, Bench::new(model, shape))];
         // A residual with sharp ends looks like a walk without white noise, to which a threshold that is off by a row, or
         // a form that is not quite the one, is no better than none: it is found where the noise is white.
-        if near && (acting || candidate.is_whole() || candidate.is_local()) {
+        // A clip of the bias was not near with a bias that it bends.
+        let sharp = acting || candidate.is_whole() || candidate.is_local();
+        if near && sharp || candidate.is_last() && self.moves_by_bias(model) {
             benches.push((WHITE, Bench::new(model, WHITE)));
         }
         let best = |point: &Point, bias: &Option<Bias>| {
@@ -93,9 +95,16 @@ impl Search<'_> {
         bench: &Bench<'_>,
     ) -> Option<(Point, Option<Bias>)> {
         let c = self.channels;
-        let gain = |p: &Point| refine::gain(bench, candidate, c, &model.bias, p);
+        let unclipped = (candidate.is_last() && self.moves_by_bias(model))
+            .then(|| self.unclipped_beside(model));
+        let free = |p: &Point| unclipped.as_ref().and_then(|u| u.bias(candidate, p));
+        let gain = |p: &Point| {
+            let free = free(p);
+            refine::gain(bench, candidate, c, free.as_ref().unwrap_or(&model.bias), p)
+        };
         let each = points.iter().map(|p| {
-            let columns = candidate.columns(c, &model.bias, p);
+            let free = free(p);
+            let columns = candidate.columns(c, free.as_ref().unwrap_or(&model.bias), p);
             (columns, candidate.is_sized(p))
         });
         let gains = refine::gains(bench, each);
@@ -103,7 +112,9 @@ impl Search<'_> {
         let each = each.map(|(p, gain)| (gain - price(candidate, c, p), p));
         let (_, start) = each.max_by(|a, b| a.0.total_cmp(&b.0))?;
         let steps = map(&candidate.spacing(c, start), |s| 0.5 * s);
-        Some((refine::climbed(start, steps, gain), None))
+        let top = refine::climbed(start, steps, gain);
+        let bias = free(&top);
+        Some((top, bias))
     }
 
     /// The best of `points` whose coefficients physics admits, each with the declared bias that is there beside it: a

@@ -196,7 +196,7 @@ impl Search<'_> {
             if !t.candidate.named() {
                 return true;
             }
-            if self.shows_once(t, &model) {
+            if !t.evident && self.shows_once(t, &model) {
                 return false;
             }
             let single = t.id() == "stress_jump" && self.switches(t, &model) < 2;
@@ -220,7 +220,9 @@ impl Search<'_> {
         let mut k = 0;
         let mut changed = false;
         for (own, term) in model.terms.iter().enumerate() {
-            if !term.candidate.named() || (self.lasts(&model, term) && self.recurs(&model, own)?) {
+            // A rail is seen without a fit: another effect that bends there too does not refute it.
+            let lasts = || term.evident || self.lasts(&model, term);
+            if !term.candidate.named() || (lasts() && self.recurs(&model, own)?) {
                 k += 1;
                 continue;
             }
