@@ -39,6 +39,9 @@ fn a_bias_that_clips_before_its_noise_is_no_resonance() {
         (1, [0.9, 1.65, 0.35], 2.45),
         (2, [1.0, 3.2, 0.6], 3.2),
         (3, [0.5, -4.6, -0.9], 2.2),
+        // Held in two rows of five, by little more than the noise.
+        (4, [1.0, 0.747, 0.124], 1.243),
+        (5, [1.128, 0.913, 0.166], 1.159),
     ] {
         let c = clipped(seed, bias, upper_dps, false);
         let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
