@@ -56,6 +56,8 @@ pub struct Around {
     pub free: [[f64; 2]; 2],
     /// Variances of both channels' white noise, codes squared.
     pub noise: [f64; 2],
+    /// Sine and cosine of each line in both channels, codes.
+    pub lines: [Vec<[f64; 2]>; 2],
 }
 
 impl Around {
@@ -87,6 +89,11 @@ pub fn around(capture: &Capture, model: &mut Model, base: &[Combo], neutral: boo
             *value += coefficients.get(column).copied().unwrap_or(0.0);
         }
     }
+    let lines = [0, 1].map(|c: usize| {
+        let at = |k: usize| coefficients[c].get(k).copied().unwrap_or(0.0);
+        let of = |(sin, cos): (usize, usize)| [at(sin), at(cos)];
+        (0..model.lines.len()).map(|i| of(line(i))).collect()
+    });
     let residuals = residuals(capture, model, &coefficients, true);
     if neutral {
         // Without the tables, unless they are needed: where the codes are is then known better.
@@ -106,6 +113,7 @@ pub fn around(capture: &Capture, model: &mut Model, base: &[Combo], neutral: boo
         training,
         free,
         noise: [0.0; 2],
+        lines,
     };
     let spectrum = seen.spectrum(capture);
     seen.noise = [0, 1].map(|c: usize| spectrum.variance(c).max(LEAST_VARIANCE));

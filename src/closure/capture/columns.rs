@@ -93,6 +93,8 @@ pub struct Model {
     pub neutral: [Vec<f64>; 2],
     /// Frequencies of the lines, turns a sample.
     pub lines: Vec<f64>,
+    /// Their standard deviations, as far as they were looked for.
+    pub line_stds: Vec<f64>,
     /// Address of a truncated oscillator.
     pub truncation: Option<Truncation>,
     /// Limits of each channel.

@@ -12,13 +12,15 @@ use super::search::Search;
 use super::steps::{find_steps, is_sharp, settle};
 use super::tone::{Phases, Tone};
 use super::wander::{self, Series};
-use super::{feedthrough, jitter, truncation};
+use super::{feedthrough, jitter, line_places, truncation};
 use std::collections::BTreeMap;
 
 /// Rounds at most.
 const ROUNDS: usize = 6;
 /// The same after the first, where the quantiser's steps show: each is dear, and exact.
 const SHARP_ROUNDS: usize = 1;
+/// Times that the frequencies of the lines are looked for anew, each nearer by the square.
+const REFINEMENTS: usize = 3;
 /// Gain that jitter has to make: one free parameter.
 const JITTER_COST: f64 = 7.0;
 /// What the search for levels of clipping costs, and each level that was found.
@@ -104,6 +106,7 @@ pub fn declared(capture: &Capture, known: &Known, tone: Tone) -> Model {
         declared: declared_tones(capture, known),
         coefficients: [vec![0.0; ALL], vec![0.0; ALL]],
         lines: Vec::new(),
+        line_stds: Vec::new(),
         truncation: None,
         limits: [Limits::NONE; 2],
         missing: [Missing::default(), Missing::default()],
@@ -253,7 +256,7 @@ fn round(
     (fitted, sharp)
 }
 
-/// Adds lines to the model until no new one stands out; the block series of what is left.
+/// Adds lines to the model until no new one stands out, and moves them to where they are; the block series of what is left.
 fn follow_lines(
     capture: &Capture,
     known: &Known,
@@ -268,10 +271,15 @@ fn follow_lines(
         *seen = around(capture, model, base, false);
     }
     let before = block_series(model, seen);
-    if !add_slow_mains(capture, known, model, &before) {
-        return before;
+    if add_slow_mains(capture, known, model, &before) {
+        *seen = around(capture, model, base, false);
     }
-    *seen = around(capture, model, base, false);
+    for _ in 0..REFINEMENTS {
+        if line_places::refine(capture, known, model, seen) {
+            break;
+        }
+        *seen = around(capture, model, base, false);
+    }
     block_series(model, seen)
 }
 

@@ -45,6 +45,7 @@ pub mod instant;
 pub mod jitter;
 pub mod keys;
 pub mod latency;
+pub mod line_places;
 pub mod mains;
 pub mod missing;
 pub mod missing_moves;

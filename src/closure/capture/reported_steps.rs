@@ -38,7 +38,10 @@ pub(super) fn linear_step(
                 Some(fs) => (format!("{prefix}frequency_hz"), fs),
                 None => (format!("{prefix}frequency_per_sample"), 1.0),
             };
-            let std = frequency_std(&step, &prefix, capture.rows());
+            let std = match fitted.model.line_stds.get(i) {
+                Some(std) => *std,
+                None => frequency_std(&step, &prefix, capture.rows()),
+            };
             step.parameter_std.insert(name.clone(), std * unit);
             step.parameters.insert(name, turns * unit);
         }
