@@ -174,7 +174,8 @@ fn placed(capture: &Capture, model: &mut Model, base: &[Combo]) -> Around {
     let seen = around(capture, model, base, !sharp);
     let [drive, sense] = &seen.training;
     let spectrum = seen.spectrum(capture);
-    model.truncation = truncation::best(capture, model, [drive, sense], seen.free, &spectrum);
+    let residuals = [drive.as_slice(), sense.as_slice()];
+    model.truncation = truncation::best(capture, model, base, residuals, seen.free, &spectrum);
     around(capture, model, base, false)
 }
 

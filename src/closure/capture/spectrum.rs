@@ -164,27 +164,28 @@ impl Spectrum {
     }
 }
 
+/// |sum of residual e^(-i w t)|^2 at a frequency, turns a sample.
+pub fn power(residual: &[f64], turns: f64) -> f64 {
+    let step = Complex::from_polar(1.0, -std::f64::consts::TAU * turns);
+    let mut sum = Complex::new(0.0, 0.0);
+    for (block, rows) in residual.chunks(512).enumerate() {
+        let angle = -std::f64::consts::TAU * (turns * (block * 512) as f64).fract();
+        let mut turn = Complex::from_polar(1.0, angle);
+        for r in rows {
+            sum += turn * *r;
+            turn *= step;
+        }
+    }
+    sum.norm_sqr()
+}
+
 /// The frequency near `turns` at which both residuals together have most power (weights one over their
 /// variances), by parabolas on the exact sums.
 pub fn refine(residuals: [&[f64]; 2], variances: [f64; 2], turns: f64) -> f64 {
     let n = residuals[0].len().max(1);
     let power = |turns: f64| -> f64 {
-        let step = Complex::from_polar(1.0, -std::f64::consts::TAU * turns);
-        let mut sums = [Complex::new(0.0, 0.0); 2];
-        for (block, start) in (0..n).step_by(512).enumerate() {
-            let angle = -std::f64::consts::TAU * (turns * (block * 512) as f64).fract();
-            let mut turn = Complex::from_polar(1.0, angle);
-            for row in start..(start + 512).min(n) {
-                for (sum, residual) in sums.iter_mut().zip(residuals) {
-                    *sum += turn * residual.get(row).copied().unwrap_or(0.0);
-                }
-                turn *= step;
-            }
-        }
-        sums.iter()
-            .zip(variances)
-            .map(|(s, v)| s.norm_sqr() / v)
-            .sum()
+        let each = residuals.iter().zip(variances);
+        each.map(|(r, v)| power(r, turns) / v).sum()
     };
     let mut centre = turns;
     let mut width = 0.5 / n as f64;

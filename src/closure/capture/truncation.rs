@@ -1,12 +1,13 @@
 //! How many phase bits the oscillator's table is addressed with and how they are rounded, if truncation shows in the
 //! codes (`table_address_bits` and `address_rounding` of the contract's oscillator).
 
-use super::around::LEAST_VARIANCE;
-use super::columns::Model;
+use super::around::{LEAST_VARIANCE, generous};
+use super::candidates::{base_ridge, per_column};
+use super::columns::{LINES, Model, TRUNCATED, line};
+use super::gram::{Combo, Detail, Gram, Summed, solve};
 use super::input::Capture;
-use super::spectrum::Spectrum;
-use super::spur::ADDRESS_BITS;
-use super::tone::fold;
+use super::spectrum::{self, Spectrum};
+use super::spur::{self, ADDRESS_BITS};
 use std::f64::consts::TAU;
 
 /// How an oscillator comes from its phase to an address of its table.
@@ -48,12 +49,16 @@ const LEAST_GAIN: f64 = 8.0;
 /// Least surprise of the two strongest lines together.
 const LEAST_SURPRISE: f64 = 12.0;
 
+/// Nats by which lines must be better than a truncated tone: where they are the same, their fits differ by rounding.
+const ALIKE: f64 = 1.0;
+
 /// The address bits and their rounding whose truncated tone explains most of the residuals (zero where rows are
 /// left out; constant and tone already taken off); `None` if none does, or the tuning word is not known. `tones` are
 /// sine and cosine of both tones as they are in the codes.
 pub fn best(
     capture: &Capture,
     model: &Model,
+    base: &[Combo],
     residuals: [&[f64]; 2],
     tones: [[f64; 2]; 2],
     spectrum: &Spectrum,
@@ -66,18 +71,12 @@ pub fn best(
         if u64::from(word) % modulus == 0 {
             continue;
         }
-        // Lines near the tone or near zero frequency may be noise of the amplitude or of the offset, and
-        // a line must stand out of what is around it.
-        let place = |k: i64| {
-            let steps = (1 + k * (1i64 << bits)) * i64::from(word);
-            fold(steps.rem_euclid(1i64 << 32) as f64 / 4_294_967_296.0)
-        };
-        let near = |k: i64| {
-            let apart = (place(k) - model.tone.folded()).abs().min(place(k));
-            apart * (capture.rows() as f64) < 12.0
-        };
-        let seen = |k: i64| spectrum.surprise_at(place(k), &model.tone, [LEAST_VARIANCE; 2]);
-        if near(1) || near(-1) || seen(1) + seen(-1) < LEAST_SURPRISE {
+        // The strongest two first.
+        let places = spur::places_of(&model.tone, bits);
+        let tells = |at: &&f64| tells(capture, model, **at);
+        let surprise = |at: &f64| spectrum.surprise_at(*at, &model.tone, [LEAST_VARIANCE; 2]);
+        let strongest = places.iter().take(2).filter(tells);
+        if strongest.map(surprise).sum::<f64>() < LEAST_SURPRISE {
             continue;
         }
         for way in Truncation::both(bits) {
@@ -87,7 +86,61 @@ pub fn best(
             }
         }
     }
-    best.map(|b| b.1)
+    let way = best?.1;
+    let mut places = spur::places_of(&model.tone, way.bits);
+    places.retain(|at| tells(capture, model, *at));
+    let gain = |at: &f64| line_gain(residuals, variances, *at);
+    places.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
+    (!is_lines(capture, model, base, way, &places)).then_some(way)
+}
+
+/// Whether a line at the first of some places (turns a sample), or a pair at two of them, explains the codes better than
+/// a truncated tone, with all else fitted beside each. Of what truncation makes no two lines are all, but where so few
+/// bits are lost that a line has the truncated tone's columns in other words.
+fn is_lines(
+    capture: &Capture,
+    model: &Model,
+    base: &[Combo],
+    way: Truncation,
+    places: &[f64],
+) -> bool {
+    let resolution = 1.0 / capture.rows() as f64;
+    let first = places.first().copied();
+    let apart = |at: &&f64| first.is_some_and(|f| (*at - f).abs() > resolution);
+    let second = places.iter().find(apart).copied();
+    let known = model.lines.len();
+    let mut trial = model.clone();
+    trial.truncation = Some(way);
+    let room = LINES.saturating_sub(known);
+    trial
+        .lines
+        .extend(first.into_iter().chain(second).take(room));
+    let of = |columns: [usize; 2]| {
+        let each = [0, 1].into_iter().flat_map(|c| columns.map(|k| (c, k)));
+        each.map(|(c, k)| Combo::one("", c, k)).collect::<Vec<_>>()
+    };
+    let rest = generous(base, model);
+    let truncated = of([TRUNCATED, TRUNCATED + 1]);
+    let lines = (known..trial.lines.len()).flat_map(|i| of([line(i).0, line(i).1]));
+    let lines: Vec<Combo> = lines.collect();
+    let all: Vec<&Combo> = rest.iter().chain(&truncated).chain(&lines).collect();
+    let gram = Gram::over(capture, &trial, &Summed::of(&all, 1));
+    let gain = |own: &[Combo]| {
+        let combos: Vec<&Combo> = rest.iter().chain(own).collect();
+        let mut ridge = base_ridge(base);
+        ridge.resize(combos.len(), 0.0);
+        solve(gram.all(), &combos, &ridge, Detail::Gain).gain
+    };
+    let single = gain(lines.get(..4).unwrap_or_default());
+    let more = lines.len().saturating_sub(4) as f64 * per_column(capture.training_rows());
+    single.max(gain(&lines) - more) > gain(&truncated) + ALIKE
+}
+
+/// Whether a line at a place (turns a sample) tells of truncation: near the tone or near zero frequency it may be noise
+/// of the amplitude or of the offset.
+fn tells(capture: &Capture, model: &Model, place: f64) -> bool {
+    let apart = (place - model.tone.folded()).abs().min(place);
+    apart * (capture.rows() as f64) >= 12.0
 }
 
 /// Gain in log-likelihood of the truncated tone in the channel or channels that have it.
@@ -125,6 +178,15 @@ fn gain(
             return 0.0;
         }
         with[c].iter().map(|w| w * w).sum::<f64>() / (2.0 * energy * variances[c])
+    };
+    of(0).max(of(1)).max(of(0) + of(1) - 2.0)
+}
+
+/// The same of a single sinusoid of any phase at a frequency (turns a sample).
+fn line_gain(residuals: [&[f64]; 2], variances: [f64; 2], turns: f64) -> f64 {
+    let of = |c: usize| {
+        let rows = residuals[c].len().max(1) as f64;
+        spectrum::power(residuals[c], turns) / (rows * variances[c])
     };
     of(0).max(of(1)).max(of(0) + of(1) - 2.0)
 }
@@ -173,6 +235,25 @@ mod tests {
         let (spur, std) = of("drive_largest_spur_codes");
         assert!((spur - 1500.0 / 127.0).abs() < 0.1, "{spur}");
         assert!(std > 0.0 && std < 0.01, "{std}");
+    }
+
+    #[test]
+    fn a_single_line_at_the_strongest_place_is_no_truncation() {
+        let word = WORDS[1];
+        for size in [4.0, 40.0] {
+            let codes = codes(5, word, |channel, row, x| {
+                let steps = (-63 * i64::from(word) * row as i64).rem_euclid(1 << 32);
+                let wave = (TAU * steps as f64 / 4_294_967_296.0 + 1.1).sin();
+                x + [size, 0.2 * size][channel] * wave
+            });
+            let found = judged(codes, meta(word)).2;
+            let told = (names(&found), found.structure.left);
+            assert_eq!(told, (vec!["nco_spur"], false), "{size}");
+            let step = &found.steps[0];
+            assert!(found.models[1].truncation.is_none(), "{size}");
+            let amplitude = step.parameters["line1_drive_amplitude_codes"];
+            assert!((amplitude / size - 1.0).abs() < 0.02, "{size} {amplitude}");
+        }
     }
 
     #[test]
