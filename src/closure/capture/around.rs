@@ -8,7 +8,7 @@ use super::gram::{Combo, Detail, Gram, Summed, solve, spread};
 use super::input::{Capture, Part};
 use super::spectrum::{self, Spectrum};
 use super::wander::{self, Series};
-use super::{harmonics, mains, nonlinearity, rounding, spur, steps};
+use super::{mains, nonlinearity};
 use crate::closure::likelihood::tail::chi_square_surprise;
 
 /// Least variance of a channel's noise, codes squared: nearly that of an ideal quantiser's error, whose
@@ -120,71 +120,8 @@ pub fn around(capture: &Capture, model: &mut Model, base: &[Combo], neutral: boo
     seen
 }
 
-/// Looks for new lines; true if any was added. Besides the strongest, those are taken that are no sidelobe
-/// of a stronger one; where the quantiser's steps show, those only that are none of its own, unless they are the mains'.
-/// Where a harmonic stands out at a place that no truncation has, the tone is bent, and all its harmonics are the bend's.
-pub fn add_lines(capture: &Capture, known: &Known, model: &mut Model, around: &Around) -> bool {
-    let rows = capture.rows() as f64;
-    let spectrum = around.spectrum(capture);
-    let [drive, sense] = &around.training;
-    let before = model.lines.len();
-    let tones = around.free.map(|[sin, cos]| sin.hypot(cos));
-    let sharp = steps::is_sharp(&model.neutral, model);
-    let resolution = 1.0 / rows;
-    let is_rounding = |line: &spectrum::Line| {
-        sharp
-            && !mains::is_mains(known, line.turns, 0.5 * resolution)
-            && rounding::explains(&model.tone, tones, line.turns, resolution, line.amplitudes)
-    };
-    let lines = spectrum.lines(&model.tone, 12, 3.0, [LEAST_VARIANCE; 2]);
-    let lines = without_wander(model, around, lines);
-    let refined =
-        |line: &spectrum::Line| spectrum::refine([drive, sense], around.noise, line.turns);
-    // A bin tells the frequency to half a resolution, its surroundings to a tenth of one where it stands out at all.
-    let order = |turns: f64, within: f64| {
-        let is_mains = mains::is_mains(known, turns, 0.5 * resolution);
-        harmonics::order(&model.tone, turns, within * resolution).filter(|_| !is_mains)
-    };
-    let is_low = |order: Option<usize>| order.is_some_and(|k| k <= harmonics::TELLING);
-    let is_told =
-        |turns: f64| is_low(order(turns, 0.3)) && !spur::is_place(&model.tone, turns, resolution);
-    let mut low = lines.iter().filter(|line| is_low(order(line.turns, 0.7)));
-    let telling = low.find(|line| is_told(refined(line)) && !is_rounding(line));
-    // Harmonics fall with their order: a line of a high one that is stronger than what tells is not of them.
-    let is_own = |line: &spectrum::Line| {
-        let order = order(line.turns, 0.7);
-        telling.is_some_and(|t| is_low(order) || order.is_some() && line.surprise < t.surprise)
-    };
-    let mut stronger: Vec<spectrum::Line> = Vec::new();
-    for line in lines.iter().copied() {
-        if model.lines.len() >= LINES {
-            break;
-        }
-        // A line that is known is not found again: its rest is the frequency's error.
-        let is_known = model
-            .lines
-            .iter()
-            .any(|t| (t - line.turns).abs() * rows < 1.0);
-        let sidelobe = stronger.iter().any(|s| {
-            let apart = (s.turns - line.turns) * rows;
-            apart.abs() < 8.0 || line.surprise * apart * apart < 4.0 * s.surprise
-        });
-        if is_known || sidelobe {
-            continue;
-        }
-        if is_own(&line) {
-            // What is beside it may be its sidelobe.
-            stronger.push(line);
-        } else if !is_rounding(&line) {
-            model.lines.push(refined(&line));
-            stronger.push(line);
-        }
-    }
-    model.lines.len() > before
-}
-
 /// The lines, without the slow ones that a wander makes as well as the others do.
-fn without_wander(
+pub fn without_wander(
     model: &Model,
     around: &Around,
     lines: Vec<spectrum::Line>,

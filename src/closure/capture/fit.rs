@@ -1,6 +1,6 @@
 //! The rounds of the fit: noise, lines and nonlinear parts around the model, then the set of effects.
 
-use super::around::{Around, LEAST_VARIANCE, add_lines, add_slow_mains, around, block_series};
+use super::around::{Around, LEAST_VARIANCE, add_slow_mains, around, block_series};
 use super::candidates::{Effect, Known, PRIOR, Variant, base, base_ridge, per_column, variants};
 use super::clipping::{self, Limits};
 use super::columns::{ALL, Model, Variance};
@@ -9,6 +9,7 @@ use super::input::Capture;
 use super::missing::{self, Missing};
 use super::own_steps::OwnSteps;
 use super::search::Search;
+use super::standing::{add_lines, add_spurs};
 use super::steps::{find_steps, is_sharp, settle};
 use super::tone::{Phases, Tone};
 use super::wander::{self, Series};
@@ -136,6 +137,10 @@ pub fn rounds(capture: &Capture, known: &Known, start: &Model) -> Fitted {
         let mut model = fitted.model.clone();
         if is_sharp(&model.neutral, &model) {
             model.lines.clear();
+            model.line_stds.clear();
+            // Random instants smooth the steps: those that steps in the wrong place made would be found again.
+            model.variance.jitter = [0.0; 2];
+            model.declared = declared_tones(capture, known);
         }
         let seen = begun(capture, known, &base, &mut model, false);
         let (next, sharp) = round(capture, known, &base, model, seen, false);
@@ -265,9 +270,16 @@ fn follow_lines(
     model: &mut Model,
     seen: &mut Around,
 ) -> [Option<Series>; 2] {
+    let sharp = is_sharp(&model.neutral, model);
+    add_spurs(capture, known, model, base, seen);
     for _ in 0..3 {
         if !add_lines(capture, known, model, seen) {
             break;
+        }
+        if sharp {
+            // A line moves the codes over the quantiser's steps: steps that stay where they were leave its whole error
+            // where the tone is steep, as a random instant does.
+            find_steps(capture, model, base);
         }
         *seen = around(capture, model, base, false);
     }
@@ -430,6 +442,9 @@ fn with_limits(
 mod tests {
     use super::super::synthetic_rows::{WORDS, judged, late, meta, names};
     use super::*;
+    use crate::closure::synthetic::Random;
+    use crate::record::capture_meta::CaptureMeta;
+    use std::f64::consts::TAU;
 
     #[test]
     fn random_instants_take_their_part_of_both_declared_tones() {
@@ -437,6 +452,30 @@ mod tests {
         let codes = late(3, WORDS[1], 4.0, |_, _, x| x);
         let found = judged(codes, meta(WORDS[1])).2;
         assert_eq!(names(&found), ["aperture_jitter"]);
+    }
+
+    #[test]
+    fn steps_that_a_line_moves_are_no_random_instants() {
+        // Noise too small to hide the quantiser's steps, and a modulated phase that moves the steep rows by a code.
+        let word = 108_867_417u32;
+        let mut random = Random::new(4);
+        let mut codes = [Vec::new(), Vec::new()];
+        for row in 0..5000u32 {
+            let phase = TAU * f64::from(word.wrapping_mul(row)) / 4_294_967_296.0;
+            let angle = phase + 9e-5 * (512.0 * phase + 2.0).sin();
+            let sense = 5000.0 * (angle - 1.9).sin() + 500.0 * (angle - 1.9).cos();
+            for (codes, x) in codes.iter_mut().zip([-11_160.0 * angle.cos(), sense]) {
+                codes.push((x + 0.11 * random.normal() + 0.5).floor() as i32);
+            }
+        }
+        let meta = CaptureMeta {
+            adc_bits: Some(16),
+            drive_amplitude_codes: Some(11_160.0),
+            sense_codes_per_dps: None,
+            rate_dps: None,
+            ..meta(word)
+        };
+        assert_eq!(names(&judged(codes, meta).2), ["nco_spur"]);
     }
 
     #[test]

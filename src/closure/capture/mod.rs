@@ -10,7 +10,7 @@
 //! file an effect ([`offset`], [`gain`], [`latency`], [`feedthrough`], [`nonlinearity`],
 //! [`harmonics`], [`mains`], [`spur`] with [`truncation`]); [`gram`] their sums and least squares;
 //! [`search`] chooses. Outside of the linear part are [`clipping`] (with [`flat_top`] and [`instant`]), [`missing`] (the histogram: [`code_counts`], [`missing_moves`]),
-//! [`jitter`] (the variance). [`spectrum`] gives noise and lines ([`rounding`]: those that are the quantiser's own),
+//! [`jitter`] (the variance). [`spectrum`] gives noise and lines ([`standing`]: which of them are new; [`skirts`]: those that hide in their own; [`rounding`]: those that are the quantiser's own), [`line_places`] where these are,
 //! [`wander`] the slow noise that must not pass for an
 //! effect. [`around`] is the fit with every freedom, [`steps`] where the quantiser's
 //! steps are, [`own_steps`] the search where they show ([`exact_steps`]: with the steps exactly where the codes say),
@@ -60,8 +60,10 @@ mod reported_steps;
 pub mod rivals;
 pub mod rounding;
 pub mod search;
+pub mod skirts;
 pub mod spectrum;
 pub mod spur;
+pub mod standing;
 pub mod steps;
 pub mod structure;
 #[cfg(test)]

@@ -5,6 +5,9 @@ use super::tone::Tone;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
+/// Resolutions around a line that was taken off within which little of the noise is left.
+const TAKEN_OFF: f64 = 1.2;
+
 /// Periodograms of both channels.
 pub struct Spectrum {
     /// |sum of residual e^(-i w t)|^2 / rows, by channel and bin: the mean is the variance.
@@ -62,13 +65,19 @@ impl Spectrum {
     }
 
     /// The noise around each bin: medians of blocks that widen with the distance from zero frequency and from
-    /// the tone, where noise of the amplitude piles up.
-    fn floor(&self, channel: usize, tone: &Tone, least: f64) -> Vec<f64> {
+    /// the tone, where noise of the amplitude piles up. Bins `aside` (frequencies, turns a sample) are none of the noise:
+    /// there lines were taken off.
+    fn floor(&self, channel: usize, tone: &Tone, least: f64, aside: &[f64]) -> Vec<f64> {
         let power = &self.power[channel];
         let n = power.len();
         let all = self.variance(channel).max(least);
         let centre = (tone.folded() * self.bins as f64).round() as usize;
         let mut out = vec![all; n];
+        let width = TAKEN_OFF * self.bins as f64 / self.rows;
+        let is_aside = |k: usize| {
+            let near = |turns: &f64| (turns * self.bins as f64 - k as f64).abs() < width;
+            aside.iter().any(near)
+        };
         for (start, sign) in [(0usize, 1i64), (centre, 1), (centre, -1)] {
             let mut from = 1i64;
             while from < 3 * n as i64 {
@@ -78,18 +87,20 @@ impl Spectrum {
                         .ok()
                         .filter(|k| *k < n)
                 };
-                let mut block: Vec<f64> = (from..to)
-                    .filter_map(index)
+                let inside = || (from..to).filter_map(index);
+                let all_inside = inside().count();
+                let mut block: Vec<f64> = inside()
+                    .filter(|k| !is_aside(*k))
                     .filter_map(|k| power.get(k))
                     .copied()
                     .collect();
                 let count = block.len();
-                if count == 0 {
+                if all_inside == 0 {
                     break;
                 }
                 let middle = normal::median(&mut block).unwrap_or(0.0) / std::f64::consts::LN_2;
                 // A short block is uncertain, and lines are in it.
-                if count >= 12 && middle > all * (1.0 + 3.0 / (count as f64).sqrt()) {
+                if all_inside >= 12 && middle > all * (1.0 + 3.0 / (count as f64).sqrt()) {
                     let centre = 0.5 * (from + to) as f64;
                     for d in from..to {
                         if let Some(v) = index(d).and_then(|k| out.get_mut(k)) {
@@ -106,7 +117,7 @@ impl Spectrum {
 
     /// Surprise of what is at a frequency (turns a sample), the two nearest bins together.
     pub fn surprise_at(&self, turns: f64, tone: &Tone, least: [f64; 2]) -> f64 {
-        let floors = [self.floor(0, tone, least[0]), self.floor(1, tone, least[1])];
+        let floors = self.floors(tone, least, &[]);
         let at = |c: usize| {
             let bin = (turns * self.bins as f64) as usize;
             let of = |k: usize| Some(self.power[c].get(k)? / floors[c].get(k)?);
@@ -117,7 +128,7 @@ impl Spectrum {
 
     /// The noise around a frequency (turns a sample) in a channel over the white noise, 1 or more.
     pub fn excess(&self, channel: usize, turns: f64, tone: &Tone, least: f64) -> f64 {
-        let floor = self.floor(channel, tone, least);
+        let floor = self.floor(channel, tone, least, &[]);
         let bin = (super::tone::fold(turns) * self.bins as f64).round() as usize;
         let here = floor.get(bin.min(floor.len().saturating_sub(1)));
         here.copied().unwrap_or(least) / self.variance(channel).max(least)
@@ -129,11 +140,40 @@ impl Spectrum {
         (of(self.power[channel].get(bin)) - 3.0 * of(floor.get(bin))).max(0.0)
     }
 
+    /// The largest amplitude at any bin below a frequency (turns a sample), codes.
+    pub fn largest_below(&self, turns: f64) -> [f64; 2] {
+        let bins = (turns * self.bins as f64) as usize;
+        [0, 1].map(|c: usize| {
+            let below = self.power[c].iter().take(bins);
+            2.0 * (below.fold(0.0, |a: f64, b| a.max(*b)) / self.rows).sqrt()
+        })
+    }
+
     /// Lines above their surroundings, strongest first, with less than one in a thousand by chance. Harmonics
     /// of the tone up to `harmonics`, zero frequency, and what is within `apart` resolutions of
     /// either are none.
     pub fn lines(&self, tone: &Tone, harmonics: usize, apart: f64, least: [f64; 2]) -> Vec<Line> {
-        let floors = [self.floor(0, tone, least[0]), self.floor(1, tone, least[1])];
+        self.lines_over(&self.floors(tone, least, &[]), tone, harmonics, apart)
+    }
+
+    /// The noise around each bin of both channels, lines having been taken off at the frequencies `aside`.
+    pub fn floors(&self, tone: &Tone, least: [f64; 2], aside: &[f64]) -> [Vec<f64>; 2] {
+        [0, 1].map(|c: usize| self.floor(c, tone, least[c], aside))
+    }
+
+    /// The white noise at each bin of both channels.
+    pub fn white(&self, least: [f64; 2]) -> [Vec<f64>; 2] {
+        [0, 1].map(|c: usize| vec![self.variance(c).max(least[c]); self.power[c].len()])
+    }
+
+    /// The same lines above floors that are known.
+    pub fn lines_over(
+        &self,
+        floors: &[Vec<f64>; 2],
+        tone: &Tone,
+        harmonics: usize,
+        apart: f64,
+    ) -> Vec<Line> {
         let stretch = self.bins as f64 / self.rows;
         let excluded: Vec<f64> = (0..=harmonics)
             .map(|k| super::tone::fold(k as f64 * tone.turns) * self.bins as f64)
