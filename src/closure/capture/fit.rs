@@ -199,7 +199,13 @@ fn round(
         true => block_series(&model, &seen),
         false => follow_lines(capture, known, base, &mut model, &mut seen),
     };
-    let (jitter, jitter_taken) = follow_jitter(capture, known, &mut model, &seen);
+    let (mut jitter, mut jitter_taken) = follow_jitter(capture, known, &mut model, &seen);
+    if sharp && !first && jitter_taken {
+        // The steps were found without its smoothing, and so was it.
+        find_steps(capture, &mut model, base);
+        seen = around(capture, &mut model, base, false);
+        (jitter, jitter_taken) = follow_jitter(capture, known, &mut model, &seen);
+    }
     let mut gram = Gram::of(capture, &model);
     let nuisance = slow_noise(capture, &model, &seen, &series);
     let [drive, sense] = &seen.residuals;
@@ -439,54 +445,5 @@ fn with_limits(
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::synthetic_rows::{WORDS, judged, late, meta, names};
-    use super::*;
-    use crate::closure::synthetic::Random;
-    use crate::record::capture_meta::CaptureMeta;
-    use std::f64::consts::TAU;
-
-    #[test]
-    fn random_instants_take_their_part_of_both_declared_tones() {
-        // 0.22 rad rms: 2.3 per cent of the rate's 300 codes.
-        let codes = late(3, WORDS[1], 4.0, |_, _, x| x);
-        let found = judged(codes, meta(WORDS[1])).2;
-        assert_eq!(names(&found), ["aperture_jitter"]);
-    }
-
-    #[test]
-    fn steps_that_a_line_moves_are_no_random_instants() {
-        // Noise too small to hide the quantiser's steps, and a modulated phase that moves the steep rows by a code.
-        let word = 108_867_417u32;
-        let mut random = Random::new(4);
-        let mut codes = [Vec::new(), Vec::new()];
-        for row in 0..5000u32 {
-            let phase = TAU * f64::from(word.wrapping_mul(row)) / 4_294_967_296.0;
-            let angle = phase + 9e-5 * (512.0 * phase + 2.0).sin();
-            let sense = 5000.0 * (angle - 1.9).sin() + 500.0 * (angle - 1.9).cos();
-            for (codes, x) in codes.iter_mut().zip([-11_160.0 * angle.cos(), sense]) {
-                codes.push((x + 0.11 * random.normal() + 0.5).floor() as i32);
-            }
-        }
-        let meta = CaptureMeta {
-            adc_bits: Some(16),
-            drive_amplitude_codes: Some(11_160.0),
-            sense_codes_per_dps: None,
-            rate_dps: None,
-            ..meta(word)
-        };
-        assert_eq!(names(&judged(codes, meta).2), ["nco_spur"]);
-    }
-
-    #[test]
-    fn what_is_left_of_a_tone_is_exact_for_large_instants() {
-        let tone = Tone {
-            word: None,
-            turns: 0.1,
-            offset_turns: 0.0,
-        };
-        // Variance of the phase 0.4: a mean tone of e^-0.2, and 1 - e^-0.4 of its slope squared.
-        let jitter = (1.0 - (-0.4f64).exp()) / tone.angle().powi(2);
-        assert!((left_by(jitter, &tone) - (-0.2f64).exp()).abs() < 1e-12);
-    }
-}
+#[path = "fit_tests.rs"]
+mod tests;
