@@ -175,11 +175,17 @@ mod tests {
     #[test]
     fn a_spur_of_the_phase_that_goes_with_it_is_no_bend() {
         // Phase modulation at 16 times the tone: lines at 15 and 17 times.
-        for phase in [0.3, 1.9, 3.6] {
-            let word = WORDS[1];
+        let word = WORDS[1];
+        for (depth, phase) in [
+            (1e-3, 0.3),
+            (1e-3, 3.6),
+            (1e-2, 0.3),
+            (1e-2, 1.9),
+            (1e-2, 3.6),
+        ] {
             let codes = codes(3, word, |channel, row, x| {
                 let turns = f64::from(word.wrapping_mul(row as u32)) / 4_294_967_296.0;
-                let late = 1e-3 * (TAU * 16.0 * turns + phase).sin();
+                let late = depth * (TAU * 16.0 * turns + phase).sin();
                 let tone = |angle: f64| match channel {
                     0 => -1500.0 * angle.cos(),
                     _ => 300.0 * (angle + 0.3).sin() + 90.0 * (angle + 0.3).cos(),
@@ -188,7 +194,24 @@ mod tests {
             });
             let found = judged(codes, meta(word)).2;
             let told = (names(&found), found.structure.left);
-            assert_eq!(told, (vec!["nco_spur"], false), "{phase}");
+            assert_eq!(told, (vec!["nco_spur"], false), "{depth} {phase}");
+        }
+    }
+
+    #[test]
+    fn a_bend_that_harmonics_tell_of_is_no_spur() {
+        for seed in 1..4 {
+            let codes = codes(seed, WORDS[1], |channel, _, x| {
+                let u: f64 = x / [1500.0, 330.0][channel];
+                x + 4.0 * u.powi(3) + 2.0 * (9.0 * u).sin()
+            });
+            let found = judged(codes, meta(WORDS[1])).2;
+            let names = names(&found);
+            assert!(
+                names.contains(&"adc_integral_nonlinearity"),
+                "{seed} {names:?}"
+            );
+            assert!(!names.contains(&"nco_spur"), "{seed} {names:?}");
         }
     }
 }
