@@ -478,3 +478,20 @@ fn readings_a_few_steps_beyond_a_level_deny_it_where_the_output_has_steps() {
     assert!(lower(record(-step)).is_some_and(|l| (l - 6.5).abs() < 1e-9));
     assert_eq!(lower(record(2.0 * step)), None);
 }
+
+#[test]
+fn a_rail_that_only_the_noise_meets_is_a_step_though_the_total_does_not_pass_it() {
+    for seed in 0..4 {
+        let mut random = Random::new(seed);
+        // The bias is highest, a quarter of a deviation below the level, in the middle of each ramp.
+        let output: Vec<f64> = triangle(800)
+            .iter()
+            .map(|t| 1.0 - 0.5 * (t / 35.0 - 1.0).powi(2) + 0.02 * random.normal())
+            .map(|v| v.min(1.005))
+            .collect();
+        let c = channels(&output, None);
+        let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+        let names: Vec<String> = search.run().unwrap().terms.iter().map(Term::id).collect();
+        assert_eq!(names, ["output_saturation"], "{seed}");
+    }
+}

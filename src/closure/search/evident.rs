@@ -13,11 +13,6 @@ const WORTH: f64 = 20.0;
 const WORTH_OF_SPIKES: f64 = 10.0;
 const SPIKES: usize = 3;
 
-/// By how many deviations of the noise a total is short of a level, and by how much more of the rows at the rails a shape
-/// has to be so that the rails deny it.
-const SHORT: f64 = 2.0;
-const DENIED: f64 = 0.4;
-
 /// Steps of a level towards the mean of its rows.
 const STEPS: usize = 3;
 
@@ -96,41 +91,6 @@ impl Search<'_> {
             best = next;
         }
         Ok(Some(self.model(&best.terms)?))
-    }
-
-    /// Share of the rows that stand at a rail whose total, by a model, is short of it: none of them, if the model is right.
-    /// These rows are not fitted, and a shape may put the total anywhere there.
-    pub(super) fn short_of_rails(&self, model: &Model) -> f64 {
-        let Some(rails) = self.rails.as_ref() else {
-            return 0.0;
-        };
-        let c = self.channels;
-        let rate = c.column("rate_dps");
-        let output = c.output_dps();
-        let noise_dps = SHORT * model.fit.noise.white_rms_dps;
-        let (mut rows, mut short) = (0.0, 0.0);
-        for i in (0..c.len()).filter(|i| rails.rows[*i]) {
-            let others = model.bias.others_dps.get(i).copied().unwrap_or(0.0);
-            let total = rate.map_or(0.0, |r| r[i]) + model.bias.at(c.u[i]) + others;
-            let near = |level: &f64| (output[i] - level).abs();
-            let levels = [(rails.upper_dps, 1.0), (rails.lower_dps, -1.0)];
-            let levels = levels
-                .iter()
-                .filter_map(|(level, sign)| Some(((*level)?, sign)));
-            let own = levels.min_by(|a, b| near(&a.0).total_cmp(&near(&b.0)));
-            let is_short = |(level, sign): (f64, &f64)| sign * (level - total) > noise_dps;
-            rows += 1.0;
-            short += f64::from(u8::from(own.is_some_and(is_short)));
-        }
-        if rows > 0.0 { short / rows } else { 0.0 }
-    }
-
-    /// Whether a model with a term more has many more rows short of a rail that they stand at.
-    pub(super) fn denies_rails(&self, with: &Model, without: &Model) -> bool {
-        if !with.terms.iter().any(|t| t.evident) {
-            return false;
-        }
-        self.short_of_rails(with) > self.short_of_rails(without) + DENIED
     }
 
     /// The rails, and a level on the side that has none.

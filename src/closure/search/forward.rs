@@ -107,7 +107,6 @@ impl Search<'_> {
         found: &mut Found,
         names_only: bool,
     ) -> Result<Model, Unusable> {
-        let mut denied: Vec<String> = Vec::new();
         loop {
             let named = model.terms.iter().filter(|t| t.candidate.named()).count();
             let strangers = model.terms.len() - named;
@@ -119,10 +118,7 @@ impl Search<'_> {
             if found.first.is_empty() {
                 found.first = round.judged.clone();
             }
-            let next = match denied.is_empty() {
-                true => self.next(&model, &round)?,
-                false => self.next(&model, &round.without(&denied))?,
-            };
+            let next = self.next(&model, &round)?;
             if found.missing.is_empty() {
                 found.missing.clone_from(&round.missing);
             }
@@ -137,14 +133,8 @@ impl Search<'_> {
                 Next::Add(mut term) => {
                     term.beside = model.terms.iter().map(Term::id).collect();
                     let mut terms = model.terms.clone();
-                    let id = term.id();
                     terms.push(term);
-                    let with = self.polished(self.model(&terms)?)?;
-                    if self.denies_rails(&with, &model) {
-                        denied.push(id);
-                    } else {
-                        model = with;
-                    }
+                    model = self.polished(self.model(&terms)?)?;
                 }
             }
         }

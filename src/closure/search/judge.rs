@@ -110,13 +110,6 @@ impl Round {
         }
     }
 
-    /// Without some candidates.
-    pub fn without(&self, ids: &[String]) -> Round {
-        let mut out = self.clone();
-        out.judged.retain(|j| !ids.contains(&j.candidate.id()));
-        out
-    }
-
     /// Names that do as well as the given one, best first; of those that do so only because the
     /// temperature goes one way, no more than a step may have.
     pub fn rivals(&self, chosen: &Judged) -> Vec<String> {

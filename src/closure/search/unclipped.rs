@@ -31,7 +31,26 @@ pub(super) struct Unclipped<'a> {
     fixed_dps: Vec<f64>,
 }
 
-impl Unclipped<'_> {
+impl<'a> Unclipped<'a> {
+    /// `columns` are the declared ones and those of other effects.
+    fn new(
+        c: &'a Channels,
+        columns: Vec<Vec<f64>>,
+        fixed_dps: Vec<f64>,
+        weights: Vec<f64>,
+    ) -> Self {
+        let mut y = c.error_dps.clone();
+        add_scaled(&mut y, -1.0, &fixed_dps);
+        Unclipped {
+            c,
+            y,
+            order: declared(c).len(),
+            columns,
+            weights,
+            fixed_dps,
+        }
+    }
+
     /// The bias beside a clip, and what else is there in [`Bias::others_dps`]; `None` where it leaves too few rows.
     pub(super) fn bias(&self, clip: &dyn Candidate, point: &Point) -> Option<Bias> {
         // The total that readings alone tell.
@@ -78,17 +97,7 @@ impl<'a> Search<'a> {
         let c = self.channels;
         let mut fixed_dps = model.bias.others_dps.clone();
         fixed_dps.resize(c.len(), 0.0);
-        let mut y = c.error_dps.clone();
-        add_scaled(&mut y, -1.0, &fixed_dps);
-        let columns = declared(c);
-        Unclipped {
-            c,
-            y,
-            order: columns.len(),
-            columns,
-            weights: model.free_weights(),
-            fixed_dps,
-        }
+        Unclipped::new(c, declared(c), fixed_dps, model.free_weights())
     }
 
     /// The bias of terms with a clip among them, for a start: nothing is known yet of rows that stand out.
@@ -97,7 +106,6 @@ impl<'a> Search<'a> {
         let clip = terms.iter().find(|t| t.candidate.is_last())?;
         let mut fixed_dps = vec![0.0; c.len()];
         let mut columns = declared(c);
-        let order = columns.len();
         for term in terms.iter().filter(|t| !t.candidate.is_last()) {
             for column in term.candidate.columns(c, start, &term.point) {
                 match term.candidate.is_sized(&term.point) {
@@ -106,16 +114,7 @@ impl<'a> Search<'a> {
                 }
             }
         }
-        let mut y = c.error_dps.clone();
-        add_scaled(&mut y, -1.0, &fixed_dps);
-        let unclipped = Unclipped {
-            c,
-            y,
-            columns,
-            order,
-            weights: self.weights(),
-            fixed_dps,
-        };
+        let unclipped = Unclipped::new(c, columns, fixed_dps, self.weights());
         unclipped.bias(clip.candidate.as_ref(), &clip.point)
     }
 

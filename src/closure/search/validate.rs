@@ -196,6 +196,7 @@ impl Search<'_> {
             if !t.candidate.named() {
                 return true;
             }
+            // A rail is seen without a fit, also where the model's total hardly passes it.
             if !t.evident && self.shows_once(t, &model) {
                 return false;
             }
@@ -220,9 +221,7 @@ impl Search<'_> {
         let mut k = 0;
         let mut changed = false;
         for (own, term) in model.terms.iter().enumerate() {
-            // A rail is seen without a fit: another effect that bends there too does not refute it.
-            let lasts = || term.evident || self.lasts(&model, term);
-            if !term.candidate.named() || (lasts() && self.recurs(&model, own)?) {
+            if !term.candidate.named() || (self.lasts(&model, term) && self.recurs(&model, own)?) {
                 k += 1;
                 continue;
             }
