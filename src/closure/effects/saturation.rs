@@ -3,6 +3,9 @@
 use super::{Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, map};
 use crate::closure::channels::{Channels, range};
 
+/// Largest share of the rows that a clip holds.
+const MOST_HELD: f64 = 0.8;
+
 /// Clipping of the total output.
 pub(super) struct Saturation;
 
@@ -100,8 +103,8 @@ impl Candidate for Saturation {
         let (low, high) = limits(point);
         let total = total(c, bias);
         let beyond = total.iter().filter(|x| **x < low || **x > high).count();
-        if 5 * beyond > 4 * total.len() {
-            // An output that clips most of the time is no output.
+        if beyond as f64 > MOST_HELD * total.len() as f64 {
+            // An output that hardly ever leaves its limits is no output.
             return vec![vec![0.0; total.len()]];
         }
         vec![map(&total, |x| x.max(low).min(high) - x)]

@@ -3,6 +3,7 @@
 use super::acting::Settling;
 use super::judge::{PRICE, WHITE, price};
 use super::refine::{self, Bench};
+use super::unclipped::Unclipped;
 use super::{Model, Search};
 use crate::closure::effects::{Bias, Candidate, Point, map};
 use crate::closure::likelihood::linear::add_scaled;
@@ -48,8 +49,10 @@ impl Search<'_> {
         // A residual with sharp ends looks like a walk without white noise, to which a threshold that is off by a row, or
         // a form that is not quite the one, is no better than none: it is found where the noise is white.
         // A clip of the bias was not near with a bias that it bends.
+        let unclipped = (candidate.is_last() && self.moves_by_bias(model))
+            .then(|| self.unclipped_beside(model));
         let sharp = acting || candidate.is_whole() || candidate.is_local();
-        if near && sharp || candidate.is_last() && self.moves_by_bias(model) {
+        if near && sharp || unclipped.is_some() {
             benches.push((WHITE, Bench::new(model, WHITE)));
         }
         let best = |point: &Point, bias: &Option<Bias>| {
@@ -72,7 +75,7 @@ impl Search<'_> {
                     let top = refine::refined(bench, candidate, c, &model.bias, point, 0.5);
                     Some((top, None))
                 }
-                _ => self.sharpened(model, candidate, points, bench),
+                _ => self.sharpened(model, candidate, points, (bench, unclipped.as_ref())),
             };
             let Some((point, bias)) = found else { continue };
             let net = best(&point, &bias) - price(candidate, c, &point);
@@ -86,18 +89,16 @@ impl Search<'_> {
         top
     }
 
-    /// The best point of a shape with thresholds on a bench.
+    /// The best point of a shape with thresholds on a bench, and the bias there of the rows that a clip does not hold.
     fn sharpened(
         &self,
         model: &Model,
         candidate: &dyn Candidate,
         points: &[Point],
-        bench: &Bench<'_>,
+        (bench, unclipped): (&Bench<'_>, Option<&Unclipped<'_>>),
     ) -> Option<(Point, Option<Bias>)> {
         let c = self.channels;
-        let unclipped = (candidate.is_last() && self.moves_by_bias(model))
-            .then(|| self.unclipped_beside(model));
-        let free = |p: &Point| unclipped.as_ref().and_then(|u| u.bias(candidate, p));
+        let free = |p: &Point| unclipped.and_then(|u| u.bias(candidate, p));
         let gain = |p: &Point| {
             let free = free(p);
             refine::gain(bench, candidate, c, free.as_ref().unwrap_or(&model.bias), p)
