@@ -7,6 +7,7 @@
 //! shapes; [`Candidate::points`] is where the search for them starts, [`super::search`] ends it.
 
 pub mod covariate;
+mod deadband;
 pub mod demodulation;
 pub mod drive;
 pub mod field;
@@ -20,6 +21,7 @@ pub mod structure;
 pub mod time;
 pub mod tone;
 pub mod user;
+mod within;
 
 use super::channels::Channels;
 use super::firmware::Words;

@@ -165,6 +165,50 @@ fn a_dead_band_claims_no_more_than_fitted_rows_show_where_held_out_ones_contradi
     assert!((0.06..0.0601).contains(&found_dps), "{found_dps}");
 }
 
+#[test]
+fn a_dead_band_is_found_in_means_over_a_rate_that_swings() {
+    for (seed, half_dps, subtracts) in [(1, 0.06, true), (2, 0.05, true), (3, 4.0, false)] {
+        let (rows, inner) = (400, 60);
+        let mut random = Random::new(seed);
+        let degc = [triangle(rows / 2), triangle(rows / 2)].concat();
+        // Some six rows a swing, or twenty.
+        let turn = if subtracts { 1.03 } else { 0.31 };
+        let rate = |t: f64| 40.0 * (turn * t).sin();
+        let passed = |o: f64| match (o.abs() <= half_dps, subtracts) {
+            (true, _) => 0.0,
+            (false, true) => o - half_dps * o.signum(),
+            (false, false) => o,
+        };
+        let mean = |k: usize, f: &dyn Fn(f64) -> f64| -> f64 {
+            let within = (0..inner).map(|i| k as f64 + (f64::from(i) + 0.5) / f64::from(inner));
+            within.map(f).sum::<f64>() / f64::from(inner)
+        };
+        let output = (0..rows).map(|k| {
+            let passed = mean(k, &|t| passed(rate(t)));
+            0.3 - 0.01 * degc[k] + passed + 0.01 * random.normal()
+        });
+        let columns = BTreeMap::from([
+            ("rate_out_dps".to_owned(), output.collect()),
+            (
+                "rate_dps".to_owned(),
+                (0..rows).map(|k| mean(k, &rate)).collect(),
+            ),
+            ("die_degc".to_owned(), degc.clone()),
+        ]);
+        let time_s: Vec<f64> = (0..rows).map(|k| 20.0 * k as f64).collect();
+        let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+        let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+        let found = search.run().unwrap();
+        let names: Vec<String> = found.terms.iter().map(|t| t.id()).collect();
+        assert_eq!(names, ["output_deadband"], "{seed}");
+        let found_dps = found.terms[0].point.theta[0].exp();
+        assert!(
+            (found_dps / half_dps - 1.0).abs() < 0.05,
+            "{seed}: {found_dps}"
+        );
+    }
+}
+
 /// Names, what is left and the first step's report, of a scale factor with `slope_ppm` a kelvin and `bend_ppm` a kelvin squared about
 /// 25 degC, and a supply that moves the output.
 fn scaled(seed: u64, slope_ppm: f64, bend_ppm: f64) -> (Vec<String>, Option<String>, Reported) {

@@ -16,7 +16,7 @@ use nalgebra::DMatrix;
 
 /// How to fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Options {
+pub struct Options<'a> {
     /// Beyond this many used rows the fit works on block means.
     pub rows: usize,
     /// Whether spikes lose weight.
@@ -26,15 +26,18 @@ pub struct Options {
     /// Where the shape of the noise is known to lie: only lattice points near it are tried. For
     /// comparisons of models; [`Fit::lattice`] is then no posterior.
     pub near: Option<Shape>,
+    /// Rows that are spikes, whatever this fit says of them; empty: none is.
+    pub out: &'a [bool],
 }
 
-impl Default for Options {
+impl Default for Options<'_> {
     fn default() -> Self {
         Options {
             rows: 3000,
             robust: true,
             evaluations: 40,
             near: None,
+            out: &[],
         }
     }
 }
@@ -102,7 +105,7 @@ impl Fit {
 
     /// The same record, weights and blocks with further regressors (already reduced): noise
     /// estimated again from the lattice on.
-    pub fn with_columns(&self, further: &[Vec<f64>], options: &Options) -> Evaluated {
+    pub fn with_columns(&self, further: &[Vec<f64>], options: &Options<'_>) -> Evaluated {
         let mut problem = self.problem.clone();
         problem.columns.extend_from_slice(further);
         problem.refine(&problem.lattice(), options.evaluations)
@@ -119,8 +122,16 @@ pub fn fit(
     y: &[f64],
     columns: &[Vec<f64>],
     used: &[bool],
-    options: &Options,
+    options: &Options<'_>,
 ) -> Result<Fit, Unusable> {
+    let kept: Vec<bool>;
+    let used = match options.out {
+        [] => used,
+        out => {
+            kept = used.iter().zip(out).map(|(u, out)| *u && !out).collect();
+            &kept
+        }
+    };
     check(times_s, y, columns, used)?;
     let factor = used
         .iter()
@@ -137,7 +148,12 @@ pub fn fit(
         let decimated = decimate::decimate(times_s, &plain, used, size, options.robust)?;
         return Ok(fit_long(&plain.line, decimated, options));
     }
-    let (problem, lattice, at, row_weights) = fit_rows(&plain, options);
+    let Rows {
+        problem,
+        lattice,
+        at,
+        weights: row_weights,
+    } = fit_rows(&plain, options);
     let noise = NoiseModel::of_shape(at.shape, at.white_variance().sqrt(), plain.line.period_s);
     let row_weights = row_weights
         .iter()
@@ -176,13 +192,57 @@ fn check(times_s: &[f64], y: &[f64], columns: &[Vec<f64>], used: &[bool]) -> Res
     Ok(())
 }
 
+/// A fit of rows: the problem with its weights, the lattice, the likeliest shape, the weights.
+struct Rows {
+    problem: Problem,
+    lattice: Vec<Evaluated>,
+    at: Evaluated,
+    weights: Vec<f64>,
+}
+
+impl Rows {
+    /// Log-density of all rows, spikes as [`robust::ACCIDENT`] says.
+    fn density(&self) -> f64 {
+        let deviation = self.at.white_variance().sqrt().max(f64::MIN_POSITIVE);
+        // Rows that are not used have their full weight.
+        let spikes = self.weights.iter().filter(|w| **w < 0.5).count();
+        self.at.loglik - spikes as f64 * (robust::ACCIDENT + deviation.ln())
+    }
+}
+
+/// Weights and noise, and where rows stand out from white noise that do not from the noise that was found, the same from
+/// there: a few spikes may pass for the steps of a walk, whose coefficients follow them.
+fn fit_rows(plain: &Problem, options: &Options<'_>) -> Rows {
+    let found = by_turns(plain, options, None);
+    if !options.robust || found.at.shape == Shape::default() {
+        return found;
+    }
+    let Some(weights) = robust::beside_white(plain) else {
+        return found;
+    };
+    let same = |(a, b): (&f64, &f64)| (*a < 0.5) == (*b < 0.5);
+    if weights.iter().zip(&found.weights).all(same) {
+        return found;
+    }
+    let other = by_turns(plain, options, Some(weights));
+    match other.density() > found.density() {
+        true => other,
+        false => found,
+    }
+}
+
 /// Weights and noise, by turns: each pass tests all rows again, at full weight.
-fn fit_rows(plain: &Problem, options: &Options) -> (Problem, Vec<Evaluated>, Evaluated, Vec<f64>) {
+fn by_turns(plain: &Problem, options: &Options<'_>, start: Option<Vec<f64>>) -> Rows {
     let mut problem = plain.clone();
-    let mut lattice = problem.lattice_near(options.near);
+    let near = options.near.filter(|_| start.is_none());
+    let mut weighed = start.is_some();
+    let mut weights = start.unwrap_or_else(|| vec![1.0; plain.y.len()]);
+    if weighed {
+        let factors = robust::factors(&plain.line.white_factor, &weights);
+        problem.line = plain.line.with_white_factor(factors);
+    }
+    let mut lattice = problem.lattice_near(near);
     let mut at = problem.refine(&lattice, options.evaluations);
-    let mut weights = vec![1.0; plain.y.len()];
-    let mut weighed = false;
     for _ in 0..if options.robust { 3 } else { 0 } {
         let next = robust::weights(plain, &problem, &at);
         let moved = next.iter().zip(&weights).map(|(a, b)| (a - b).abs());
@@ -202,10 +262,15 @@ fn fit_rows(plain: &Problem, options: &Options) -> (Problem, Vec<Evaluated>, Eva
         lattice = problem.lattice();
         at = problem.refine(&lattice, options.evaluations);
     }
-    (problem, lattice, at, weights)
+    Rows {
+        problem,
+        lattice,
+        at,
+        weights,
+    }
 }
 
-fn fit_long(line: &Timeline, decimated: Decimated, options: &Options) -> Fit {
+fn fit_long(line: &Timeline, decimated: Decimated, options: &Options<'_>) -> Fit {
     let problem = decimated.problem.clone();
     let lattice = problem.lattice_near(options.near);
     let at = problem.refine(&lattice, options.evaluations);

@@ -5,11 +5,21 @@
 //! neighbours share, is no spike.
 
 use super::lattice::{Evaluated, Problem};
+use super::noise::Shape;
 use super::whiten::Whitener;
 
 /// Deviations, in robust standard deviations, from which a row's weight falls, and at which it is 0.
 /// One clean row in 16000 is beyond the first.
 pub const SPIKE: (f64, f64) = (4.0, 8.0);
+
+/// Minus the log-density of a spike, in units of the white deviation: it may lie anywhere within some twenty deviations, and
+/// happens once in a hundred rows.
+pub const ACCIDENT: f64 = 8.0;
+
+/// Passes of [`beside_white`]; most spikes of a short record, and of how many rows one may be a spike.
+const PASSES: usize = 3;
+const FEW: usize = 2;
+const RARELY: usize = 100;
 
 /// The weight of a row `deviation` robust standard deviations off: 1, falling linearly to 0.
 pub fn weight(deviation: f64) -> f64 {
@@ -69,6 +79,28 @@ pub fn weights(plain: &Problem, weighted: &Problem, at: &Evaluated) -> Vec<f64> 
             }
         })
         .collect()
+}
+
+/// Weights beside white noise, if there are few spikes then, each by itself: more of them may be what a cause does now and
+/// then.
+pub fn beside_white(plain: &Problem) -> Option<Vec<f64>> {
+    let mut weighted = plain.clone();
+    let mut own = vec![1.0; plain.y.len()];
+    for _ in 0..PASSES {
+        own = weights(plain, &weighted, &weighted.evaluate(Shape::default()));
+        weighted.line = plain
+            .line
+            .with_white_factor(factors(&plain.line.white_factor, &own));
+    }
+    let used = own.iter().zip(&plain.line.white_factor);
+    let spikes: Vec<bool> = used
+        .filter(|(_, factor)| factor.is_finite())
+        .map(|(w, _)| *w < 0.5)
+        .collect();
+    let count = spikes.iter().filter(|s| **s).count();
+    let few = count <= (spikes.len() / RARELY).max(FEW);
+    let alone = spikes.windows(2).all(|pair| !(pair[0] && pair[1]));
+    (count > 0 && few && alone).then_some(own)
 }
 
 /// White variance factors for weights; rows of weight 0 are not used.
