@@ -24,6 +24,9 @@ const POWERS: i32 = 6;
 /// the reading errs by only where most of the difference is the reading's.
 const SAME: f64 = 1.25;
 
+/// Share of the rows that may be off by more.
+const FEW: f64 = 0.01;
+
 /// Regressors of what the readings err by, times powers of u: those of the declared bias's slope where the neighbours tell, and
 /// two more where another channel does, so that what other effects of the temperature make of the noise is among them.
 /// None where a fit of all rows would not see them (a likelihood that rises by less than a half).
@@ -59,16 +62,39 @@ fn errors(c: &Channels, truth: &[f64], count: i32) -> Vec<Vec<f64>> {
 
 /// u by all channels that read the temperature as well as the thermometer does: least squares over their powers.
 fn by_others(c: &Channels) -> Option<Vec<f64>> {
-    let noise = reading_noise(&c.time_s, &c.u);
-    let follows = |x: &[f64]| {
-        let (_, off) = least_squares(&of_powers(x), &c.u);
-        stats::rms(&off) <= SAME * noise
-    };
-    let names = c.columns.keys().filter(|name| **name != c.thermometer);
-    let scaled = names.filter_map(|name| c.moving(name).and(c.scaled(name)));
-    let thermometers: Vec<Vec<f64>> = scaled.filter(|x| follows(x)).collect();
-    let columns: Vec<Vec<f64>> = thermometers.iter().flat_map(|x| of_powers(x)).collect();
+    let noise = noise_of(c);
+    let names = c.columns.keys();
+    let thermometers = names.filter_map(|name| read_by(c, name, noise));
+    let columns: Vec<Vec<f64>> = thermometers.flat_map(|x| of_powers(&x)).collect();
     (!columns.is_empty()).then(|| least_squares(&columns, &c.u).0)
+}
+
+/// Whether a channel reads the temperature as well as the thermometer does.
+pub(super) fn reads_temperature(c: &Channels, name: &str) -> bool {
+    read_by(c, name, noise_of(c)).is_some()
+}
+
+/// A channel, scaled, if it follows the temperature up to the noise of the thermometer.
+fn read_by(c: &Channels, name: &str, noise: f64) -> Option<Vec<f64>> {
+    if name == c.thermometer {
+        return None;
+    }
+    let x = c.moving(name).and(c.scaled(name))?;
+    let (_, off) = least_squares(&of_powers(&x), &c.u);
+    let sizes = stats::sorted(&map(&off, f64::abs));
+    (stats::rms(all_but_few(&sizes)) <= SAME * noise).then_some(x)
+}
+
+/// What the thermometer errs by: its noise or, of which rows in which it stands still say nothing, its rounding.
+fn noise_of(c: &Channels) -> f64 {
+    let rounding = stats::lattice_step(&c.u).map_or(0.0, |step| step / 12f64.sqrt());
+    reading_noise(&c.time_s, &c.u).max(rounding)
+}
+
+/// Sizes, in order, without the greatest: a few rows without a reading lie between their neighbours. More of them are not of the
+/// reading: a channel that lags is the same in a dwell.
+fn all_but_few(sizes: &[f64]) -> &[f64] {
+    &sizes[..sizes.len() - (FEW * sizes.len() as f64) as usize]
 }
 
 /// A channel's powers from the first one on.

@@ -76,6 +76,11 @@ fn readings_that_hardly_err_cost_nothing() {
 
 /// As [`record`], slowly curved by a third order, with a drive gain that follows the temperature and is read with little noise.
 fn with_gain(seed: u64, own_k: f64) -> Channels {
+    with_gain_read(seed, own_k, |t, random| t + 2.0 * random.normal())
+}
+
+/// The same with a thermometer that reads a temperature so.
+fn with_gain_read(seed: u64, own_k: f64, read: impl Fn(f64, &mut Random) -> f64) -> Channels {
     let mut random = Random::new(seed);
     let degc = [triangle(ROWS / 2), triangle(ROWS / 2)].concat();
     let u = |t: f64| t / 35.0 - 1.0;
@@ -84,7 +89,7 @@ fn with_gain(seed: u64, own_k: f64) -> Channels {
         .iter()
         .map(|t| output(u(*t)) + NOISE_DPS * random.normal())
         .collect();
-    let die = degc.iter().map(|t| t + 2.0 * random.normal()).collect();
+    let die = degc.iter().map(|t| read(*t, &mut random)).collect();
     let gain = degc
         .iter()
         .map(|t| 1.0 + 0.05 * u(t + own_k * random.normal()))
@@ -111,4 +116,31 @@ fn a_channel_that_reads_the_temperature_better_is_no_cause() {
     }
     // One that moves by itself says nothing of the thermometer's noise.
     assert_eq!(errors_of(&with_gain(1, 3.0)).len(), 2);
+}
+
+#[test]
+fn rounding_and_a_few_rows_without_a_reading_are_no_reason_to_distrust_a_channel() {
+    let coarse = |t: f64, _: &mut Random| (t / 0.7).round() * 0.7;
+    let odd = |t: f64, random: &mut Random| {
+        let rarely = if random.normal() > 2.6 { 25.0 } else { 0.0 };
+        t + 2.0 * random.normal() + rarely
+    };
+    for seed in 1..=3 {
+        for c in [
+            with_gain_read(seed, 0.01, coarse),
+            with_gain_read(seed, 0.01, odd),
+        ] {
+            assert!(by_others(&c).is_some(), "{seed}");
+        }
+    }
+}
+
+#[test]
+fn a_channel_that_lags_now_and_then_is_another_temperature() {
+    // Off in one row out of twenty.
+    let late = |t: f64, random: &mut Random| {
+        let rarely = if random.normal() > 1.65 { 25.0 } else { 0.0 };
+        t + 2.0 * random.normal() + rarely
+    };
+    assert!(by_others(&with_gain_read(1, 0.01, late)).is_none());
 }

@@ -6,11 +6,14 @@
 
 use super::declared::declared;
 use super::judge::{EQUAL, Judged};
+use super::reading::reads_temperature;
 use super::sweep::BETTER;
 use super::{Found, LEVEL, MOST_RIVALS, Model, Search, Term};
+use crate::closure::effects::Candidate;
 use crate::closure::likelihood::Unusable;
 use crate::closure::likelihood::linear::{Basis, dot};
 use crate::closure::smooth::reading_noise;
+use std::sync::Arc;
 
 /// Net gain behind a step's within which names are looked at, and how many of them.
 const BEHIND: f64 = 50.0;
@@ -99,6 +102,27 @@ impl Search<'_> {
             found.terms[k].rivals = rivals;
         }
         Ok(())
+    }
+
+    /// Adds to the rivals of each step the other effects of a channel of its that reads the temperature as well as the
+    /// thermometer does: whatever is a function of it is one of the temperature, and what the thermometer errs by looks like either.
+    pub(super) fn with_thermometers(&self, found: &mut Found) {
+        let c = self.channels;
+        let named: Vec<String> = found.terms.iter().map(Term::id).collect();
+        let of = |candidate: &dyn Candidate| candidate.channels(c).unwrap_or_default();
+        for term in &mut found.terms {
+            let mut channels = of(term.candidate.as_ref());
+            channels.retain(|name| reads_temperature(c, name));
+            let shares = |k: &&Arc<dyn Candidate>| {
+                k.named() && of(k.as_ref()).iter().any(|name| channels.contains(name))
+            };
+            for id in self.candidates.iter().filter(shares).map(|k| k.id()) {
+                let known = named.contains(&id) || term.rivals.contains(&id);
+                if !known && term.rivals.len() < MOST_RIVALS {
+                    term.rivals.push(id);
+                }
+            }
+        }
     }
 
     /// The probability of a name beside a model, if it is beyond chance.
