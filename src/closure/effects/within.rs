@@ -94,7 +94,7 @@ mod tests {
             0.5 * within * within + 0.3 * (o.abs() - within)
         };
         let means = Within::of(&c).means(clip, integral);
-        for k in 1..39 {
+        for (k, mean) in means.iter().enumerate().take(39).skip(1) {
             let at = |t: f64| (0.7 * t).sin();
             let (before, own, after) = (at(k as f64 - 1.0), at(k as f64), at(k as f64 + 1.0));
             let steps = 2000;
@@ -105,7 +105,7 @@ mod tests {
                     clip(own + t.abs() * if t < 0.0 { before - own } else { after - own })
                 })
                 .sum();
-            assert!((means[k] - sum / f64::from(steps)).abs() < 1e-6, "{k}");
+            assert!((mean - sum / f64::from(steps)).abs() < 1e-6, "{k}");
         }
     }
 

@@ -2,8 +2,9 @@
 
 use super::judge::{Judged, PRICE, Round};
 use super::memo::Memo;
-use super::{ACCIDENT, Found, LEVEL, MOST_RIVALS, Model, Search, Term};
+use super::{Found, LEVEL, MOST_RIVALS, Model, Search, Term};
 use crate::closure::effects::Candidate;
+use crate::closure::likelihood::robust::ACCIDENT;
 use crate::closure::likelihood::{Unusable, reml};
 use std::sync::Arc;
 
@@ -267,7 +268,7 @@ impl Search<'_> {
     }
 
     /// A quick fit beside a model: the noise is looked for near its own.
-    pub fn near(&self, model: &Model) -> reml::Options {
+    pub fn near(&self, model: &Model) -> reml::Options<'static> {
         reml::Options {
             near: Some(model.fit.at.shape),
             ..self.options()

@@ -24,6 +24,7 @@ mod memo;
 mod model;
 mod once;
 mod otherwise;
+mod pairs;
 mod polish;
 mod proven;
 mod reading;
@@ -48,6 +49,7 @@ use super::likelihood::Unusable;
 use super::likelihood::blocks::Split;
 use super::likelihood::linear::add_scaled;
 use super::likelihood::reml::{self, Fit};
+use super::likelihood::robust::ACCIDENT;
 use super::likelihood::tail::Tail;
 use super::rails::{self, Rails};
 use acting::Settling;
@@ -105,6 +107,8 @@ pub struct Term {
     pub gain: f64,
     /// What the probability is beside: the ids of the terms that were in.
     pub beside: Vec<String>,
+    /// The probability is that of a pair with another such term (`search/pairs.rs`).
+    pub paired: bool,
     /// The record shows it without a fit ([`crate::closure::rails`]): its shape stands, and no comparison decides on it.
     pub evident: bool,
 }
@@ -120,6 +124,7 @@ impl Term {
             rivals: Vec::new(),
             gain: 0.0,
             beside: Vec::new(),
+            paired: false,
             evident: false,
         }
     }
@@ -139,9 +144,6 @@ impl Term {
         self.candidate.id()
     }
 }
-
-/// Minus the log-density of a spike, in units of the white deviation.
-const ACCIDENT: f64 = 8.0;
 
 /// What the search found.
 pub struct Found {
@@ -261,8 +263,25 @@ impl<'a> Search<'a> {
         Ok(model)
     }
 
+    /// The model of terms on the rows that a model with more terms keeps, if that puts more rows out than it does itself: under the
+    /// slow noise that has a missing term in it, a few odd rows are none.
+    ///
+    /// # Errors
+    /// As [`Search::model`].
+    pub(super) fn keeping(&self, terms: &[Term], with: &Model) -> Result<Option<Model>, Unusable> {
+        if self.spikes(&with.fit) <= self.spikes(&self.model(terms)?.fit) {
+            return Ok(None);
+        }
+        let out: Vec<bool> = with.fit.row_weights.iter().map(|w| *w < 0.5).collect();
+        let options = reml::Options {
+            out: &out,
+            ..self.options()
+        };
+        self.model_with(terms, &options).map(Some)
+    }
+
     /// The usual way to fit.
-    pub fn options(&self) -> reml::Options {
+    pub fn options(&self) -> reml::Options<'static> {
         reml::Options {
             rows: self.effort.rows,
             ..reml::Options::default()
@@ -273,7 +292,11 @@ impl<'a> Search<'a> {
     ///
     /// # Errors
     /// As there.
-    pub fn model_with(&self, terms: &[Term], options: &reml::Options) -> Result<Model, Unusable> {
+    pub fn model_with(
+        &self,
+        terms: &[Term],
+        options: &reml::Options<'_>,
+    ) -> Result<Model, Unusable> {
         let mut bias = self.plain_bias();
         let acts = |t: &Term| t.candidate.acts_on_bias();
         if !terms.iter().any(acts) {
@@ -334,7 +357,7 @@ impl<'a> Search<'a> {
         &self,
         terms: &[Term],
         acting: &Bias,
-        options: &reml::Options,
+        options: &reml::Options<'_>,
     ) -> Result<Model, Unusable> {
         let c = self.channels;
         // Rows at a rail are left out where the clip is in the model.
@@ -407,8 +430,6 @@ impl<'a> Search<'a> {
             others_dps: others,
         };
         let spikes = self.spikes(&fit);
-        // A row that is left out has the density of something that may lie anywhere within some
-        // twenty deviations, and happens once in a hundred rows.
         let accident = -ACCIDENT - fit.noise.white_rms_dps.max(f64::MIN_POSITIVE).ln();
         Ok(Model {
             terms: terms.to_vec(),

@@ -9,6 +9,7 @@
 use super::forward::STRANGER;
 use super::judge::{Judged, PRICE, price};
 use super::reported::{BEYOND, WANDER};
+use super::together::WORTH;
 use super::{Found, LEVEL, Model, Search, Term};
 use crate::closure::channels::range;
 use crate::closure::likelihood::Unusable;
@@ -34,6 +35,9 @@ const ALL_BUT: f64 = 0.02;
 /// Share of the error's range that is nothing.
 const NOTHING: f64 = 1e-4;
 
+/// Slow noise, in units of the white, from which on two names are tried in place of one.
+const SOME: f64 = 0.3;
+
 /// Slow noise, in units of the white, from which on it is said that something is left: a walk of the rate, or a cause that
 /// wanders as one.
 const MUCH: f64 = 3.0;
@@ -53,6 +57,16 @@ struct Due {
     /// Names that the first run took and that did not hold: what they would say beside others leaves something where
     /// it did so there.
     refuted: Vec<String>,
+}
+
+impl Due {
+    fn more_by(&self, net: f64) -> Due {
+        Due {
+            whole: self.whole + net,
+            all_but: self.all_but + net,
+            refuted: self.refuted.clone(),
+        }
+    }
 }
 
 /// How a search begins.
@@ -85,6 +99,7 @@ impl Search<'_> {
             self.kept_stable(&mut found)?;
         }
         self.with_ties(&mut found)?;
+        self.with_thermometers(&mut found);
         let named: Vec<String> = found.terms.iter().map(Term::id).collect();
         for term in &mut found.terms {
             // What is in beside a step is no other name for it.
@@ -109,11 +124,18 @@ impl Search<'_> {
         // Names that leave a wander may be the wrong ones, or not all.
         let wanders = self.wander(&model) > WANDER;
         let clean = first.left.is_none() && !clustered && !wanders;
-        if clean || !first.undecided.is_empty() {
+        if !first.undecided.is_empty() {
             return Ok(first);
         }
         let due = self.due(&first, &model, &reached)?;
         let barred = self.begin(Beginning::default());
+        if let Some(found) = self.as_two(&first, &model, &due)? {
+            return Ok(found);
+        }
+        if clean {
+            self.begin(barred);
+            return Ok(first);
+        }
         let mut others = Vec::new();
         if wanders {
             let given = self.together(&model)?;
@@ -122,12 +144,17 @@ impl Search<'_> {
                 ..Beginning::default()
             }));
         }
-        if first.left.is_some() || clustered || !first.terms.is_empty() {
+        let doubted = first.left.is_some() || clustered;
+        if doubted || !first.terms.is_empty() {
             others.extend(beginnings(&reached.terms, &first));
         }
         for beginning in others {
             self.begin(beginning);
-            if let Some(found) = self.run_again(&first, &due)? {
+            let other = match doubted {
+                true => self.run_again(&first, &due)?,
+                false => self.run_instead(&first, &model, &due)?,
+            };
+            if let Some(found) = other {
                 return Ok(found);
             }
         }
@@ -136,6 +163,40 @@ impl Search<'_> {
             first.left = first.left.or_else(|| Some("time_s".to_owned()));
         }
         Ok(first)
+    }
+
+    /// A run that begins with two slow names in place of all that the first one took, if these leave slow noise and the two are
+    /// clearly worth more: one name may look like the sum of two others.
+    fn as_two(&self, first: &Found, model: &Model, due: &Due) -> Result<Option<Found>, Unusable> {
+        if first.terms.is_empty() || self.wander(model) <= SOME {
+            return Ok(None);
+        }
+        let Some(given) = self.together(&self.model(&[])?)? else {
+            return Ok(None);
+        };
+        let known = |t: &Term| first.terms.iter().any(|f| f.id() == t.id());
+        if given.iter().all(known) {
+            return Ok(None);
+        }
+        self.begin(Beginning {
+            given,
+            ..Beginning::default()
+        });
+        self.run_instead(first, model, &due.more_by(WORTH))
+    }
+
+    /// As [`Search::run_again`], in place of names that leave nothing: no farther from the rows that no estimate used.
+    fn run_instead(
+        &self,
+        first: &Found,
+        model: &Model,
+        due: &Due,
+    ) -> Result<Option<Found>, Unusable> {
+        let Some(found) = self.run_again(first, due)? else {
+            return Ok(None);
+        };
+        let [own, other] = self.heldout_squares([model, &self.model(&found.terms)?]);
+        Ok((other <= own).then_some(found))
     }
 
     /// What another run has to be worth, given the first one, the model of its names and what it came to with all its
@@ -361,6 +422,35 @@ mod tests {
             );
         }
         assert_eq!(of_noisy_squares(4, 0.0), (name(), None));
+    }
+
+    #[test]
+    fn one_name_that_looks_like_the_sum_of_two_gives_its_place_to_them() {
+        let rows = 1600;
+        for seed in 0..3 {
+            let mut random = Random::new(seed);
+            let time_s: Vec<f64> = (0..rows).map(|k| 20.0 * k as f64).collect();
+            let turn = std::f64::consts::TAU / 9000.0;
+            let degc = |t: f64| 30.0 - 44.0 * (turn * t).cos();
+            let output = time_s.iter().map(|t| {
+                let rate = 44.0 * turn * (turn * t).sin();
+                let ageing = 0.1 * (1.0 + t / 3700.0).ln();
+                0.3 - 0.004 * degc(*t) - 0.9 * rate + ageing + 0.0067 * random.normal()
+            });
+            let columns = BTreeMap::from([
+                ("rate_out_dps".to_owned(), output.collect::<Vec<f64>>()),
+                (
+                    "die_degc".to_owned(),
+                    time_s.iter().map(|t| degc(*t)).collect(),
+                ),
+            ]);
+            let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+            let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+            let found = search.run().unwrap();
+            let mut names: Vec<String> = found.terms.iter().map(Term::id).collect();
+            names.sort();
+            assert_eq!(names, ["ageing_drift", "temperature_rate"], "{seed}");
+        }
     }
 
     #[test]

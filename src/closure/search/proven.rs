@@ -54,11 +54,17 @@ impl Search<'_> {
                     model.terms[k] = own;
                     k += 1;
                 }
-                None => {
-                    self.bar(own.id());
-                    model = without;
-                    k = 0;
-                }
+                None => match self.still_a_pair(&model, k)? {
+                    Some(pair) => {
+                        model = pair;
+                        k += 1;
+                    }
+                    None => {
+                        self.bar(own.id());
+                        model = without;
+                        k = 0;
+                    }
+                },
             }
         }
         Ok(model)

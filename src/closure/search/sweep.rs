@@ -1,6 +1,6 @@
 //! After the forward steps: every term again, with the others in.
 
-use super::judge::{EQUAL, Judged, PRICE};
+use super::judge::{EQUAL, Judged, PRICE, Round};
 use super::{MOST_RIVALS, Model, Search, Term};
 use crate::closure::likelihood::Unusable;
 
@@ -30,9 +30,7 @@ impl Search<'_> {
                 }
                 let mut others = model.terms.clone();
                 let own = others.remove(k);
-                let own_spikes = self.spikes(&model.fit);
-                let ag = self.again((&others, k), &own, own_spikes)?;
-                match ag {
+                match self.again((&others, k), &own, &model)? {
                     Some(term) => {
                         changed |= term.id() != own.id();
                         others.insert(k, term);
@@ -116,20 +114,45 @@ impl Search<'_> {
         Ok(Some(self.polished(self.model(&terms)?)?))
     }
 
-    /// What takes a term's place beside the others; `None`: nothing is needed.
+    /// What takes a term's place beside the others in a model; `None`: nothing is needed.
     fn again(
         &self,
         (others, k): (&[Term], usize),
         own: &Term,
-        own_spikes: usize,
+        with: &Model,
     ) -> Result<Option<Term>, Unusable> {
         let without = self.model(others)?;
+        let explains_spikes = self.spikes(&without.fit) > self.spikes(&with.fit) + 1;
+        let place = (others, k);
         let round = self.round(&without, 0);
+        let again = self.again_in(place, own, &round, explains_spikes)?;
+        let stays = again.as_ref().is_some_and(|t| t.id() == own.id());
+        // A threshold is of few rows itself.
+        if stays || own.candidate.is_whole() || own.candidate.is_local() {
+            return Ok(again);
+        }
+        // It may lead where the rows that contradict it are out.
+        let Some(keeping) = self.keeping(others, with)? else {
+            return Ok(again);
+        };
+        let there = self.again_in(place, own, &self.judge(&keeping, 0), false)?;
+        Ok(there.filter(|t| t.id() == own.id()).or(again))
+    }
+
+    /// The same by a round beside the others.
+    fn again_in(
+        &self,
+        (others, k): (&[Term], usize),
+        own: &Term,
+        round: &Round,
+        explains_spikes: bool,
+    ) -> Result<Option<Term>, Unusable> {
         let same = round.judged.iter().find(|j| j.candidate.id() == own.id());
         let kept = |j: &Judged| {
             let mut term = Term::of(j, round.rivals(j));
             term.p_value = own.p_value;
             term.beside.clone_from(&own.beside);
+            term.paired = own.paired;
             if term.id() == own.id() {
                 term.found_at.clone_from(&own.found_at);
             } else {
@@ -147,7 +170,6 @@ impl Search<'_> {
             j.candidate.named() && !self.is_another_channels(&j.candidate.id(), &j.point)
         };
         let best_name = round.judged.iter().find(stays);
-        let explains_spikes = self.spikes(&without.fit) > own_spikes + 1;
         let Some(same) = same else {
             if explains_spikes {
                 // All that it explains is out: there is nothing to judge it by but those rows.

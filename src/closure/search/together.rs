@@ -1,17 +1,25 @@
 //! Two names that explain together what neither explains alone.
 //!
 //! Beside a slow cause that is not in yet, every other slow cause looks like a part of a walk of the rate, and beside a walk
-//! none is beyond chance: with both in, the noise is seen to be fast, and each is beyond chance beside the other.
+//! none is beyond chance: with both in, the noise is seen to be fast, and each is beyond chance beside the other, or both
+//! are as a pair ([`super::pairs`]).
 
 use super::judge::{Judged, PRICE, price};
 use super::reported::WANDER;
 use super::{LEVEL, Model, Search, Term, declared};
+use crate::closure::effects::{Candidate, Point};
 use crate::closure::likelihood::Unusable;
 use crate::closure::likelihood::linear::{Basis, dot};
+use std::sync::Arc;
 
 /// Log-likelihood, less the price, by which two names have to be better than slow noise in their place: the best of
-/// some two hundred pairs (Wilks 1938: four coefficients and a time constant rarely gain ten).
-const WORTH: f64 = 15.0;
+/// some two hundred pairs (Wilks 1938: four coefficients and a time constant rarely gain ten); and by which they have to be if
+/// they are beyond chance as a pair.
+pub(super) const WORTH: f64 = 15.0;
+const AS_A_PAIR: f64 = 10.0;
+
+/// The same by which two names have to be better than one.
+const MORE: f64 = 6.0;
 
 /// Probability, under the slow noise that it replaces, up to which one name more is beyond chance that is worth as much as a pair and
 /// ends the wander which others leave: that noise was found with the name out, and has it in.
@@ -46,39 +54,58 @@ impl Search<'_> {
             }
         }
         let known = model.terms.len();
+        if with.terms.len() == known {
+            return Ok(None);
+        }
+        if self.net(&with) < self.net(model) + WORTH {
+            return Ok(self.as_a_pair(model, with));
+        }
         let ends = known > 0 && with.terms.len() == known + 1 && self.wander(&with) <= WANDER;
         let level = if ends { NEARLY } else { LEVEL };
         let mut terms = with.terms.clone();
         for (k, term) in terms.iter_mut().enumerate().skip(known) {
             let mut others = with.terms.clone();
             let own = others.remove(k);
-            let round = self.round(&self.model(&others)?, self.effort.surrogates);
+            let round = match self.keeping(&others, &with)? {
+                Some(beside) => Arc::new(self.judge(&beside, self.effort.surrogates)),
+                None => self.round(&self.model(&others)?, self.effort.surrogates),
+            };
             let mut judged = round.judged.iter();
             let again = judged.find(|j| j.candidate.id() == own.id() && j.p_value <= level);
-            let Some(again) = again else { return Ok(None) };
+            let Some(again) = again else {
+                return Ok(self.as_a_pair(model, with));
+            };
             *term = Term {
                 point: own.point,
                 beside: others.iter().map(Term::id).collect(),
                 ..Term::of(again, round.rivals(again))
             };
         }
-        Ok((terms.len() > known).then_some(terms))
+        Ok(Some(terms))
     }
 
-    /// The model with the one or two names more that are worth most, if they are worth enough.
+    /// The model with the one or two names more that are worth most, if they are worth enough; two where they are worth
+    /// clearly more than one.
     fn with_more(&self, model: &Model) -> Result<Option<Model>, Unusable> {
-        let mut best: Option<(Model, f64)> = None;
+        let known = self.net(model);
+        let mut of_one: Option<(Model, f64)> = None;
+        let mut of_two: Option<(Model, f64)> = None;
         for added in self.sets(model) {
             let mut terms = model.terms.clone();
             terms.extend(added.iter().map(|j| Term::of(j, Vec::new())));
             let with = self.tried(&terms, 0)?;
-            let net = self.net(&with);
-            if best.as_ref().is_none_or(|b| net > b.1) {
-                best = Some((with, net));
+            let worth = self.net(&with) - known;
+            let best = match added.len() {
+                1 => &mut of_one,
+                _ => &mut of_two,
+            };
+            if best.as_ref().is_none_or(|b| worth > b.1) {
+                *best = Some((with, worth));
             }
         }
-        let due = self.net(model) + WORTH;
-        Ok(best.filter(|(_, net)| *net > due).map(|(with, _)| with))
+        let one = of_one.as_ref().map_or(0.0, |b| b.1);
+        let two = of_two.filter(|(_, worth)| *worth > AS_A_PAIR && *worth > one + MORE);
+        Ok(two.or(of_one.filter(|_| one > WORTH)).map(|b| b.0))
     }
 
     /// The names and pairs of names that leave least of the fitted rows.
@@ -145,10 +172,14 @@ impl Search<'_> {
 
 /// A name with coefficients of its own over the whole record, as slow as noise may be.
 fn is_slow(judged: &Judged) -> bool {
-    let candidate = judged.candidate.as_ref();
+    may_be_slow(judged.candidate.as_ref(), &judged.point)
+}
+
+/// The same of a candidate at a point.
+pub(super) fn may_be_slow(candidate: &dyn Candidate, point: &Point) -> bool {
     let fast = candidate.id() == "periodic_pickup";
     let threshold = candidate.is_local() || candidate.is_whole();
-    candidate.named() && !fast && !threshold && !candidate.is_sized(&judged.point)
+    candidate.named() && !fast && !threshold && !candidate.is_sized(point)
 }
 
 #[cfg(test)]

@@ -131,3 +131,69 @@ fn a_scale_factor_that_is_off_in_one_direction_is_an_asymmetry_alone() {
         assert_eq!(found(columns).0, ["scale_factor_asymmetry"], "{sign}");
     }
 }
+
+#[test]
+fn a_third_order_and_ageing_are_a_pair_where_the_temperature_goes_one_way() {
+    let (rows, noise_dps) = (270, 0.016);
+    let mut found_both = 0;
+    for seed in 0..8 {
+        let mut random = Random::new(400 + seed);
+        // Fast, slowly, fast again.
+        let u: Vec<f64> = (0..rows)
+            .map(|k| 2.0 * k as f64 / rows as f64 - 1.0)
+            .map(|x| 0.35 * x + 0.65 * x.powi(3))
+            .collect();
+        let output = (0..rows).map(|k| {
+            let (u, t) = (u[k], k as f64 / rows as f64);
+            -1.0 + 0.2 * u + 0.1 * u * u - 0.27 * u.powi(3) - 0.48 * t + noise_dps * random.normal()
+        });
+        let columns = BTreeMap::from([
+            ("rate_out_dps".to_owned(), output.collect::<Vec<f64>>()),
+            (
+                "die_degc".to_owned(),
+                u.iter().map(|u| 45.0 + 20.0 * u).collect(),
+            ),
+        ]);
+        let time_s: Vec<f64> = (0..rows).map(|k| 15.0 * k as f64).collect();
+        let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+        let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+        let found = search.run().unwrap();
+        let mut names: Vec<String> = found.terms.iter().map(|t| t.id()).collect();
+        names.sort();
+        found_both += usize::from(names == ["ageing_drift", "bias_third_order"]);
+    }
+    assert!(found_both >= 6, "{found_both}");
+}
+
+#[test]
+fn an_odd_row_at_each_of_two_jumps_hides_no_large_effect() {
+    for seed in 0..3 {
+        let mut random = Random::new(500 + seed);
+        let degc = degc();
+        let at = |k: usize| [1.0f64, -3.1, 2.2, 0.4, -1.9, 3.4][k / 30 % 6];
+        let quadrature: Vec<f64> = walk(&mut random).iter().map(|w| 20.0 + 3.0 * w).collect();
+        // Two readings of the acceleration are means over a jump, of which the output is no function.
+        let mean = |k: usize| [89, 299].contains(&k);
+        let accel = |k: usize| match mean(k) {
+            true => 0.5 * (at(k) + at(k + 1)),
+            false => at(k),
+        };
+        let output = (0..ROWS).map(|k| {
+            let square = 0.5 * (at(k).powi(2) + at(k + usize::from(mean(k))).powi(2));
+            let drift = 1.5e-4 * (degc[k] - 35.0) * quadrature[k];
+            0.3 - 0.01 * degc[k] - 0.0137 * square + drift + 0.006 * random.normal()
+        });
+        let (names, left) = found(vec![
+            ("rate_out_dps", output.collect()),
+            ("die_degc", degc.clone()),
+            ("accel_g", (0..ROWS).map(accel).collect()),
+            ("quad_dps", quadrature.clone()),
+        ]);
+        assert_eq!(
+            names,
+            ["demod_phase_drift", "g_squared_sensitivity"],
+            "{seed}"
+        );
+        assert_eq!(left, None, "{seed}");
+    }
+}
