@@ -194,3 +194,33 @@ fn a_noise_makes_its_own_whitener() {
     assert!((back.walk_dps_rts - 0.3).abs() < 1e-12);
     assert!(Stream::new(1, 2).uniform(3) != Stream::new(1, 3).uniform(3));
 }
+
+/// Weights of the rows at two jumps of a sawtooth whose readings are means over the jump; the signal follows its square.
+fn at_jumps(seed: u64, options: &Options<'_>) -> [f64; 2] {
+    let (n, period, odd) = (360, 81, [80, 323]);
+    let level = |k: usize| 6.6 * (k % period) as f64 / period as f64 - 3.2;
+    let both = |k: usize| [level(k), level(k + usize::from(odd.contains(&k)))];
+    let white = noise(seed, n, 0.006, 0.0, 0.0);
+    let y: Vec<f64> = (0..n)
+        .map(|k| {
+            let missing = 0.01 * (k as f64 / 28.0).sin();
+            let [before, after] = both(k).map(|a| a * a);
+            -0.0137 * (0.25 * before + 0.75 * after) + missing + white[k]
+        })
+        .collect();
+    let squared = |k: usize| {
+        let [before, after] = both(k);
+        (0.25 * before + 0.75 * after).powi(2)
+    };
+    let times: Vec<f64> = (0..n).map(|k| k as f64).collect();
+    let columns = vec![vec![1.0; n], (0..n).map(squared).collect()];
+    let fit = reml::fit(&times, &y, &columns, &vec![true; n], options).unwrap();
+    odd.map(|k| fit.row_weights[k])
+}
+
+#[test]
+fn an_odd_row_at_a_jump_is_a_spike_and_no_step_of_a_walk() {
+    for seed in 0..6 {
+        assert_eq!(at_jumps(seed, &Options::default()), [0.0; 2], "{seed}");
+    }
+}

@@ -170,16 +170,17 @@ fn an_odd_row_at_each_of_two_jumps_hides_no_large_effect() {
     for seed in 0..3 {
         let mut random = Random::new(500 + seed);
         let degc = degc();
-        let at = |k: usize| [1.0f64, -3.1, 2.2, 0.4, -1.9, 3.4][k / 30 % 6];
+        let at = |k: usize| 6.6 * (k % 81) as f64 / 81.0 - 3.2;
         let quadrature: Vec<f64> = walk(&mut random).iter().map(|w| 20.0 + 3.0 * w).collect();
         // Two readings of the acceleration are means over a jump, of which the output is no function.
-        let mean = |k: usize| [89, 299].contains(&k);
+        let mean = |k: usize| [80, 323].contains(&k);
         let accel = |k: usize| match mean(k) {
-            true => 0.5 * (at(k) + at(k + 1)),
+            true => 0.25 * at(k) + 0.75 * at(k + 1),
             false => at(k),
         };
         let output = (0..ROWS).map(|k| {
-            let square = 0.5 * (at(k).powi(2) + at(k + usize::from(mean(k))).powi(2));
+            let after = at(k + usize::from(mean(k)));
+            let square = 0.25 * at(k) * at(k) + 0.75 * after * after;
             let drift = 1.5e-4 * (degc[k] - 35.0) * quadrature[k];
             0.3 - 0.01 * degc[k] - 0.0137 * square + drift + 0.006 * random.normal()
         });
