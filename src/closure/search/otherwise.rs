@@ -60,6 +60,7 @@ struct Due {
 }
 
 impl Due {
+    /// The same and so much net log-likelihood more.
     fn more_by(&self, net: f64) -> Due {
         Due {
             whole: self.whole + net,
@@ -185,7 +186,7 @@ impl Search<'_> {
         self.run_instead(first, model, &due.more_by(WORTH))
     }
 
-    /// As [`Search::run_again`], in place of names that leave nothing: no farther from the rows that no estimate used.
+    /// As [`Search::run_again`], in place of names whose model is given: no farther from the rows that no estimate used.
     fn run_instead(
         &self,
         first: &Found,
@@ -196,7 +197,11 @@ impl Search<'_> {
             return Ok(None);
         };
         let [own, other] = self.heldout_squares([model, &self.model(&found.terms)?]);
-        Ok((other <= own).then_some(found))
+        if other > own {
+            self.begin(Beginning::default());
+            return Ok(None);
+        }
+        Ok(Some(found))
     }
 
     /// What another run has to be worth, given the first one, the model of its names and what it came to with all its
