@@ -4,7 +4,7 @@
 //! each shape is there once for readings of a rate that stands still and once for means over one that moves.
 
 use super::rate::{rate_alone, top};
-use super::within::Within;
+use super::within_rows::Within;
 use super::{
     Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, entry, from_log, map,
     spaced,
@@ -16,11 +16,12 @@ use crate::record::stats;
 /// Dead zone around rate zero.
 pub(super) struct Deadband;
 
-/// Whether what is beyond the zone comes through less the zone, and whether readings are means over a rate that moves.
+/// Whether what is beyond the zone comes through less the zone.
 fn subtracts(point: &Point) -> bool {
     point.form % 2 == 1
 }
 
+/// Whether readings are means over a rate that moves.
 fn is_mean(point: &Point) -> bool {
     point.form >= 2
 }
@@ -172,3 +173,7 @@ impl Candidate for Deadband {
         .collect()
     }
 }
+
+#[cfg(test)]
+#[path = "deadband_tests.rs"]
+mod tests;

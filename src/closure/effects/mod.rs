@@ -21,7 +21,7 @@ pub mod structure;
 pub mod time;
 pub mod tone;
 pub mod user;
-mod within;
+mod within_rows;
 
 use super::channels::Channels;
 use super::firmware::Words;

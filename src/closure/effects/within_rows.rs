@@ -11,7 +11,7 @@ const APART: f64 = 1.5;
 const OFTEN: f64 = 0.5;
 const MUCH: f64 = 1e-3;
 
-/// Share of the greatest rate within which the mean of a function is its value.
+/// Share of the rates by which they may differ for the mean of a function over them to be its value.
 const STILL: f64 = 1e-9;
 
 /// The applied rate, deg/s, of each row at its beginning, its middle and its end: half way to its neighbours.
