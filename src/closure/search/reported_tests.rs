@@ -195,3 +195,35 @@ fn of_few_rows_that_a_name_explains_what_is_left_is_no_slow_noise() {
         assert_eq!(names, ["scale_factor_nonlinearity"], "{rows}, {noise_dps}");
     }
 }
+
+#[test]
+fn a_lag_that_only_the_first_hour_tells_from_a_rate_keeps_its_name_beside_slow_noise() {
+    let (rows, tau_s, turn) = (2000, 300.0, std::f64::consts::TAU / 7000.0);
+    for seed in 0..3 {
+        let mut random = Random::new(seed);
+        let time_s: Vec<f64> = (0..rows).map(|k| 10.0 * k as f64).collect();
+        let degc: Vec<f64> = time_s
+            .iter()
+            .map(|t| 25.0 + 30.0 * (turn * t).sin())
+            .collect();
+        let (mut lagging, mut walk) = (25.0, 0.0);
+        let output = time_s.iter().zip(&degc).map(|(t, degc)| {
+            lagging += (degc - lagging) * (1.0 - f64::exp(-10.0 / tau_s));
+            walk += 0.0005 * random.normal();
+            let ageing = 0.05 * (t / 3000.0).ln_1p();
+            0.3 - 0.01 * degc + 0.01 * (lagging - degc) + ageing + walk + 0.01 * random.normal()
+        });
+        let columns = BTreeMap::from([
+            ("rate_out_dps".to_owned(), output.collect::<Vec<f64>>()),
+            ("die_degc".to_owned(), degc.clone()),
+        ]);
+        let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+        let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+        let found = search.run().unwrap();
+        let names: Vec<String> = found.terms.iter().map(Term::id).collect();
+        assert!(
+            names.contains(&"thermal_lag".to_owned()),
+            "{seed}: {names:?}"
+        );
+    }
+}
