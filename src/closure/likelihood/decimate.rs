@@ -97,11 +97,15 @@ pub fn decimate(
         rows,
     };
     let residual = plain_residual(plain, &blocks.weights);
+    // The median of a large block is not one of the rows of an accident.
+    if robust && rows < WIDE {
+        without_runs(&residual, &mut blocks.weights);
+    }
     // What the scale is of, and what is far.
     let (usual, deviations) = match rows {
-        0..FEWEST => from_neighbours(&residual, &blocks.weights),
+        0..FEWEST => from_neighbours(&residual, &blocks.weights, FEWEST),
         _ => {
-            let (_, apart) = from_neighbours(&residual, &blocks.weights);
+            let (_, apart) = from_neighbours(&residual, &blocks.weights, FEWEST);
             let deviations = from_block_medians(&residual, &blocks, apart);
             (deviations.clone(), deviations)
         }
@@ -157,9 +161,28 @@ fn plain_residual(plain: &Problem, weights: &[f64]) -> Vec<f64> {
 /// Fewest rows that have a median of which one may be far.
 const FEWEST: usize = 3;
 
-/// How far each row is from the median of the rows before it, and from that and the median of the rows after it: the
+/// Rows of which one accident spoils less than half.
+const WIDE: usize = 2 * robust::LONGEST + 1;
+
+/// No weight for rows that are far from what is before and behind them, several in a row, where these are accidents.
+fn without_runs(residual: &[f64], weights: &mut [f64]) {
+    let used = |w: &f64| *w > 0.0;
+    let (usual, apart) = from_neighbours(residual, weights, WIDE);
+    let rows = usual.iter().zip(weights.iter()).filter(|(_, w)| used(w));
+    let unit = robust::scale(rows.map(|(d, _)| *d));
+    let far = |d: &f64| unit > 0.0 && robust::weight(d.abs() / unit) == 0.0;
+    let rows = apart.iter().zip(weights.iter()).filter(|(_, w)| used(w));
+    let marked: Vec<bool> = rows.map(|(d, _)| far(d)).collect();
+    if robust::are_accidents(&marked) {
+        for (w, d) in weights.iter_mut().zip(&apart) {
+            *w *= f64::from(u8::from(!far(d)));
+        }
+    }
+}
+
+/// How far each row is from the median of a few rows before it, and from that and the median of those after it: the
 /// lesser of the two, or nothing where they are to both sides. The rows at a step are like those on one of its sides.
-fn from_neighbours(residual: &[f64], weights: &[f64]) -> (Vec<f64>, Vec<f64>) {
+fn from_neighbours(residual: &[f64], weights: &[f64], few: usize) -> (Vec<f64>, Vec<f64>) {
     let used: Vec<usize> = (0..residual.len()).filter(|i| weights[*i] > 0.0).collect();
     let median = |rows: &[usize]| {
         let mut near: Vec<f64> = rows.iter().map(|i| residual[*i]).collect();
@@ -168,8 +191,8 @@ fn from_neighbours(residual: &[f64], weights: &[f64]) -> (Vec<f64>, Vec<f64>) {
     };
     let (mut one_sided, mut apart) = (vec![0.0; residual.len()], vec![0.0; residual.len()]);
     for (k, row) in used.iter().enumerate() {
-        let before = median(&used[k.saturating_sub(FEWEST)..k]);
-        let after = median(&used[k + 1..(k + 1 + FEWEST).min(used.len())]);
+        let before = median(&used[k.saturating_sub(few)..k]);
+        let after = median(&used[k + 1..(k + 1 + few).min(used.len())]);
         let (Some(before), Some(after)) = (before.or(after), after.or(before)) else {
             continue;
         };

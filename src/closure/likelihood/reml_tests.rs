@@ -224,3 +224,73 @@ fn an_odd_row_at_a_jump_is_a_spike_and_no_step_of_a_walk() {
         assert_eq!(at_jumps(seed, &Options::default()), [0.0; 2], "{seed}");
     }
 }
+
+/// Rows that shocks spoil, a few in a row each, far and unlike each other.
+fn shocked(y: &mut [f64]) -> Vec<usize> {
+    let runs = [
+        (31, 6, 70.0),
+        (140, 4, -40.0),
+        (333, 2, 300.0),
+        (405, 6, -200.0),
+    ];
+    let mut rows = Vec::new();
+    for (from, count, size) in runs {
+        for k in 0..count {
+            y[from + k] += size * (1.0 + 0.3 * (7.0 * k as f64).sin());
+            rows.push(from + k);
+        }
+    }
+    rows
+}
+
+#[test]
+fn rows_that_shocks_spoil_are_no_steps_of_a_walk() {
+    // Rows by themselves, in pairs, and in fours.
+    for rows in [600, 300, 150] {
+        for seed in 0..4 {
+            let mut simulated = record(seed, 600, (1.0, 0.0, 0.0));
+            let spoilt = shocked(&mut simulated.y);
+            let options = Options {
+                rows,
+                ..Options::default()
+            };
+            let fit = fit(&simulated, &options);
+            let weights = &fit.row_weights;
+            assert!(
+                spoilt.iter().all(|row| weights[*row] == 0.0),
+                "{rows} {seed}"
+            );
+            let out = weights.iter().filter(|w| **w < 0.5).count();
+            assert!(out <= spoilt.len() + 2, "{rows} {seed}: {out}");
+            let noise = &fit.noise;
+            assert!(
+                (0.85..1.15).contains(&noise.white_rms_dps),
+                "{rows} {seed}: {noise:?}"
+            );
+            // Over the whole record, less than the noise of a row.
+            assert!(
+                noise.walk_dps_rts * 600f64.sqrt() < 1.0,
+                "{rows} {seed}: {noise:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn what_comes_often_is_no_shock() {
+    // In blocks; by themselves, rows that are off by so much are tested under the memory that they make.
+    for rows in [300, 150] {
+        let mut often = record(5, 600, (1.0, 0.0, 0.0));
+        let on = |k: &usize| k % 30 < 5;
+        for k in (0..600).filter(on) {
+            often.y[k] += 60.0;
+        }
+        let options = Options {
+            rows,
+            ..Options::default()
+        };
+        let weights = fit(&often, &options).row_weights;
+        let kept = (0..600).filter(on).filter(|k| weights[*k] >= 0.5).count();
+        assert!(kept > 50, "{rows}: {kept}");
+    }
+}

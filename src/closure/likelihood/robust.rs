@@ -16,10 +16,13 @@ pub const SPIKE: (f64, f64) = (4.0, 8.0);
 /// happens once in a hundred rows.
 pub const ACCIDENT: f64 = 8.0;
 
-/// Passes of [`beside_white`]; most spikes of a short record, and of how many rows one may be a spike.
+/// Passes of [`beside_white`].
 const PASSES: usize = 3;
+
+/// Most accidents of a short record, and of how many rows one may begin; most rows that one spoils.
 const FEW: usize = 2;
-const RARELY: usize = 100;
+const RARELY: usize = 50;
+pub const LONGEST: usize = 8;
 
 /// The weight of a row `deviation` robust standard deviations off: 1, falling linearly to 0.
 pub fn weight(deviation: f64) -> f64 {
@@ -81,8 +84,7 @@ pub fn weights(plain: &Problem, weighted: &Problem, at: &Evaluated) -> Vec<f64> 
         .collect()
 }
 
-/// Weights beside white noise, if there are few spikes then, each by itself: more of them may be what a cause does now and
-/// then.
+/// Weights beside white noise, if the spikes then are accidents: more of them may be what a cause does now and then.
 pub fn beside_white(plain: &Problem) -> Option<Vec<f64>> {
     let mut weighted = plain.clone();
     let mut own = vec![1.0; plain.y.len()];
@@ -97,10 +99,15 @@ pub fn beside_white(plain: &Problem) -> Option<Vec<f64>> {
         .filter(|(_, factor)| factor.is_finite())
         .map(|(w, _)| *w < 0.5)
         .collect();
-    let count = spikes.iter().filter(|s| **s).count();
-    let few = count <= (spikes.len() / RARELY).max(FEW);
-    let alone = spikes.windows(2).all(|pair| !(pair[0] && pair[1]));
-    (count > 0 && few && alone).then_some(own)
+    (spikes.contains(&true) && are_accidents(&spikes)).then_some(own)
+}
+
+/// Whether marked rows are accidents: a shock or a lost word spoils a row or a few in a row, once in a while.
+pub fn are_accidents(marked: &[bool]) -> bool {
+    let runs = marked.chunk_by(|a, b| a == b).filter(|run| run[0]);
+    let lengths: Vec<usize> = runs.map(<[bool]>::len).collect();
+    let few = lengths.len() <= (marked.len() / RARELY).max(FEW);
+    few && lengths.iter().all(|rows| *rows <= LONGEST)
 }
 
 /// White variance factors for weights; rows of weight 0 are not used.
@@ -110,4 +117,29 @@ pub fn factors(plain: &[f64], weights: &[f64]) -> Vec<f64> {
         .zip(weights)
         .map(|(f, w)| if *w > 0.0 { f / w } else { f64::INFINITY })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn few_short_runs_are_accidents() {
+        let marked = |runs: &[(usize, usize)]| {
+            let mut out = vec![false; 300];
+            for (from, rows) in runs {
+                out[*from..from + rows].fill(true);
+            }
+            are_accidents(&out)
+        };
+        assert!(marked(&[]));
+        assert!(marked(&[(0, 8), (100, 1), (102, 3), (292, 8)]));
+        // Nine in a row are a cause, and so is what comes again and again.
+        assert!(!marked(&[(40, 9)]));
+        let often: Vec<(usize, usize)> = (0..7).map(|k| (40 * k, 1)).collect();
+        assert!(marked(&often[..6]) && !marked(&often));
+        // Two in a record of few rows.
+        assert!(are_accidents(&[true, false, true, false]));
+        assert!(!are_accidents(&[true, false, true, false, true]));
+    }
 }

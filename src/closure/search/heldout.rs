@@ -4,6 +4,7 @@ use super::otherwise::stand_together;
 use super::{Model, Search};
 use crate::closure::likelihood::noise::Timeline;
 use crate::closure::likelihood::reml::whitener_of;
+use crate::closure::likelihood::robust::are_accidents;
 use crate::record::stats;
 
 /// Most that one row's innovation counts.
@@ -36,14 +37,14 @@ impl Search<'_> {
         })
     }
 
-    /// Rows, fitted or held out, that are accidents to all models that are compared: few, each by itself, and far off. One
-    /// of them may outweigh whatever the models differ by, so that errors are of the other rows.
+    /// Rows, fitted or held out, that are accidents to all models that are compared: few, far off, and each by itself or with a
+    /// few neighbours. One of them may outweigh whatever the models differ by, so that errors are of the other rows.
     pub fn accidents<const N: usize>(&self, models: [&Model; N]) -> Vec<bool> {
         let far = self.far(models);
         let rows: Vec<usize> = self.judged_rows().collect();
         let in_order: Vec<bool> = rows.iter().map(|row| far[*row]).collect();
         let few = rows.len() >= LEAST && !is_riddled(&in_order);
-        if few && !stand_together(&in_order) {
+        if few && (!stand_together(&in_order) || are_accidents(&in_order)) {
             return far;
         }
         vec![false; far.len()]
