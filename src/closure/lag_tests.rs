@@ -210,3 +210,52 @@ fn firmware_that_leaves_more_than_the_model_says_so() {
     let lag = closed([0.0, -2.0, 0.0], &[]);
     assert!(firmware_over_float(&lag) < 1.02 && !said(&lag));
 }
+
+/// What a lag that was so far behind, degC, at the first row, or after a gap of 40 rows, is called.
+fn names_of_a_lag_behind(first_degc: f64, after_gap_degc: f64) -> (Vec<String>, f64) {
+    let (gap, gain) = (250..290, 0.004);
+    let mut random = Random::new(3);
+    let degc: Vec<f64> = [triangle(ROWS / 4), triangle(ROWS / 4)].concat().repeat(2);
+    let time_s: Vec<f64> = (0..ROWS).map(|k| k as f64).collect();
+    let late = lag(&time_s, &degc, TAU_S);
+    let gone = |behind_degc: f64, since: usize, k: usize| match k >= since {
+        true => behind_degc * (-((k - since) as f64) / TAU_S).exp(),
+        false => 0.0,
+    };
+    let output: Vec<f64> = (0..ROWS)
+        .map(|k| {
+            let behind =
+                degc[k] - late[k] + gone(first_degc, 0, k) + gone(after_gap_degc, gap.end, k);
+            at(BIAS, degc[k]) + gain * behind + 0.01 * random.normal()
+        })
+        .collect();
+    let mut record = synthetic::record("die_degc", &degc, &output);
+    let kept = |column: &Vec<f64>| {
+        let rows = (0..ROWS).filter(|k| !gap.contains(k));
+        rows.map(|k| column[k]).collect()
+    };
+    record.time_s = kept(&record.time_s);
+    for column in record.columns.values_mut() {
+        *column = kept(column);
+    }
+    let design = reader::read(None).unwrap();
+    let closed = close(&record, Vec::new(), &design, "test", Effort::default()).unwrap();
+    let steps = closed.closure.steps.iter();
+    let names = steps.map(|s| s.effect.clone()).collect();
+    (names, closed.closure.steps[0].parameters["tau_s"])
+}
+
+#[test]
+fn how_far_a_lag_was_behind_before_the_record_or_a_gap_is_no_other_name() {
+    for (first_degc, after_gap_degc) in [(25.0, 0.0), (0.0, -20.0), (-20.0, 15.0)] {
+        let (names, tau_s) = names_of_a_lag_behind(first_degc, after_gap_degc);
+        assert_eq!(names, ["thermal_lag"], "{first_degc} {after_gap_degc}");
+        assert!(
+            (tau_s / TAU_S - 1.0).abs() < 0.15,
+            "{first_degc} {after_gap_degc}: {tau_s}"
+        );
+    }
+    // Farther behind than the thermometer goes, no lag is: that is a warm-up.
+    let (names, _) = names_of_a_lag_behind(400.0, 0.0);
+    assert!(names.contains(&"warmup_transient".to_owned()), "{names:?}");
+}

@@ -163,7 +163,7 @@ impl Candidate for Damping {
         true
     }
 
-    fn admits(&self, point: &Point, beta: &[f64]) -> bool {
+    fn admits(&self, _c: &Channels, point: &Point, beta: &[f64]) -> bool {
         // Less Q bends the phase one way; where the resonance is free as well, by what physics says.
         let (least, most) = match point.theta.is_empty() {
             true => (0.0, f64::INFINITY),
@@ -322,7 +322,7 @@ impl Candidate for Coupling {
         true
     }
 
-    fn admits(&self, point: &Point, beta: &[f64]) -> bool {
+    fn admits(&self, _c: &Channels, point: &Point, beta: &[f64]) -> bool {
         // Beside a bias that hardly moves, a small pull would have to be a huge one.
         let small = beta.first().filter(|_| point.theta.is_empty());
         small.is_none_or(|pull_u| pull_u.abs() <= MOST_PULL_U)

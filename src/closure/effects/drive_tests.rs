@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 
 #[test]
 fn less_q_does_not_bend_the_phase_back() {
+    let c = Pull::default().made().channels;
     for (form, beta, admitted) in [
         (0, vec![-3.0], true),
         (0, vec![1500.0], false),
@@ -17,7 +18,7 @@ fn less_q_does_not_bend_the_phase_back() {
         (2, vec![3.0, -0.9], false),
     ] {
         assert_eq!(
-            Damping.admits(&Point::form(form), &beta),
+            Damping.admits(&c, &Point::form(form), &beta),
             admitted,
             "{form}"
         );
@@ -25,7 +26,7 @@ fn less_q_does_not_bend_the_phase_back() {
     // Beside a resonance of its own, a share of nearly two is another effect.
     for (form, beta, admitted) in [(1, vec![0.9], true), (2, vec![3.0, 1.8], false)] {
         let free = Point::at(form, &[0.2]);
-        assert_eq!(Damping.admits(&free, &beta), admitted, "{form}");
+        assert_eq!(Damping.admits(&c, &free, &beta), admitted, "{form}");
     }
 }
 
@@ -192,8 +193,9 @@ fn a_small_pull_is_the_only_name() {
 #[test]
 fn a_small_pull_of_a_million_radians_is_none() {
     let coupling = Coupling { pulls: Vec::new() };
-    assert!(coupling.admits(&Point::form(0), &[30.0]));
-    assert!(!coupling.admits(&Point::form(1), &[-3e6]));
+    let c = Pull::default().made().channels;
+    assert!(coupling.admits(&c, &Point::form(0), &[30.0]));
+    assert!(!coupling.admits(&c, &Point::form(1), &[-3e6]));
     // A large one has its size in its shape.
-    assert!(coupling.admits(&Point::at(0, &[0.4]), &[1.0]));
+    assert!(coupling.admits(&c, &Point::at(0, &[0.4]), &[1.0]));
 }

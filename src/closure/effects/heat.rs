@@ -67,14 +67,15 @@ impl Candidate for ThermalLag {
         let fastest = 2.0 * shortest_s(c);
         let slowest = (c.span_s() / 2.5).max(2.0 * fastest);
         let taus = spaced(fastest, slowest, 18);
-        let forms = if c.span_s() > 0.0 {
-            2 * c.histories()
-        } else {
-            0
-        };
-        (0..forms)
-            .flat_map(|form| taus.iter().map(move |t| Point::at(form, &[t.ln()])))
-            .collect()
+        let histories = if c.span_s() > 0.0 { c.histories() } else { 0 };
+        let every = |form| taus.iter().map(move |t| Point::at(form, &[t.ln()]));
+        (0..2 * histories).flat_map(every).collect()
+    }
+
+    fn fine(&self, c: &Channels, point: &Point, _seen: &[bool]) -> Vec<Point> {
+        // What was before a beginning is asked where a lag is seen without that.
+        let others = (0..3 * c.histories()).filter(|form| *form != point.form);
+        others.map(|form| Point::at(form, &point.theta)).collect()
     }
 
     fn columns(&self, c: &Channels, _bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
@@ -87,7 +88,22 @@ impl Candidate for ThermalLag {
         match Lagging::of(c, point) {
             Lagging::Linear => vec![behind(1)],
             Lagging::Curved => vec![behind(1), behind(2)],
+            Lagging::Begun => {
+                let mut columns = vec![behind(1)];
+                columns.extend(beginnings(c, tau_s(c, point)));
+                columns
+            }
         }
+    }
+
+    fn admits(&self, c: &Channels, point: &Point, beta: &[f64]) -> bool {
+        let Some((gain, behind)) = beta
+            .split_first()
+            .filter(|_| Lagging::of(c, point) == Lagging::Begun)
+        else {
+            return true;
+        };
+        behind.iter().all(|b| b.abs() <= MOST_BEHIND_U * gain.abs())
     }
 
     fn spacing(&self, c: &Channels, _point: &Point) -> Vec<f64> {
@@ -129,7 +145,11 @@ impl Candidate for ThermalLag {
             tau_s,
             kept,
         };
-        let columns = self.columns(c, &f.bias, &e.point);
+        let mut columns = self.columns(c, &f.bias, &e.point);
+        if lagging == Lagging::Begun {
+            // What was before a beginning, firmware does not know either.
+            columns.truncate(1);
+        }
         // A curve of a lagging tangent is neither of the last two: what comes nearest is taken.
         let terms: &[&LagTerm<'_>] = match (tangent, lagging) {
             (_, Lagging::Curved) => &[&curve_of_late, &late_curve],
@@ -182,15 +202,43 @@ enum Lagging {
     Linear,
     /// One with a curve of its own.
     Curved,
+    /// One that is linear, of which nobody knows how far it was behind when the record began, or went on after a gap.
+    Begun,
 }
 
 impl Lagging {
     fn of(c: &Channels, point: &Point) -> Self {
         match point.form / c.histories() {
             0 => Lagging::Linear,
-            _ => Lagging::Curved,
+            1 => Lagging::Curved,
+            _ => Lagging::Begun,
         }
     }
+}
+
+/// Rows without which a course of temperature is not known, most beginnings of a lag that are asked for, and how far it may be
+/// behind there: as far as the thermometer goes.
+const LOST: f64 = 3.5;
+const MOST_BEGINNINGS: usize = 4;
+const MOST_BEHIND_U: f64 = 2.0;
+
+/// What is left of a lag that was one behind at a beginning of the record: at its first row, and after its longest gaps.
+fn beginnings(c: &Channels, tau_s: f64) -> Vec<Vec<f64>> {
+    let gap_s = |row: &usize| c.time_s[*row] - c.time_s[row - 1];
+    let mut after: Vec<usize> = (1..c.len())
+        .filter(|row| gap_s(row) > LOST * c.period_s())
+        .collect();
+    after.sort_by(|a, b| gap_s(b).total_cmp(&gap_s(a)));
+    after.truncate(MOST_BEGINNINGS - 1);
+    let rows = std::iter::once(0).chain(after);
+    rows.map(|row| {
+        let begun_s = c.time_s.get(row).copied().unwrap_or(0.0);
+        map(&c.time_s, |t| match t >= begun_s {
+            true => (-(t - begun_s) / tau_s).exp(),
+            false => 0.0,
+        })
+    })
+    .collect()
 }
 
 /// Shortest time constant of a lag, s: of a shorter one a row sees no more than that it comes after the rate of change.

@@ -259,7 +259,7 @@ pub trait Candidate: Send + Sync {
     }
 
     /// False for coefficients that physics excludes, however well they fit.
-    fn admits(&self, _point: &Point, _beta: &[f64]) -> bool {
+    fn admits(&self, _c: &Channels, _point: &Point, _beta: &[f64]) -> bool {
         true
     }
 

@@ -65,7 +65,7 @@ impl Model {
         let from = declared(c).len() + before;
         let term = &self.terms[k];
         let own = &self.beta[from..from + count(term)];
-        term.candidate.admits(&term.point, own)
+        term.candidate.admits(c, &term.point, own)
     }
 
     /// What each term adds, deg/s, every row.

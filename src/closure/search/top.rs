@@ -135,7 +135,7 @@ impl Search<'_> {
         let beside = |point: &Point| {
             let settled = settling.beside(candidate, point, start);
             let paid = PRICE * settled.own.len() as f64 + price(candidate, c, point);
-            let admitted = candidate.admits(point, &settled.own);
+            let admitted = candidate.admits(self.channels, point, &settled.own);
             let columns = (settled.columns, candidate.is_sized(point));
             admitted.then_some((columns, paid))
         };
