@@ -94,7 +94,7 @@ impl Search<'_> {
             let most = if evident { EVIDENT } else { ABOVE };
             let [of_before, of_after] = self.heldout_squares([&before, &model]);
             let above = of_after > most.powi(2) * of_before;
-            let beside = found.left.is_some() && !sure && !evident;
+            let beside = found.left.is_some() && !sure && !evident && !outweigh(found);
             let little = beside && of_after > BESIDE.powi(2) * of_before;
             if !above && !little {
                 break;
@@ -153,6 +153,12 @@ impl Search<'_> {
         found.left = found.left.take().or_else(|| self.channel(&term));
         term
     }
+}
+
+/// Whether each of the names explains more than all that is known of what is left.
+fn outweigh(found: &Found) -> bool {
+    let strange: f64 = found.strangers.iter().map(|t| t.gain).sum();
+    strange > 0.0 && found.terms.iter().all(|t| t.gain > strange)
 }
 
 #[cfg(test)]

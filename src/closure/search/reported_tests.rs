@@ -163,6 +163,38 @@ fn beside_something_larger_names_have_to_explain_a_good_part() {
 }
 
 #[test]
+fn names_that_outweigh_what_is_known_of_the_rest_need_not_explain_most() {
+    // Beside a wander of ten times what they explain, and a shape without a name that gains less than each, or more.
+    for (strange, names) in [(28.0, 2), (60.0, 0)] {
+        let bump = |k: usize| 60.0 * (-((k as f64 - 140.0) / 60.0).powi(2)).exp();
+        let c = disturbed(|_| 4.0, 5.0, bump);
+        let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+        let term = |id: &str, p_value: f64, gain: f64| {
+            let candidate = search.candidates().iter().find(|c| c.id() == id).unwrap();
+            let point = candidate.points(&c).remove(0);
+            Term {
+                p_value,
+                gain,
+                ..Term::new(candidate.clone(), point)
+            }
+        };
+        let stranger = term("outside:curve", 1e-9, strange);
+        let mut found = Found {
+            terms: BOTH.map(|id| term(id, 1e-15, 47.0)).to_vec(),
+            strangers: vec![stranger],
+            left: Some("time_s".to_owned()),
+            first: Vec::new(),
+            missing: Vec::new(),
+            undecided: Vec::new(),
+            within_rounding: Vec::new(),
+            once: Vec::new(),
+        };
+        search.kept_below(&mut found).unwrap();
+        assert_eq!(found.terms.len(), names, "{strange}");
+    }
+}
+
+#[test]
 fn names_that_predict_worse_than_none_are_dropped() {
     // Its gain has the other sign in the rows that are held out.
     let c = channels(|_| 4.0, 5.0);
