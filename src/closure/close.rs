@@ -157,7 +157,7 @@ pub fn close(
     Ok(closed)
 }
 
-/// The rows that errors are of, and those that stand out alone.
+/// The rows that errors are of, and those that stand out, alone or a few in a row.
 struct JudgedRows {
     train: Vec<bool>,
     heldout: Vec<bool>,

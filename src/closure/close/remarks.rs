@@ -67,8 +67,8 @@ impl Told<'_> {
             "outliers",
             "rate_out_dps",
             format!(
-                "{} of {} rows ({} held out) stand out alone by more than six deviations, whatever the model: they are not in \
-                 the errors; the farthest, at {} s, is off by {:.3e} deg/s",
+                "{} of {} rows ({} held out) stand out by more than six deviations, whatever the model, alone or a few in a \
+                 row: they are not in the errors; the farthest, at {} s, is off by {:.3e} deg/s",
                 rows.len(),
                 residual.len(),
                 held,

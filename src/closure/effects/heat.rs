@@ -27,7 +27,8 @@ const THERMAL_LAG: Sheet = Sheet {
     id: "thermal_lag",
     physics: "part of the bias (electronics, package) follows a temperature that lags the \
               structure's: a loop between heating and cooling that closes in dwells",
-    equation: "k (T - T_l), or k (T - T_l) + q (T^2 - T_l^2), T from the middle; tau dT_l/dt = T - T_l",
+    equation: "k (T - T_l), or k (T - T_l) + q (T^2 - T_l^2), T from the middle; tau dT_l/dt = T - T_l, \
+               T_l as T or free at the first row and after gaps",
     parameters: &[
         Parameter {
             name: "gain_dps_per_k",
