@@ -21,6 +21,10 @@ const ABSENT: f64 = 0.02;
 const WIDEST: i64 = 1 << 20;
 /// Noise from which on the histogram is smoothed as a whole, codes.
 const WIDE: f64 = 1.5;
+/// Share of the noise's variance from which on a wander moves the rows of a phase together.
+const WANDERS: f64 = 0.1;
+/// The same share that the noise's own estimate may be off by.
+const OFF: f64 = 0.05;
 /// Noise below which rows of one phase have one code, codes.
 const NARROW: f64 = 0.3;
 
@@ -60,8 +64,10 @@ impl Counts {
         if !(8..WIDEST).contains(&range) {
             return None;
         }
-        let sigma2 = model.variance.base[channel] - 1.0 / 12.0;
-        let sigma = sigma2.max(0.0025).sqrt();
+        let noise2 = (model.variance.base[channel] - 1.0 / 12.0).max(0.0025);
+        // A slow wander spreads the codes as noise does, but keeps the rows of a phase together.
+        let wander2 = wander(capture, model, channel);
+        let sigma = (noise2 + wander2).sqrt();
         let pad = (4.0 * sigma).min(1e5) as i64 + 4;
         let first = i64::from(low) - pad;
         let size = (range + 2 * pad + 1) as usize;
@@ -74,7 +80,12 @@ impl Counts {
         };
         out.count(capture, model, channel, sigma);
         out.exclude(model, channel, [i64::from(low), i64::from(high)]);
-        let repeats = repeats(capture, model, channel, sigma);
+        let apart = if wander2 > WANDERS * noise2 {
+            0.0
+        } else {
+            sigma
+        };
+        let repeats = repeats(capture, model, channel, apart);
         for cells in [&mut out.seen, &mut out.expected, &mut out.between] {
             cells.iter_mut().for_each(|n| *n /= repeats);
         }
@@ -238,9 +249,28 @@ impl Counts {
     }
 }
 
+/// Variance of the training rows about the model beyond that of the white noise: what a wander leaves, codes squared.
+fn wander(capture: &Capture, model: &Model, channel: usize) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    let mut rows = Rows::new();
+    for segment in capture.segments.iter().filter(|s| s.part != Part::HeldOut) {
+        for chunk in chunks(segment.rows.clone()) {
+            let n = chunk.len();
+            rows.fill(capture, model, chunk);
+            for i in (0..n).filter(|i| rows.weight[channel][*i] > 0.0) {
+                let error = rows.error(model, channel, i);
+                sum += error * error - 1.0 / rows.weight[channel][i];
+                count += 1.0;
+            }
+        }
+    }
+    let beyond = sum / f64::max(count, 1.0) - OFF * model.variance.base[channel];
+    beyond.max(0.0)
+}
+
 /// Training rows that fall on the same phase and so on the same code, where noise was added after rounding or is
 /// small: they count once, as all of them miss a code if the tone is a little off.
-fn repeats(capture: &Capture, model: &Model, channel: usize, sigma: f64) -> f64 {
+pub(super) fn repeats(capture: &Capture, model: &Model, channel: usize, sigma: f64) -> f64 {
     if sigma > NARROW && !steps::is_undithered(&model.neutral[channel]) {
         return 1.0;
     }

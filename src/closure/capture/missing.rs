@@ -20,6 +20,12 @@ pub struct Missing {
 }
 
 impl Missing {
+    /// Whether a code from `low` to `high` is missing.
+    pub fn any_in(&self, low: f64, high: f64) -> bool {
+        let first = self.codes.partition_point(|c| f64::from(*c) < low);
+        self.codes.get(first).is_some_and(|c| f64::from(*c) <= high)
+    }
+
     /// What it moves the mean code by at a signal with this noise, codes.
     pub fn shift(&self, signal: f64, sigma: f64) -> f64 {
         if self.codes.is_empty() {
@@ -251,6 +257,23 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn codes_that_a_wander_leaves_are_not_missing() {
+        // 1024 phases, each of them moved through several codes in the course of the capture.
+        let made = Made {
+            rows: 100_000,
+            word: 13 << 22,
+            ..QUIET
+        };
+        let mut capture = made.capture();
+        for (row, code) in capture.codes[0].iter_mut().enumerate() {
+            let slow = std::f64::consts::TAU * row as f64 / 100_000.0;
+            *code += (4.0 * slow.sin() + 2.0 * (2.3 * slow).sin()).round() as i32;
+        }
+        let (_, model) = model(&capture, &made);
+        assert_eq!(find(&capture, &model), None);
     }
 
     #[test]
