@@ -1,10 +1,13 @@
 //! `adc_clipping`: the code does not pass a level, on one side or on both.
 //!
-//! Two signs: rows whose phase puts the tone above a level all have the same mean (a flat top), or, where
-//! noise is limited with the signal, the outermost code is far more frequent than those next to it.
+//! Three signs: rows whose phase puts the tone above a level all have the same mean (a flat top), or, where
+//! noise is limited with the signal, the outermost code is far more frequent than those next to it; or, within a code of
+//! the crest, codes are rarer than the tone and its noise make them ([`super::crest`]).
 //! What is limited is left out of all other fits.
 
-use super::columns::{COS, Model, Rows, SIN, chunks};
+use super::code_chances::Limiter;
+use super::columns::{COS, HAT, Model, Rows, SAW, SEGMENT, SIN, chunks};
+use super::crest::{Crest, Level, Side, reach};
 use super::flat_top::{Inside, Profile};
 use super::input::{Capture, Part};
 use super::instant::Instant;
@@ -17,6 +20,8 @@ pub struct Limits {
     pub low: f64,
     /// Upper level, codes.
     pub high: f64,
+    /// Whether noise is added behind the limit, and nothing of it is limited.
+    pub is_front: bool,
 }
 
 impl Limits {
@@ -24,6 +29,7 @@ impl Limits {
     pub const NONE: Limits = Limits {
         low: f64::NEG_INFINITY,
         high: f64::INFINITY,
+        is_front: false,
     };
 
     /// Whether there is a limit.
@@ -40,6 +46,9 @@ impl Limits {
     pub fn shift(&self, signal: f64, sigma: f64) -> f64 {
         if !self.any() || self.is_free(signal, 2.0 * sigma) {
             return 0.0;
+        }
+        if self.is_front {
+            return signal.clamp(self.low, self.high) - signal;
         }
         let sigma = sigma.max(1e-6);
         let over = |level: f64, sign: f64| match level.is_finite() {
@@ -93,6 +102,119 @@ pub fn find(capture: &Capture, model: &Model, channel: usize) -> Option<Found> {
         pile_gain,
         rows,
     })
+}
+
+/// Noise (with the rounding's own) up to which a level less than a code inside of the crest shows, codes.
+const LOUDEST: f64 = 1.5;
+/// Gain from which on the levels of several crests count together, each less what it costs.
+const LEAST_CREST: f64 = 6.0;
+/// What the search for a level at a crest costs.
+const CREST_COST: f64 = 4.0;
+/// Gain less costs that all crests together have to make.
+const LEAST_CRESTS: f64 = 11.0;
+/// Share of the noise that random instants may add where the tone is steepest.
+const LATE: f64 = 0.1;
+
+/// The levels that the codes at the crests tell on sides without one, if they gain enough together.
+pub fn at_the_crests(capture: &Capture, model: &Model, limits: [Limits; 2]) -> Vec<(Side, Level)> {
+    let mut out = Vec::new();
+    for (channel, limits) in limits.iter().enumerate() {
+        if is_unsteady(capture, model, channel) {
+            continue;
+        }
+        for (sign, there) in [(1.0, limits.high), (-1.0, limits.low)] {
+            if there.is_finite() || is_missing(capture, model, channel, sign) {
+                continue;
+            }
+            let side = Side { channel, sign };
+            let crest = Crest::of(capture, model, side, None, false);
+            if let Some(level) = crest.and_then(|c| c.level()) {
+                out.push((side, level));
+            }
+        }
+    }
+    out.retain(|(_, level)| level.gain > LEAST_CREST);
+    let gain: f64 = out.iter().map(|(_, level)| level.gain - CREST_COST).sum();
+    if gain < LEAST_CRESTS {
+        out.clear();
+    }
+    out
+}
+
+/// Whether a code near the outermost is missing: its rows go to others, as those beyond a level do.
+fn is_missing(capture: &Capture, model: &Model, channel: usize, sign: f64) -> bool {
+    let outward = training(capture, channel).map(|(_, code)| sign * f64::from(code));
+    let last = outward.fold(f64::NEG_INFINITY, f64::max);
+    let first = last - 2.0 * reach(model.variance.base[channel].sqrt());
+    let [low, high] = if sign > 0.0 {
+        [first, last]
+    } else {
+        [-last, -first]
+    };
+    model.missing[channel].any_in(low - 1.0, high + 1.0)
+}
+
+/// Whether the codes at a crest tell no level that is less than a code inside of it: noise hides it, random instants
+/// spread the rows that tell the noise more than those at the crest, or a bend passes less of the noise there.
+fn is_unsteady(capture: &Capture, model: &Model, channel: usize) -> bool {
+    let noise = model.variance.base[channel];
+    let instant = Instant::of(model, channel);
+    let codes = capture.used_codes(channel).map(i32::unsigned_abs);
+    let peak = f64::from(codes.max().unwrap_or(0));
+    let late = (instant.spread * peak).powi(2);
+    let bends = (SIN + 2..SAW).chain(HAT..SEGMENT);
+    let mut bends = bends.filter_map(|k| model.coefficients[channel].get(k));
+    noise.sqrt() > LOUDEST || late + instant.bent > LATE * noise || bends.any(|b| *b != 0.0)
+}
+
+/// Limits where the codes about them are likeliest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Placed {
+    /// The levels.
+    pub limits: Limits,
+    /// Their standard deviations (lower, upper), codes.
+    pub stds: [f64; 2],
+    /// What they gain in the held-out rows by the codes' frequencies.
+    pub heldout_gain: f64,
+}
+
+impl Placed {
+    /// No limit.
+    pub const NONE: Placed = Placed {
+        limits: Limits::NONE,
+        stds: [0.0; 2],
+        heldout_gain: 0.0,
+    };
+}
+
+/// The levels of a channel where the codes about them are likeliest.
+pub fn placed(capture: &Capture, model: &Model, channel: usize) -> Placed {
+    let mut out = Placed {
+        limits: model.limits[channel],
+        stds: [0.0; 2],
+        heldout_gain: 0.0,
+    };
+    let mut fronts = 0;
+    let sides = [(-1.0, out.limits.low), (1.0, out.limits.high)];
+    for ((sign, level), std) in sides.into_iter().zip(&mut out.stds) {
+        let side = Side { channel, sign };
+        let crest = |held: bool| {
+            let near = level.is_finite().then_some(level);
+            near.and_then(|level| Crest::of(capture, model, side, Some(level), held))
+        };
+        let Some(found) = crest(false).map(|c| c.near(level, crest(true).as_ref())) else {
+            continue;
+        };
+        *std = found.std;
+        fronts += usize::from(found.limiter == Limiter::Front);
+        out.heldout_gain += found.heldout_gain;
+        match sign > 0.0 {
+            true => out.limits.high = found.codes,
+            false => out.limits.low = found.codes,
+        }
+    }
+    out.limits.is_front = fronts > 0;
+    out
 }
 
 /// Noise from which on rows are looked for beyond the outermost code, codes.

@@ -175,9 +175,11 @@ impl Rows {
         let limits = model.limits[channel];
         let signal = self.signal[channel][i];
         let undithered = steps::is_undithered(&model.neutral[channel]);
-        if undithered && limits.any() && !(limits.low..limits.high).contains(&signal) {
-            // Noise is added to the code of the level, and nothing of it is limited.
-            return self.code[channel][i] - signal.clamp(limits.low, limits.high);
+        let passes = undithered || limits.is_front;
+        if passes && limits.any() && !(limits.low..limits.high).contains(&signal) {
+            // Noise is added to the level or to its code, and nothing of it is limited.
+            let level = signal.clamp(limits.low, limits.high);
+            return self.code[channel][i] - steps::mean_code(level, &model.neutral[channel]);
         }
         let value = self.value(channel, i, &model.coefficients[channel]);
         let shift = match undithered {

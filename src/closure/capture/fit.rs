@@ -2,7 +2,8 @@
 
 use super::around::{Around, LEAST_VARIANCE, add_slow_mains, around, block_series};
 use super::candidates::{Effect, Known, PRIOR, Variant, base, base_ridge, per_column, variants};
-use super::clipping::{self, Limits};
+use super::clipping::{self, Limits, Placed};
+use super::code_chances::Limiter;
 use super::columns::{ALL, Model, Variance};
 use super::gram::{Combo, Detail, Gram, Summed, solve, spread};
 use super::input::Capture;
@@ -14,7 +15,7 @@ use super::steps::{find_steps, is_sharp, settle};
 use super::tone::{Phases, Tone};
 use super::wander::{self, Series};
 use super::{feedthrough, jitter, line_places, truncation};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Rounds at most.
 const ROUNDS: usize = 6;
@@ -27,6 +28,8 @@ const JITTER_COST: f64 = 7.0;
 /// What the search for levels of clipping costs, and each level that was found.
 const LEVELS_COST: f64 = 4.0;
 const LEVEL_COST: f64 = 2.0;
+/// Log-likelihood that levels have to gain in the held-out rows, where these are no nearer to their means.
+const HELDOUT_GAIN: f64 = 1.0;
 
 /// The outcome of the rounds.
 pub struct Fitted {
@@ -49,6 +52,8 @@ pub struct Fitted {
     pub objective: f64,
     /// What clipping gains, if it was taken, the search for its levels taken off.
     pub clipping: Option<f64>,
+    /// Where the levels are by the codes' frequencies, by channel.
+    pub levels: [Placed; 2],
     /// Missing codes, if taken.
     pub missing: Option<missing::Found>,
     /// Jitter, as fitted.
@@ -64,6 +69,12 @@ pub struct Fitted {
 }
 
 impl Fitted {
+    /// The chosen linear effects.
+    fn effects(&self) -> BTreeSet<Effect> {
+        let chosen = self.set.iter().filter_map(|k| self.variants.get(*k));
+        chosen.map(|v| v.effect).collect()
+    }
+
     /// What the chosen linear effects cost.
     fn costs(&self) -> f64 {
         let chosen = self.set.iter().filter_map(|k| self.variants.get(*k));
@@ -258,6 +269,7 @@ fn round(
         own_gains,
         objective,
         clipping: None,
+        levels: [Placed::NONE; 2],
         missing: None,
         jitter,
         jitter_taken,
@@ -397,6 +409,7 @@ pub fn fit(capture: &Capture, known: &Known, tone: Tone, alone: &Model) -> Fitte
     start.missing = codes(&again).unwrap_or_default();
     Fitted {
         clipping: best.clipping,
+        levels: best.levels,
         missing: again,
         ..rounds(capture, known, &start)
     }
@@ -412,12 +425,15 @@ fn with_limits(
     alone: &Model,
 ) -> Fitted {
     let found = [0, 1].map(|c: usize| clipping::find(capture, &plain.model, c));
-    if found.iter().all(Option::is_none) {
+    let there = found.map(|f| f.map_or(Limits::NONE, |f| f.limits));
+    let crests = clipping::at_the_crests(capture, &plain.model, there);
+    if found.iter().all(Option::is_none) && crests.is_empty() {
         return plain;
     }
     let mut limited = start.clone();
     let mut sides = 0.0;
     let mut piled = 0.0;
+    let mut crest = 0.0;
     for (limits, found) in limited.limits.iter_mut().zip(&found) {
         if let Some(found) = found {
             *limits = found.limits;
@@ -425,6 +441,16 @@ fn with_limits(
             sides += f64::from(u8::from(found.limits.low.is_finite()));
             sides += f64::from(u8::from(found.limits.high.is_finite()));
         }
+    }
+    for (side, level) in &crests {
+        let limits = &mut limited.limits[side.channel];
+        match side.sign > 0.0 {
+            true => limits.high = level.codes,
+            false => limits.low = level.codes,
+        }
+        limits.is_front |= level.limiter == Limiter::Front;
+        crest += level.gain;
+        sides += 1.0;
     }
     limited.variance = plain.model.variance;
     let mut other = rounds(capture, known, &limited);
@@ -436,9 +462,22 @@ fn with_limits(
     };
     let limited = judged(&other.model);
     let chi = 0.5 * (judged(&plain.model).train_chi - limited.train_chi);
-    let gain = chi + plain.costs() - other.costs() + piled - LEVELS_COST - LEVEL_COST * sides;
-    if gain > PRIOR && limited.heldout_chi < judged(alone).heldout_chi {
+    let shows = found.iter().any(Option::is_some);
+    // A level that only the codes at a crest tell has to be in both: in their frequencies and in their means.
+    let gain = match shows {
+        true => chi + piled,
+        false => chi.min(crest),
+    };
+    let gain = gain + plain.costs() - other.costs() - LEVELS_COST - LEVEL_COST * sides;
+    let is_nearer = limited.heldout_chi < judged(alone).heldout_chi;
+    let placed = [0, 1].map(|channel| clipping::placed(capture, &other.model, channel));
+    // A level less than a code inside of the crest shows in the codes' frequencies, and hardly in their means. Where
+    // other effects are called for beside it, frequencies alone do not tell which of them are the limit's own.
+    let heldout_gain: f64 = placed.iter().map(|p| p.heldout_gain).sum();
+    let is_likelier = heldout_gain > HELDOUT_GAIN && other.effects() == plain.effects();
+    if gain > PRIOR && (shows && is_nearer || is_likelier) {
         other.clipping = Some(gain);
+        other.levels = placed;
         return other;
     }
     plain

@@ -73,6 +73,7 @@ impl Profile {
         Some(Limits {
             low: at(0.02)?,
             high: at(0.98)?,
+            is_front: false,
         })
     }
 
@@ -111,6 +112,7 @@ impl Profile {
         Limits {
             low: mean(&|x| x < limits.low - 0.3 * margin, limits.low),
             high: mean(&|x| x > limits.high + 0.3 * margin, limits.high),
+            is_front: false,
         }
     }
 

@@ -9,7 +9,7 @@
 //! [`wrong_codes`] (wrong codes), both on [`blocks`]; [`tone`] is the phase; [`columns`] are the functions of which effects are made, one
 //! file an effect ([`offset`], [`gain`], [`latency`], [`feedthrough`], [`nonlinearity`],
 //! [`harmonics`], [`mains`], [`spur`] with [`truncation`]); [`gram`] their sums and least squares;
-//! [`search`] chooses. Outside of the linear part are [`clipping`] (with [`flat_top`] and [`instant`]), [`missing`] (the histogram: [`code_counts`], [`missing_moves`]),
+//! [`search`] chooses. Outside of the linear part are [`clipping`] (with [`flat_top`], [`instant`], and [`crest`] with [`code_chances`]), [`missing`] (the histogram: [`code_counts`], [`missing_moves`]),
 //! [`jitter`] (the variance). [`spectrum`] gives noise and lines ([`standing`]: which of them are new; [`skirts`]: those that hide in their own; [`rounding`]: those that are the quantiser's own), [`line_places`] where these are,
 //! [`wander`] the slow noise that must not pass for an
 //! effect. [`around`] is the fit with every freedom, [`steps`] where the quantiser's
@@ -23,8 +23,10 @@ pub mod blocks;
 pub mod candidates;
 pub mod clipping;
 pub mod clock;
+pub mod code_chances;
 pub mod code_counts;
 pub mod columns;
+pub mod crest;
 pub mod errors;
 pub mod exact_steps;
 pub mod examine;

@@ -127,7 +127,7 @@ pub fn findings(capture: &Capture, known: &Known, plain: &Model, fitted: &Fitted
                 *k,
                 (&combos, &solved),
             ),
-            Turn::Clipping => clipping_step(capture, fitted),
+            Turn::Clipping => clipping_step(fitted),
             Turn::Missing => missing_step(fitted),
             Turn::Jitter => {
                 warnings.push(Warning::general(

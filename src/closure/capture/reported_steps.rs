@@ -141,13 +141,12 @@ fn empty(effect: Effect) -> Step {
     }
 }
 
-pub(super) fn clipping_step(capture: &Capture, fitted: &Fitted) -> Step {
+pub(super) fn clipping_step(fitted: &Fitted) -> Step {
     let mut step = empty(Effect::Clipping);
-    let rows = capture.training_rows() as f64;
     for (channel, name) in ["drive", "sense"].iter().enumerate() {
-        let limits = fitted.model.limits[channel];
-        let std = (fitted.noise[channel] / rows).sqrt().max(0.01);
-        for (side, level) in [("low", limits.low), ("high", limits.high)] {
+        let limits = fitted.levels[channel].limits;
+        let [low, high] = fitted.levels[channel].stds;
+        for (side, level, std) in [("low", limits.low, low), ("high", limits.high, high)] {
             if level.is_finite() {
                 let key = format!("{name}_{side}_codes");
                 step.parameters.insert(key.clone(), level);
