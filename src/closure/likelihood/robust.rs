@@ -19,9 +19,12 @@ pub const ACCIDENT: f64 = 8.0;
 /// Passes of [`beside_white`].
 const PASSES: usize = 3;
 
-/// Most accidents of a short record, and of how many rows one may begin; most rows that one spoils.
+/// Most accidents of a short record, and of how many rows one may begin; of how many rows all of them may spoil one.
 const FEW: usize = 2;
 const RARELY: usize = 50;
+const LITTLE: usize = 20;
+
+/// Most rows that one accident spoils.
 pub const LONGEST: usize = 7;
 
 /// The weight of a row `deviation` robust standard deviations off: 1, falling linearly to 0.
@@ -107,7 +110,9 @@ pub fn are_accidents(marked: &[bool]) -> bool {
     let runs = marked.chunk_by(|a, b| a == b).filter(|run| run[0]);
     let lengths: Vec<usize> = runs.map(<[bool]>::len).collect();
     let few = lengths.len() <= (marked.len() / RARELY).max(FEW);
-    few && lengths.iter().all(|rows| *rows <= LONGEST)
+    // In a short record a few rows in a row are a good part of it.
+    let little = lengths.iter().sum::<usize>() <= (marked.len() / LITTLE).max(FEW);
+    few && little && lengths.iter().all(|rows| *rows <= LONGEST)
 }
 
 /// White variance factors for weights; rows of weight 0 are not used.
@@ -133,12 +138,15 @@ mod tests {
             are_accidents(&out)
         };
         assert!(marked(&[]));
-        assert!(marked(&[(0, 7), (100, 1), (102, 3), (293, 7)]));
+        assert!(marked(&[(0, 7), (100, 1), (102, 3), (296, 4)]));
         // Eight in a row are a cause, and so is what comes again and again.
         assert!(!marked(&[(40, 8)]));
         let often: Vec<(usize, usize)> = (0..7).map(|k| (40 * k, 1)).collect();
         assert!(marked(&often[..6]) && !marked(&often));
-        // Two in a record of few rows.
+        // One row in twenty, or two in a record of few rows: what a clip holds of these is more.
+        assert!(!marked(&[(0, 7), (100, 1), (102, 3), (295, 5)]));
+        let clipped: Vec<bool> = (0..33).map(|k| (14..19).contains(&k)).collect();
+        assert!(!are_accidents(&clipped));
         assert!(are_accidents(&[true, false, true, false]));
         assert!(!are_accidents(&[true, false, true, false, true]));
     }
