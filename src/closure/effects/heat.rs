@@ -73,10 +73,10 @@ impl Candidate for ThermalLag {
         (0..2 * histories).flat_map(every).collect()
     }
 
-    fn fine(&self, c: &Channels, point: &Point, _seen: &[bool]) -> Vec<Point> {
+    fn beside(&self, c: &Channels, point: &Point) -> Vec<Point> {
         // What was before a beginning is asked where a lag is seen without that.
-        let others = (0..3 * c.histories()).filter(|form| *form != point.form);
-        others.map(|form| Point::at(form, &point.theta)).collect()
+        let begun = 2 * c.histories()..3 * c.histories();
+        begun.map(|form| Point::at(form, &point.theta)).collect()
     }
 
     fn columns(&self, c: &Channels, _bias: &Bias, point: &Point) -> Vec<Vec<f64>> {

@@ -182,6 +182,11 @@ pub trait Candidate: Send + Sync {
         Vec::new()
     }
 
+    /// Forms that are asked only where the name is in, at the parameters of its shape.
+    fn beside(&self, _c: &Channels, _point: &Point) -> Vec<Point> {
+        Vec::new()
+    }
+
     /// For thresholds, whose likelihood is a staircase: for each of them, the points near the given one along it,
     /// in order, one between any two readings; and points of other forms from which the same is worth a
     /// try.

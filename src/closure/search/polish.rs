@@ -123,7 +123,9 @@ impl Place<'_> {
 
     /// The best shape in another form than that of a top.
     fn in_another_form(&self, top: &Point) -> Option<Point> {
-        let others = in_other_forms(&self.candidate.points(self.c), top);
+        let mut points = self.candidate.points(self.c);
+        points.extend(self.candidate.beside(self.c, top));
+        let others = in_other_forms(&points, top);
         let each = self.with_gains(others).into_iter();
         let nets = each.map(|(point, there)| (self.net(&point, there), point));
         nets.max_by(|a, b| a.0.total_cmp(&b.0)).map(|best| best.1)
