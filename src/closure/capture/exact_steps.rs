@@ -94,7 +94,7 @@ fn value(rows: &Rows, combo: &Combo, channel: usize, i: usize) -> f64 {
 }
 
 /// Where the quantiser puts a signal, less the signal.
-fn rest(signal: f64) -> f64 {
+pub(super) fn rest(signal: f64) -> f64 {
     (signal + 0.5).floor() - signal
 }
 

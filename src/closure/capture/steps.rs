@@ -3,6 +3,7 @@
 use super::around::{TABLES, generous};
 use super::candidates::{Variant, base_ridge};
 use super::columns::{COS, Model, SAW, SIN, WAVE, WAVES};
+use super::exact_steps;
 use super::gram::{Combo, Detail, Gram, Summed, solve, spread};
 use super::input::Capture;
 use super::search::combos_of;
@@ -44,7 +45,7 @@ pub fn is_undithered(coefficients: &[f64]) -> bool {
 pub fn mean_code(signal: f64, coefficients: &[f64]) -> f64 {
     let at = |k: usize| coefficients.get(k).copied().unwrap_or(0.0);
     let wave = |k: usize| at(WAVE + k) * (TAU * (k + 1) as f64 * signal).sin();
-    signal + at(SAW) * ((signal + 0.5).floor() - signal) + (0..WAVES).map(wave).sum::<f64>()
+    signal + at(SAW) * exact_steps::rest(signal) + (0..WAVES).map(wave).sum::<f64>()
 }
 
 /// Finds where the codes are before anything is chosen, where the quantiser's error shows undithered: of
