@@ -13,6 +13,8 @@ use std::collections::BTreeMap;
 pub struct Channels {
     /// s, never decreasing.
     pub time_s: Vec<f64>,
+    /// Median distance of rows, s; 1 without any.
+    pub(super) period_s: f64,
     /// Time since power-on, s; the record's time where it has no such column.
     pub on_s: Vec<f64>,
     /// Whether it has.
@@ -109,6 +111,7 @@ impl Channels {
             .and_then(|c| since_power_on(time_s, c));
         let mut out = Channels {
             time_s: time_s.to_vec(),
+            period_s: period_s(time_s),
             on_known: on.is_some(),
             on_s: on.unwrap_or_else(|| time_s.to_vec()),
             error_dps,
@@ -234,7 +237,7 @@ impl Channels {
 
     /// Median distance of rows, s.
     pub fn period_s(&self) -> f64 {
-        period_s(&self.time_s)
+        self.period_s
     }
 }
 

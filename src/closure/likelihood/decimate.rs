@@ -180,19 +180,41 @@ fn without_runs(residual: &[f64], weights: &mut [f64]) {
     }
 }
 
+/// The middle value; the upper one of two.
+fn median(values: &[f64]) -> Option<f64> {
+    let mut near = values.to_vec();
+    near.sort_by(f64::total_cmp);
+    near.get(near.len() / 2).copied()
+}
+
+/// The median of every value and those before it, `few` together.
+fn running_medians(values: &[f64], few: usize) -> Vec<f64> {
+    let mut window: Vec<f64> = Vec::with_capacity(few + 1);
+    let place = |window: &[f64], v: f64| window.partition_point(|w| w.total_cmp(&v).is_lt());
+    let each = values.iter().enumerate().map(|(k, v)| {
+        if k >= few {
+            window.remove(place(&window, values[k - few]));
+        }
+        window.insert(place(&window, *v), *v);
+        window[window.len() / 2]
+    });
+    each.collect()
+}
+
 /// How far each row is from the median of a few rows before it, and from that and the median of those after it: the
 /// lesser of the two, or nothing where they are to both sides. The rows at a step are like those on one of its sides.
 fn from_neighbours(residual: &[f64], weights: &[f64], few: usize) -> (Vec<f64>, Vec<f64>) {
     let used: Vec<usize> = (0..residual.len()).filter(|i| weights[*i] > 0.0).collect();
-    let median = |rows: &[usize]| {
-        let mut near: Vec<f64> = rows.iter().map(|i| residual[*i]).collect();
-        near.sort_by(f64::total_cmp);
-        near.get(near.len() / 2).copied()
-    };
+    let rest: Vec<f64> = used.iter().map(|i| residual[*i]).collect();
+    let medians = running_medians(&rest, few);
     let (mut one_sided, mut apart) = (vec![0.0; residual.len()], vec![0.0; residual.len()]);
     for (k, row) in used.iter().enumerate() {
-        let before = median(&used[k.saturating_sub(few)..k]);
-        let after = median(&used[k + 1..(k + 1 + few).min(used.len())]);
+        let before = (k > 0).then(|| medians[k - 1]);
+        let after = match (used.len() - k - 1).min(few) {
+            0 => None,
+            whole if whole == few => Some(medians[k + few]),
+            _ => median(&rest[k + 1..]),
+        };
         let (Some(before), Some(after)) = (before.or(after), after.or(before)) else {
             continue;
         };

@@ -126,11 +126,70 @@ impl Whitener {
         out
     }
 
+    /// One row more like the last.
+    fn repeat_last(&mut self) {
+        let from = self.coefficients.len() - 2 * self.width;
+        self.coefficients.extend_from_within(from..);
+        if let Some(inverse) = self.inverse_std.last().copied() {
+            self.inverse_std.push(inverse);
+            self.log_det -= 2.0 * inverse.ln();
+            self.used += 1;
+        }
+    }
+
     /// Decays and gains of a row.
     fn row(&self, row: usize) -> (&[f64], &[f64]) {
         let start = 2 * self.width * row;
         let both = self.coefficients.get(start..start + 2 * self.width);
         both.map_or((&[], &[]), |both| both.split_at(self.width))
+    }
+}
+
+/// Change of the gains from a row to the next below which they are the steady ones; how far steps of one clock differ by its rounding.
+const STEADY: f64 = 1e-14;
+const SAME: f64 = 1e-9;
+
+/// What the recursion had in its last row, and whether it stands still: where rows come at even distances the covariance does
+/// not change any more after a while (Durbin & Koopman 2012, 4.3.4).
+struct Settled<const N: usize> {
+    step: f64,
+    factor: f64,
+    f: f64,
+    gain: [f64; N],
+    is_steady: bool,
+}
+
+impl<const N: usize> Default for Settled<N> {
+    fn default() -> Self {
+        Settled {
+            step: f64::NAN,
+            factor: f64::NAN,
+            f: f64::NAN,
+            gain: [f64::NAN; N],
+            is_steady: false,
+        }
+    }
+}
+
+impl<const N: usize> Settled<N> {
+    /// Whether the row after the last, a step after it, has the same gains.
+    fn holds(&self, step: f64, factor: f64) -> bool {
+        self.is_steady && (step - self.step).abs() <= SAME * step && factor == self.factor
+    }
+
+    fn next(&mut self, step: f64, factor: f64, f: f64, gain: &[f64; N]) {
+        let pairs = gain.iter().zip(&self.gain);
+        let still = pairs.fold((f - self.f).abs() <= STEADY * f, |still, (new, old)| {
+            still && (new - old).abs() <= STEADY
+        });
+        let same = (step - self.step).abs() <= SAME * step && factor == self.factor;
+        *self = Settled {
+            step,
+            factor,
+            f,
+            gain: *gain,
+            is_steady: still && same,
+        };
     }
 }
 
@@ -156,7 +215,12 @@ fn gains<const N: usize>(line: &Timeline, shape: Shape, states: &[State]) -> Whi
     }
     let relaxations = states.iter().filter(|s| s.tau.is_finite()).count();
     let floor = line.floor(shape);
+    let mut last = Settled::default();
     for (row, (step, factor)) in line.steps.iter().zip(&line.white_factor).enumerate() {
+        if last.holds(*step, *factor) {
+            out.repeat_last();
+            continue;
+        }
         let mut a = [1.0f64; N];
         for (a, decay) in a.iter_mut().zip(&line.decays(row)[..relaxations]) {
             *a = *decay;
@@ -182,9 +246,11 @@ fn gains<const N: usize>(line: &Timeline, shape: Shape, states: &[State]) -> Whi
             out.inverse_std.push(1.0 / f.sqrt());
             out.log_det += f.ln();
             out.used += 1;
+            last.next(*step, *factor, f, &gain);
         } else {
             out.coefficients.extend_from_slice(&[0.0; N]);
             out.inverse_std.push(0.0);
+            last = Settled::default();
         }
     }
     out

@@ -215,10 +215,11 @@ impl Search<'_> {
         let value = |j: &Judged| Ok(with(j)?.value - j.gain + j.net);
         // First without surrogates, which cost most and decide nothing where no name is worth it, or the best
         // one leads without the spikes.
-        let quick = self.gains_of(&plain, &may);
+        let quick = self.plain_round(&plain, 0);
         let mut worthy: Option<(&Judged, f64)> = None;
         let mut sure: Vec<String> = Vec::new();
-        for j in looked(&quick.judged, Judged::is_named) {
+        let could = |j: &Judged| j.is_named() && may(j.candidate.as_ref());
+        for j in looked(&quick.judged, could) {
             let above = value(j)? - model.value - worth(j.candidate.as_ref()) + MARGIN;
             if j.candidate.is_whole() && above > SURELY {
                 sure.push(j.candidate.id());
@@ -230,7 +231,7 @@ impl Search<'_> {
         if worthy.is_none_or(|(j, _)| leads(j.candidate.as_ref())) {
             return Ok(None);
         }
-        let all = self.judge(&plain, self.effort.surrogates);
+        let all = self.plain_round(&plain, self.effort.surrogates);
         let mut best: Option<(&Judged, f64)> = None;
         let mut others = Vec::new();
         let is_sure = |j: &Judged| sure.contains(&j.candidate.id());

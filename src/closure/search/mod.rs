@@ -184,6 +184,8 @@ pub struct Search<'a> {
     candidates: Vec<Arc<dyn Candidate>>,
     models: Memo<Arc<Model>>,
     rounds: Memo<Known>,
+    /// The same with every row at full weight.
+    plain_rounds: Memo<Known>,
     by_chance: RefCell<Option<Tail>>,
     polishes: Memo<Vec<Point>>,
     beginning: RefCell<Beginning>,
@@ -217,6 +219,7 @@ impl<'a> Search<'a> {
             candidates,
             models: Memo::default(),
             rounds: Memo::of(memo::SOME),
+            plain_rounds: Memo::of(memo::SOME),
             by_chance: RefCell::default(),
             polishes: Memo::of(memo::MANY),
             beginning: RefCell::default(),

@@ -18,16 +18,22 @@ const POLISHES: usize = 3;
 /// Places from which a shape that moves the bias is climbed.
 const CLIMBS: usize = 4;
 
+/// What a shape gains in log-likelihood, and the same less what it costs: a form that costs more has to be worth it.
+#[derive(Clone, Copy)]
+struct Worth {
+    gain: f64,
+    net: f64,
+}
+
 /// The best place of every form.
-fn best_of_forms(places: &[(Point, f64)], net: impl Fn(&Point, f64) -> f64) -> Vec<&Point> {
+fn best_of_forms(places: &[(Point, Worth)]) -> Vec<&Point> {
     let mut best: Vec<(&Point, f64)> = Vec::new();
-    for (point, there) in places {
-        let there = net(point, *there);
+    for (point, Worth { net, .. }) in places {
         let kind = |p: &Point| (p.form, p.theta.len());
         match best.iter_mut().find(|b| kind(b.0) == kind(point)) {
-            Some(b) if there > b.1 => *b = (point, there),
+            Some(b) if *net > b.1 => *b = (point, *net),
             Some(_) => {}
-            None => best.push((point, there)),
+            None => best.push((point, *net)),
         }
     }
     best.into_iter().map(|b| b.0).collect()
@@ -85,15 +91,31 @@ impl Place<'_> {
         refine::gains(&self.bench, points.iter().map(|p| self.columns(p)))
     }
 
-    fn with_gains(&self, points: Vec<Point>) -> Vec<(Point, f64)> {
-        let gains = self.gains(&points);
-        points.into_iter().zip(gains).collect()
+    fn worths(&self, points: &[Point]) -> Vec<Worth> {
+        let mut paid = Vec::with_capacity(points.len());
+        let shapes = points.iter().map(|point| {
+            let shape = self.columns(point);
+            paid.push(price(self.candidate, self.c, point) + PRICE * shape.0.len() as f64);
+            shape
+        });
+        let gains = refine::gains(&self.bench, shapes);
+        let pairs = gains.iter().zip(&paid);
+        pairs
+            .map(|(gain, paid)| Worth {
+                gain: *gain,
+                net: gain - paid,
+            })
+            .collect()
     }
 
-    /// A gain less what the shape costs: a form that costs more has to be worth it.
-    fn net(&self, point: &Point, gain: f64) -> f64 {
-        let columns = self.candidate.columns(self.c, &self.model.bias, point);
-        gain - price(self.candidate, self.c, point) - PRICE * columns.len() as f64
+    fn net(&self, point: &Point) -> f64 {
+        let worths = self.worths(std::slice::from_ref(point));
+        worths.first().map_or(f64::NEG_INFINITY, |w| w.net)
+    }
+
+    fn with_worths(&self, points: Vec<Point>) -> Vec<(Point, Worth)> {
+        let worths = self.worths(&points);
+        points.into_iter().zip(worths).collect()
     }
 
     fn climbed(&self, start: &Point) -> Point {
@@ -101,55 +123,51 @@ impl Place<'_> {
         refine::climbed(start, map(&steps, |s| 0.5 * s), |p| self.gain(p))
     }
 
-    /// The shapes next to a term's own among which its top may lie, with their gains.
-    fn fine(&self, own: &Point, used: &[bool]) -> Vec<(Point, f64)> {
-        let mut fine = self.with_gains(self.candidate.fine(self.c, own, used));
+    /// The shapes next to a term's own among which its top may lie.
+    fn fine(&self, own: &Point, used: &[bool]) -> Vec<(Point, Worth)> {
+        let mut fine = self.with_worths(self.candidate.fine(self.c, own, used));
         if self.settling.is_none() {
             return fine;
         }
         // The bias follows closely: tops are narrow beside the distance of these places.
-        fine.sort_by(|a, b| b.1.total_cmp(&a.1));
+        fine.sort_by(|a, b| b.1.gain.total_cmp(&a.1.gain));
         let mut places = 0;
         fine.retain(|(point, _)| {
             places += usize::from(!point.theta.is_empty());
             point.theta.is_empty() || places <= CLIMBS
         });
-        for (point, there) in &mut fine {
-            *point = self.climbed(point);
-            *there = self.gain(point);
-        }
-        fine
+        let climbed = fine.iter().map(|(point, _)| self.climbed(point));
+        self.with_worths(climbed.collect())
     }
 
     /// The best shape in another form than that of a top.
     fn in_another_form(&self, top: &Point) -> Option<Point> {
         let mut points = self.candidate.points(self.c);
         points.extend(self.candidate.beside(self.c, top));
-        let others = in_other_forms(&points, top);
-        let each = self.with_gains(others).into_iter();
-        let nets = each.map(|(point, there)| (self.net(&point, there), point));
-        nets.max_by(|a, b| a.0.total_cmp(&b.0)).map(|best| best.1)
+        let each = self.with_worths(in_other_forms(&points, top)).into_iter();
+        let best = each.max_by(|a, b| a.1.net.total_cmp(&b.1.net));
+        best.map(|(point, _)| point)
     }
 
     /// The best shape near a term's own or from one of the finer ones, thresholds in the middle of their stairs.
     fn best(&self, own: &Point, used: &[bool]) -> Point {
         let fine = self.fine(own, used);
         let mut top = self.climbed(own);
-        let mut best = self.net(&top, self.gain(&top));
+        let mut best = self.net(&top);
         let other = match fine.is_empty() {
             true => self.in_another_form(&top),
             false => None,
         };
-        let starts = best_of_forms(&fine, |p, there| self.net(p, there));
-        for start in starts.into_iter().chain(&other) {
+        for start in best_of_forms(&fine).into_iter().chain(&other) {
             // Between the places of another form its top may be far above them all.
             let point = self.climbed(start);
-            let there = self.net(&point, self.gain(&point));
+            let there = self.net(&point);
             if there > best {
                 (top, best) = (point, there);
             }
         }
-        stairs::settled(self.candidate, self.c, &top, &fine, |p| self.gains(p))
+        let gains: Vec<(Point, f64)> = fine.into_iter().map(|(p, w)| (p, w.gain)).collect();
+        stairs::settled(self.candidate, self.c, &top, &gains, |p| self.gains(p))
     }
 }
 

@@ -5,6 +5,7 @@
 //! of the best of all candidates, those that are out among them: never too small.
 
 use super::judge::Round;
+use super::memo::Memo;
 use super::{Model, Search, Term};
 use std::sync::Arc;
 
@@ -51,9 +52,19 @@ impl Search<'_> {
     /// Everything judged beside a [`Search::model`]; `surrogates` = 0: gains alone, which an earlier round
     /// beside the same terms has as well.
     pub fn round(&self, model: &Model, surrogates: usize) -> Arc<Round> {
+        self.known_round(&self.rounds, model, surrogates)
+    }
+
+    /// The same beside a model with every row at full weight.
+    pub(super) fn plain_round(&self, plain: &Model, surrogates: usize) -> Arc<Round> {
+        self.known_round(&self.plain_rounds, plain, surrogates)
+    }
+
+    /// A round beside a model that its terms tell, from those of its kind that are known.
+    fn known_round(&self, rounds: &Memo<Known>, model: &Model, surrogates: usize) -> Arc<Round> {
         let terms = in_order(&model.terms);
         let barred = self.beginning.borrow().barred.clone();
-        let known = self.rounds.get(&terms);
+        let known = rounds.get(&terms);
         if let Some(round) = known.and_then(|known| known.with(&barred, surrogates)) {
             return round;
         }
@@ -63,7 +74,7 @@ impl Search<'_> {
             surrogates,
             round: round.clone(),
         };
-        self.rounds.keep(&terms, known);
+        rounds.keep(&terms, known);
         round
     }
 }

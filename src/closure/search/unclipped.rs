@@ -4,10 +4,11 @@
 //! tells which rows are held. The bias of the free rows and the rows that it does not hold are found in turns, from the rows
 //! whose reading is within the levels.
 
-use super::{Model, Search, Term, declared, weighted};
+use super::{Model, Search, Term, declared};
 use crate::closure::channels::{Channels, range};
 use crate::closure::effects::{Bias, Candidate, Point};
-use crate::closure::likelihood::linear::add_scaled;
+use crate::closure::likelihood::linear::{add_scaled, dots, normal};
+use nalgebra::DMatrix;
 
 /// Most turns.
 const TURNS: usize = 12;
@@ -21,11 +22,13 @@ const MUCH: f64 = 0.2;
 /// What is fitted beside a clip.
 pub(super) struct Unclipped<'a> {
     c: &'a Channels,
-    /// What the columns explain, deg/s, every row.
-    y: Vec<f64>,
     /// The declared columns, and those of other effects.
     columns: Vec<Vec<f64>>,
     order: usize,
+    /// The same and what they explain, each row by the root of its weight, and their products over all rows: a clip takes
+    /// out the few that it holds.
+    weighted: Vec<Vec<f64>>,
+    products: DMatrix<f64>,
     weights: Vec<f64>,
     /// What effects without a free coefficient add, deg/s, every row.
     fixed_dps: Vec<f64>,
@@ -41,11 +44,20 @@ impl<'a> Unclipped<'a> {
     ) -> Self {
         let mut y = c.error_dps.clone();
         add_scaled(&mut y, -1.0, &fixed_dps);
+        let by_root = |column: &Vec<f64>| -> Vec<f64> {
+            let rows = column.iter().zip(&weights);
+            rows.map(|(v, w)| if *w > 0.0 { v * w.sqrt() } else { 0.0 })
+                .collect()
+        };
+        let weighted: Vec<Vec<f64>> = columns.iter().chain([&y]).map(by_root).collect();
+        let count = weighted.len();
+        let products = DMatrix::from_row_slice(count, count, &dots(&weighted, &weighted));
         Unclipped {
             c,
-            y,
             order: declared(c).len(),
             columns,
+            weighted,
+            products,
             weights,
             fixed_dps,
         }
@@ -67,18 +79,28 @@ impl<'a> Unclipped<'a> {
             }
             held = now;
             let rows = self.weights.iter().zip(&held);
-            let free: Vec<f64> = rows.map(|(w, held)| if *held { 0.0 } else { *w }).collect();
-            let count = free.iter().filter(|w| **w > 0.0).count();
+            let count = rows.filter(|(w, held)| **w > 0.0 && !**held).count();
             if count < ROWS_EACH * self.columns.len() {
                 return None;
             }
-            bias = self.fitted(&free);
+            bias = self.fitted(&held);
         }
         Some(bias)
     }
 
-    fn fitted(&self, weights: &[f64]) -> Bias {
-        let mut beta = weighted(&self.columns, &self.y, weights);
+    /// Least squares of the rows that are not held.
+    fn fitted(&self, held: &[bool]) -> Bias {
+        let mut products = self.products.clone();
+        for row in (0..held.len()).filter(|row| held[*row]) {
+            for (i, a) in self.weighted.iter().enumerate() {
+                for (j, b) in self.weighted.iter().enumerate() {
+                    products[(i, j)] -= a[row] * b[row];
+                }
+            }
+        }
+        let count = self.columns.len();
+        let with = products.column(count).rows(0, count).into_owned();
+        let mut beta = normal(&products.view((0, 0), (count, count)).into_owned(), &with);
         let mut others_dps = self.fixed_dps.clone();
         for (b, column) in beta.iter().zip(&self.columns).skip(self.order) {
             add_scaled(&mut others_dps, *b, column);
