@@ -34,6 +34,10 @@ const MARGIN: f64 = 4.0;
 /// Names that are asked whether they are enough where a shape without a name explains more.
 const ENOUGH: usize = 2;
 
+/// Log-likelihood that a step may cost: it is judged with the rows that stand out at the weights that they have without it, and
+/// where very many do, others do so with it, and explain nothing.
+const LOST: f64 = 10.0;
+
 /// Most rounds of forward steps and sweeps.
 const ROUNDS: usize = 3;
 
@@ -84,8 +88,8 @@ impl Search<'_> {
         }
         let reached = model.clone();
         let model = self.validated(model, &mut found)?;
-        if found.left.is_none() && self.coloured(&model) {
-            found.left = Some("time_s".to_owned());
+        if found.left.is_none() {
+            found.left = self.structured(&model);
         }
         for term in model.terms {
             if term.candidate.named() {
@@ -135,7 +139,12 @@ impl Search<'_> {
                     term.beside = model.terms.iter().map(Term::id).collect();
                     let mut terms = model.terms.clone();
                     terms.push(term);
-                    model = self.polished(self.model(&terms)?)?;
+                    let with = self.polished(self.model(&terms)?)?;
+                    if self.net(&with) < self.net(&model) - LOST {
+                        found.left = with.terms.last().and_then(|t| self.channel(t));
+                        return Ok(model);
+                    }
+                    model = with;
                 }
             }
         }

@@ -1,7 +1,7 @@
 //! Is what is left noise? Tests of the whitened residual that need no candidate.
 
 use super::{Model, Search};
-use crate::closure::likelihood::memory;
+use crate::closure::likelihood::memory::{self, Memory};
 use crate::closure::likelihood::noise::Shape;
 use crate::closure::likelihood::whiten::Whitener;
 use rustfft::FftPlanner;
@@ -58,9 +58,26 @@ fn slowness(shape: Shape, rows: usize) -> f64 {
     (shape.flicker * n.ln() + shape.walk * n / 6.0).sqrt()
 }
 
+/// How many times what rows differ by from one to the next a white residual may be: one that is more jumps to and fro between
+/// levels.
+const SCATTERED: f64 = 3.0;
+
+/// The same probability of a whitened residual with its accidents cut.
+fn cut_p_value(whitened: impl Iterator<Item = f64>) -> f64 {
+    let white: Vec<f64> = whitened.map(|v| v.clamp(-4.0, 4.0)).collect();
+    band_p_value(&white)
+}
+
 fn is_coloured(whitened: &[f64]) -> bool {
-    let white: Vec<f64> = whitened.iter().map(|v| v.clamp(-4.0, 4.0)).collect();
-    band_p_value(&white) < COLOURED
+    cut_p_value(whitened.iter().copied()) < COLOURED
+}
+
+/// The probability of a white residual's greatest band with the rows in the order of a channel.
+fn p_value_along(white: &[f64], channel: &[f64]) -> f64 {
+    let pairs = channel.iter().zip(white).filter(|(_, w)| **w != 0.0);
+    let mut rows: Vec<(f64, f64)> = pairs.map(|(along, w)| (*along, *w)).collect();
+    rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+    cut_p_value(rows.into_iter().map(|(_, w)| w))
 }
 
 impl Search<'_> {
@@ -79,16 +96,96 @@ impl Search<'_> {
         is_coloured(&model.fit.residual_whitened) && !self.forgets(model)
     }
 
+    /// The channel along which what a model leaves has structure, or time: a residual that is white in time is white in any other
+    /// order of its rows, unless something goes with what they are ordered by.
+    pub fn structured(&self, model: &Model) -> Option<String> {
+        let c = self.channels;
+        let jumps = self.roughly(model) > SCATTERED * self.wander(model).hypot(1.0);
+        if jumps || self.coloured(model) {
+            return Some("time_s".to_owned());
+        }
+        let memory = self.memory(model);
+        let white = memory.map_or_else(|| model.fit.residual_whitened.clone(), |m| m.whitened);
+        let moving = c.columns.keys().filter(|name| c.moving(name).is_some());
+        let columns = moving.map(|name| (name, c.columns[name].as_slice()));
+        let along: Vec<(&String, &[f64])> =
+            columns.chain([(&c.thermometer, c.u.as_slice())]).collect();
+        let each = along.iter().map(|(name, column)| {
+            let p_value = p_value_along(&white, &model.fit.reduce(column));
+            (p_value * along.len() as f64, *name)
+        });
+        let least = each.min_by(|a, b| a.0.total_cmp(&b.0));
+        let found = least.filter(|(p_value, _)| *p_value < COLOURED);
+        found.map(|(_, name)| name.clone())
+    }
+
     /// Whether what a model leaves is noise with a short memory: that explains it better than 1/f noise and a walk do, and
     /// all of it, and its innovations are normal.
     pub(super) fn forgets(&self, model: &Model) -> bool {
+        self.memory(model).is_some()
+    }
+
+    /// What a model leaves under a short memory, if it forgets.
+    fn memory(&self, model: &Model) -> Option<Memory> {
         let fit = &model.fit;
         let rest = fit.reduce(&model.residual(self.channels));
         let line = &fit.problem.line;
         let whitener = Whitener::new(line, fit.at.shape);
         let slow = memory::loglik(&whitener.apply(&rest), whitener.used, whitener.log_det);
         let memory = memory::short_memory(line, &rest);
-        memory
-            .is_some_and(|m| m.loglik > slow + BETTER && !is_coloured(&m.whitened) && m.is_normal())
+        memory.filter(|m| m.loglik > slow + BETTER && !is_coloured(&m.whitened) && m.is_normal())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::closure::channels::Channels;
+    use crate::closure::search::Effort;
+    use crate::closure::synthetic::Random;
+    use std::collections::BTreeMap;
+
+    const ROWS: usize = 600;
+
+    /// Where there is structure beside the declared bias in white noise of one, with the temperature and a supply all over the
+    /// place.
+    fn found(seed: u64, error: impl Fn(usize, f64, f64) -> f64) -> Option<String> {
+        let mut random = Random::new(seed);
+        let mut any = || -> Vec<f64> { (0..ROWS).map(|_| random.uniform()).collect() };
+        let (degc, supply) = (any(), any());
+        let mut random = Random::new(seed + 1000);
+        let each = (0..ROWS).map(|k| error(k, degc[k], supply[k]) + random.normal());
+        let columns = BTreeMap::from([
+            ("rate_out_dps".to_owned(), each.collect()),
+            ("die_degc".to_owned(), degc.clone()),
+            ("supply_v".to_owned(), supply.clone()),
+        ]);
+        let time_s: Vec<f64> = (0..ROWS).map(|k| k as f64).collect();
+        let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+        let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+        search.structured(&search.model(&[]).unwrap())
+    }
+
+    #[test]
+    fn fringes_along_a_channel_are_structure_and_white_noise_is_none() {
+        for seed in 1..=40 {
+            assert_eq!(found(seed, |_, _, _| 0.0), None, "{seed}");
+        }
+        let fringe = |x: f64| (50.0 * x).sin();
+        for seed in 1..=3 {
+            let in_degc = found(seed, |_, degc, _| fringe(degc));
+            assert_eq!(in_degc.as_deref(), Some("die_degc"), "{seed}");
+            let in_supply = found(seed, |_, _, supply| fringe(supply));
+            assert_eq!(in_supply.as_deref(), Some("supply_v"), "{seed}");
+        }
+    }
+
+    #[test]
+    fn a_level_that_jumps_from_row_to_row_is_structure_although_it_is_white() {
+        let mut random = Random::new(5);
+        let jumps: Vec<bool> = (0..ROWS).map(|_| random.uniform() < 0.2).collect();
+        let jumping = |by: f64| found(7, |k, _, _| if jumps[k] { by } else { 0.0 });
+        assert_eq!(jumping(30.0).as_deref(), Some("time_s"));
+        assert_eq!(jumping(2.0), None);
     }
 }
