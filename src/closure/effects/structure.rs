@@ -18,17 +18,41 @@ struct ThirdOrder;
 const THIRD_ORDER: Sheet = Sheet {
     id: "bias_third_order",
     physics: "the bias bends more than eq. 9 says: Q, the modes' split and the phase bend together",
-    equation: "c3 u^3, u the thermometer's reading scaled to -1..1",
-    parameters: &[Parameter {
-        name: "c3_dps",
-        plausible: (0.01, 30.0),
-    }],
+    equation: "c3 u^3, u the thermometer's reading scaled to -1..1; a bend that is not quite of third order has l4 P4(u) + l5 P5(u) \
+               with it (Legendre's polynomials), less than half of it",
+    parameters: &[
+        Parameter {
+            name: "c3_dps",
+            plausible: (0.01, 30.0),
+        },
+        Parameter {
+            name: "l4_dps",
+            plausible: (0.001, 5.0),
+        },
+        Parameter {
+            name: "l5_dps",
+            plausible: (0.001, 5.0),
+        },
+    ],
     compensable: true,
     confounders: &["damping_bias", "demod_phase_drift", "mode_crossing"],
     experiment: "record the drive gain and the quadrature: a Q or quadrature that moves with \
                  temperature shows in its own channel",
     reference: "Sensors 9 (2009) 8349 (piecewise and higher orders)",
 };
+
+/// The form with higher orders, and the most that these are of the third, rms over an evenly filled range.
+const BENT: usize = 1;
+const MOST_BENT: f64 = 0.5;
+
+/// Legendre's polynomials of fourth and fifth order: each is apart from all lower orders.
+fn higher_orders(u: f64) -> [f64; 2] {
+    let v = u * u;
+    [
+        ((35.0 * v - 30.0) * v + 3.0) / 8.0,
+        ((63.0 * v - 70.0) * v + 15.0) * u / 8.0,
+    ]
+}
 
 impl Candidate for ThirdOrder {
     fn sheet(&self) -> &Sheet {
@@ -43,25 +67,58 @@ impl Candidate for ThirdOrder {
         vec![Point::form(0)]
     }
 
-    fn columns(&self, c: &Channels, _bias: &Bias, _point: &Point) -> Vec<Vec<f64>> {
-        vec![map(&c.u, |u| u * u * u)]
+    fn beside(&self, _c: &Channels, _point: &Point) -> Vec<Point> {
+        vec![Point::form(BENT)]
+    }
+
+    fn columns(&self, c: &Channels, _bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
+        let mut columns = vec![map(&c.u, |u| u * u * u)];
+        if point.form == BENT {
+            columns.extend((0..2).map(|k| map(&c.u, |u| higher_orders(u)[k])));
+        }
+        columns
+    }
+
+    fn admits(&self, _c: &Channels, _point: &Point, beta: &[f64]) -> bool {
+        let [c3, l4, l5] = *beta else { return true };
+        // u^3 is 2/5 P3 and lower orders; the mean square of Pn is 1 / (2 n + 1).
+        let third = 0.4 * c3;
+        l4 * l4 / 9.0 + l5 * l5 / 11.0 <= MOST_BENT.powi(2) * third * third / 7.0
     }
 
     fn correction(&self, _c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
-        Some(vec![Term::Product {
-            gain_dps: *e.beta.first()?,
-            factors: vec![(f.thermometer()?, 3)],
+        let input = f.thermometer()?;
+        Some(vec![match e.beta.as_slice() {
+            [c3, l4, l5] => {
+                let bend = |u: f64| {
+                    let [p4, p5] = higher_orders(u);
+                    c3 * u * u * u + l4 * p4 + l5 * p5
+                };
+                // Linear interpolation between so many knots is a thousandth off.
+                Term::Curve {
+                    input,
+                    values_dps: knots(129).map(bend).collect(),
+                }
+            }
+            beta => Term::Product {
+                gain_dps: *beta.first()?,
+                factors: vec![(input, 3)],
+            },
         }])
     }
 
     fn report(&self, c: &Channels, e: &Estimate) -> Reported {
-        [
+        let mut out: Reported = [
             gain("c3_dps", e, 0, 1.0),
             entry("u_zero", c.centre, 0.0),
             entry("u_one", c.centre + c.half, 0.0),
         ]
         .into_iter()
-        .collect()
+        .collect();
+        if e.point.form == BENT {
+            out.extend([gain("l4_dps", e, 1, 1.0), gain("l5_dps", e, 2, 1.0)]);
+        }
+        out
     }
 }
 
@@ -104,6 +161,10 @@ const WIDTHS: [f64; 5] = [0.03, 0.06, 0.12, 0.22, 0.4];
 
 /// The widest crossing, in u: of a wider one the record (-1..1) does not show both flanks, and what fits is any bend.
 const WIDEST: f64 = 0.6;
+
+/// From which width on a crossing is more like a bend of the whole characteristic, and the odds against it for each e-fold.
+const WIDE: f64 = 0.35;
+const UNUSUAL: f64 = 12.0;
 
 /// A resonance by its parts, one that is blurred, and the magnitude of one.
 const FORMS: usize = 3;
@@ -159,6 +220,10 @@ impl Candidate for ModeCrossing {
 
     fn spacing(&self, c: &Channels, point: &Point) -> Vec<f64> {
         vec![crossing(c, point).1, 0.5]
+    }
+
+    fn odds_against(&self, c: &Channels, point: &Point) -> f64 {
+        UNUSUAL * (crossing(c, point).1 / WIDE).ln().max(0.0)
     }
 
     fn is_local(&self) -> bool {

@@ -34,7 +34,7 @@ const MARGIN: f64 = 4.0;
 /// Names that are asked whether they are enough where a shape without a name explains more.
 const ENOUGH: usize = 2;
 
-/// Log-likelihood that a step may cost: it is judged with the rows that stand out at the weights that they have without it, and
+/// Log-likelihood that a step after the first may cost: it is judged with the rows that stand out at the weights that they have without it, and
 /// where very many do, others do so with it, and explain nothing.
 const LOST: f64 = 10.0;
 
@@ -58,16 +58,7 @@ impl Search<'_> {
     /// # Errors
     /// Too few rows to fit anything.
     pub(super) fn run_once(&self, names_only: bool) -> Result<(Found, Model), Unusable> {
-        let mut found = Found {
-            terms: Vec::new(),
-            strangers: Vec::new(),
-            left: None,
-            first: Vec::new(),
-            missing: Vec::new(),
-            undecided: Vec::new(),
-            within_rounding: Vec::new(),
-            once: Vec::new(),
-        };
+        let mut found = Found::default();
         let mut model = self.beginning()?;
         for _ in 0..ROUNDS {
             model = self.forward(model, &mut found, names_only)?;
@@ -88,8 +79,8 @@ impl Search<'_> {
         }
         let reached = model.clone();
         let model = self.validated(model, &mut found)?;
-        if found.left.is_none() {
-            found.left = self.structured(&model);
+        if found.left.is_none() && self.coloured(&model) {
+            found.left = Some("time_s".to_owned());
         }
         for term in model.terms {
             if term.candidate.named() {
@@ -123,7 +114,7 @@ impl Search<'_> {
             if found.first.is_empty() {
                 found.first = round.judged.clone();
             }
-            let next = self.next(&model, &round)?;
+            let next = self.next(&model, &round, found)?;
             if found.missing.is_empty() {
                 found.missing.clone_from(&round.missing);
             }
@@ -140,7 +131,7 @@ impl Search<'_> {
                     let mut terms = model.terms.clone();
                     terms.push(term);
                     let with = self.polished(self.model(&terms)?)?;
-                    if self.net(&with) < self.net(&model) - LOST {
+                    if !model.terms.is_empty() && self.net(&with) < self.net(&model) - LOST {
                         found.left = with.terms.last().and_then(|t| self.channel(t));
                         return Ok(model);
                     }
@@ -151,11 +142,21 @@ impl Search<'_> {
     }
 
     /// The next step from a round.
-    fn next(&self, model: &Model, round: &Round) -> Result<Next, Unusable> {
+    fn next(&self, model: &Model, round: &Round, found: &mut Found) -> Result<Next, Unusable> {
         // A name that gains no more than it costs is no better than none, however rare that is by chance.
         let called_for = |j: &&Judged| j.p_value <= LEVEL && (j.net > PRICE || !j.is_named());
         let significant: Vec<&Judged> = round.judged.iter().filter(called_for).collect();
         let leader = significant.first();
+        if let Some(leader) = leader
+            && let Some(mending) = self.mending(model, leader, &round.judged)?
+        {
+            // What else there is shows beside it.
+            let mending = Term::of(mending, Vec::new());
+            found.bent = found.bent.take().or_else(|| self.channel(&mending));
+            let mended = self.model(&[model.terms.as_slice(), &[mending]].concat())?;
+            let round = self.round(&mended, self.effort.surrogates);
+            return self.next(&mended, &round, found);
+        }
         let begins = model.terms.iter().all(|t| t.evident);
         if let Some(opening) = self.beginning.borrow().opening.as_ref().filter(|_| begins)
             && let Some(name) = significant.iter().find(|j| j.candidate.id() == *opening)
@@ -172,7 +173,15 @@ impl Search<'_> {
         let near = |j: &&&Judged| j.candidate.named() && j.net > leader.net - STRANGER;
         let own = |j: &&&Judged| near(j) && !self.is_another_channels(&j.candidate.id(), &j.point);
         let mut names = significant.iter();
-        if let Some(name) = names.clone().find(own).or_else(|| names.find(near)) {
+        let name = names.clone().find(own).or_else(|| names.find(near));
+        // A law that is bent before an unusual shape of another name, or one that has none.
+        let usual = name.filter(|n| n.odds_against <= 0.0);
+        if usual.is_none()
+            && let Some(law) = self.law_of(model, &significant, name.unwrap_or(leader))?
+        {
+            return Ok(decided(Term::of(law, round.rivals(law))));
+        }
+        if let Some(name) = name {
             return Ok(decided(Term::of(name, round.rivals(name))));
         }
         if let Some(first) = self.name_instead(model, &significant, leader)? {

@@ -50,7 +50,10 @@ fn taken(periods: f64, behind: f64) -> String {
         missing: Vec::new(),
         leads: None,
     };
-    match search.next(&search.model(&[]).unwrap(), &round).unwrap() {
+    match search
+        .next(&search.model(&[]).unwrap(), &round, &mut Found::default())
+        .unwrap()
+    {
         Next::Add(term) => term.id(),
         Next::Undecided(_) | Next::Stop => "nothing".to_owned(),
     }

@@ -20,6 +20,7 @@ pub mod forward;
 pub mod halves;
 pub mod heldout;
 pub mod judge;
+mod laws;
 mod memo;
 mod model;
 mod once;
@@ -146,6 +147,7 @@ impl Term {
 }
 
 /// What the search found.
+#[derive(Default)]
 pub struct Found {
     /// Named effects, in the order of their steps.
     pub terms: Vec<Term>,
@@ -153,6 +155,8 @@ pub struct Found {
     pub strangers: Vec<Term>,
     /// Something is left, with the channel of the best try.
     pub left: Option<String>,
+    /// The channel of a law that is not quite the catalogue's.
+    pub bent: Option<String>,
     /// The first round's candidates.
     pub first: Vec<Judged>,
     /// Candidates that could not be judged.

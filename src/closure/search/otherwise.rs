@@ -95,10 +95,17 @@ impl Search<'_> {
         let rough = || self.roughly(&model) > ROUGH.max(rough_by_chance(used)) && !filtered();
         let wanders = || self.wander(&model) > MUCH || rough();
         let riddled = || self.riddled(&model).is_some();
-        if found.left.is_none() && (self.missed(&model) || wanders() || riddled()) {
-            found.left = Some("time_s".to_owned());
+        if found.left.is_none() {
+            let in_time = self.missed(&model) || wanders() || riddled();
+            let along = || self.structured(&model);
+            found.left = in_time.then(|| "time_s".to_owned()).or_else(along);
             self.kept_stable(&mut found)?;
         }
+        // What a law's bend leaves shows in time as well.
+        found.left = match (found.left, found.bent.take()) {
+            (Some(left), bent) if left != "time_s" || bent.is_none() => Some(left),
+            (_, bent) => bent,
+        };
         self.with_ties(&mut found)?;
         self.with_thermometers(&mut found);
         let named: Vec<String> = found.terms.iter().map(Term::id).collect();
@@ -176,7 +183,7 @@ impl Search<'_> {
             return Ok(None);
         };
         let known = |t: &Term| first.terms.iter().any(|f| f.id() == t.id());
-        if given.iter().all(known) {
+        if given.iter().all(known) || self.has_mend(&given)? {
             return Ok(None);
         }
         self.begin(Beginning {
@@ -320,7 +327,8 @@ impl Search<'_> {
             return Ok(None);
         }
         let model = self.model(&found.terms)?;
-        if self.net(&model) <= due.all_but || self.clustered(&model) {
+        let worth = self.net(&model) > due.all_but;
+        if !worth || self.clustered(&model) || self.has_mend(&found.terms)? {
             return Ok(None);
         }
         let round = self.round(&model, self.effort.surrogates);
@@ -383,113 +391,5 @@ fn beginnings(terms: &[Term], first: &Found) -> Vec<Beginning> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::closure::channels::Channels;
-    use crate::closure::search::{Effort, Search};
-    use crate::closure::synthetic::{Random, triangle};
-    use std::collections::BTreeMap;
-
-    /// Names, and the channel of what is left, of a large effect of the acceleration's square, read with noise.
-    fn of_noisy_squares(seed: u64, reading_g: f64) -> (Vec<String>, Option<String>) {
-        let (rows, mut random) = (1100, Random::new(seed));
-        let degc = [triangle(rows / 2), triangle(rows / 2)].concat();
-        // Tumbled, a dozen rows in each position.
-        let places = [1.0, 0.0, -1.0, 0.71, -0.71, 0.5];
-        let accel = |k: usize| places[k / 12 * 5 % 6];
-        let output = (0..rows).map(|k| {
-            let bias = 0.3 - 0.002 * degc[k];
-            bias - 0.067 * accel(k) * accel(k) + 0.002 * random.normal()
-        });
-        let output = output.collect();
-        let read = (0..rows).map(|k| accel(k) + reading_g * random.normal());
-        let columns = BTreeMap::from([
-            ("rate_out_dps".to_owned(), output),
-            ("accel_g".to_owned(), read.collect()),
-            ("die_degc".to_owned(), degc),
-        ]);
-        let time_s: Vec<f64> = (0..rows).map(|k| 8.0 * k as f64).collect();
-        let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
-        let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
-        let found = search.run().unwrap();
-        (found.terms.iter().map(Term::id).collect(), found.left)
-    }
-
-    #[test]
-    fn a_large_effect_of_a_noisy_channel_has_its_name_and_leaves_a_little() {
-        let name = || vec!["g_squared_sensitivity".to_owned()];
-        for (seed, reading_g) in [(1, 0.03), (2, 0.04), (3, 0.04)] {
-            let (names, left) = of_noisy_squares(seed, reading_g);
-            assert_eq!(
-                (names, left),
-                (name(), Some("accel_g".to_owned())),
-                "{seed}"
-            );
-        }
-        assert_eq!(of_noisy_squares(4, 0.0), (name(), None));
-    }
-
-    #[test]
-    fn one_name_that_looks_like_the_sum_of_two_gives_its_place_to_them() {
-        let rows = 1600;
-        for seed in 0..3 {
-            let mut random = Random::new(seed);
-            let time_s: Vec<f64> = (0..rows).map(|k| 20.0 * k as f64).collect();
-            let turn = std::f64::consts::TAU / 9000.0;
-            let degc = |t: f64| 30.0 - 44.0 * (turn * t).cos();
-            let output = time_s.iter().map(|t| {
-                let rate = 44.0 * turn * (turn * t).sin();
-                let ageing = 0.1 * (1.0 + t / 3700.0).ln();
-                0.3 - 0.004 * degc(*t) - 0.9 * rate + ageing + 0.0067 * random.normal()
-            });
-            let columns = BTreeMap::from([
-                ("rate_out_dps".to_owned(), output.collect::<Vec<f64>>()),
-                (
-                    "die_degc".to_owned(),
-                    time_s.iter().map(|t| degc(*t)).collect(),
-                ),
-            ]);
-            let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
-            let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
-            let found = search.run().unwrap();
-            let mut names: Vec<String> = found.terms.iter().map(Term::id).collect();
-            names.sort();
-            assert_eq!(names, ["ageing_drift", "temperature_rate"], "{seed}");
-        }
-    }
-
-    #[test]
-    fn white_noise_is_hardly_ever_as_rough_as_what_is_left() {
-        let mut random = Random::new(6);
-        for rows in [16, 25, 40, 200] {
-            let rough = |random: &mut Random| {
-                let noise: Vec<f64> = (0..rows).map(|_| random.normal()).collect();
-                stats::rms(&noise) / stats::difference_noise(&noise)
-                    > ROUGH.max(rough_by_chance(rows))
-            };
-            let count = (0..4000).filter(|_| rough(&mut random)).count();
-            assert!(count < 20, "{rows}: {count}");
-        }
-        assert!(rough_by_chance(60) < ROUGH && rough_by_chance(20) > ROUGH);
-    }
-
-    #[test]
-    fn accidents_stand_alone() {
-        let marked = |rows: &[usize]| {
-            let mut out = vec![false; 300];
-            for row in rows {
-                out[*row] = true;
-            }
-            stand_together(&out)
-        };
-        assert!(!marked(&[]));
-        let alone: Vec<usize> = (0..60).map(|k| 5 * k).collect();
-        assert!(!marked(&alone));
-        assert!(!marked(&[10, 11, 90, 91, 200, 201]));
-        assert!(marked(&[40, 41, 42, 43, 44, 45]));
-        // Half of all rows, at random, have neighbours.
-        let mut random = crate::closure::synthetic::Random::new(5);
-        let half: Vec<usize> = (0..300).filter(|_| random.normal() > 0.0).collect();
-        assert!(!marked(&half));
-    }
-}
+#[path = "otherwise_tests.rs"]
+mod tests;

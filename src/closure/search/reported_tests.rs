@@ -71,13 +71,8 @@ fn kept_of(
             term("supply_sensitivity", p_values[0], rivals),
             term("g_sensitivity", p_values[1], 0),
         ],
-        strangers: Vec::new(),
         left: left.then(|| "time_s".to_owned()),
-        first: Vec::new(),
-        missing: Vec::new(),
-        undecided: Vec::new(),
-        within_rounding: Vec::new(),
-        once: Vec::new(),
+        ..Found::default()
     };
     search.kept_alone(&mut found).unwrap();
     assert!(found.left.is_some() || !left);
@@ -183,11 +178,7 @@ fn names_that_outweigh_what_is_known_of_the_rest_need_not_explain_most() {
             terms: BOTH.map(|id| term(id, 1e-15, 47.0)).to_vec(),
             strangers: vec![stranger],
             left: Some("time_s".to_owned()),
-            first: Vec::new(),
-            missing: Vec::new(),
-            undecided: Vec::new(),
-            within_rounding: Vec::new(),
-            once: Vec::new(),
+            ..Found::default()
         };
         search.kept_below(&mut found).unwrap();
         assert_eq!(found.terms.len(), names, "{strange}");

@@ -320,14 +320,8 @@ fn a_dropped_name_leaves_something_if_it_was_beyond_what_chance_makes() {
         (0.5 * BEYOND, Some("accel_g"), Some("accel_g")),
     ] {
         let mut found = Found {
-            terms: Vec::new(),
-            strangers: Vec::new(),
             left: before.map(str::to_owned),
-            first: Vec::new(),
-            missing: Vec::new(),
-            undecided: Vec::new(),
-            within_rounding: Vec::new(),
-            once: Vec::new(),
+            ..Found::default()
         };
         let term = Term {
             p_value,
