@@ -141,14 +141,14 @@ impl Search<'_> {
     }
 
     /// Whether a named law and another shape are of one channel: two names, of all the same channels. A sharp name is one of
-    /// its own.
+    /// its own, and names that act on the bias are each most of what the other one is.
     fn are_kin(&self, law: &Term, other: &Term) -> bool {
         let channels = |t: &Term| t.candidate.channels_at(self.channels, &t.point);
-        let sharp = law.candidate.is_local() || other.candidate.is_local();
+        let apart = |t: &Term| t.candidate.is_local() || t.candidate.acts_on_bias();
         law.candidate.named()
             && match other.candidate.named() {
                 false => channel(self, law) == channel(self, other),
-                true => !sharp && channels(law) == channels(other),
+                true => !apart(law) && !apart(other) && channels(law) == channels(other),
             }
     }
 
