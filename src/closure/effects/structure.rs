@@ -45,9 +45,6 @@ const THIRD_ORDER: Sheet = Sheet {
 const BENT: usize = 1;
 const MOST_BENT: f64 = 0.5;
 
-/// What it costs that the form is chosen, which the law does not need.
-const CHOICE: f64 = 2.0;
-
 /// Legendre's polynomials of fourth and fifth order: each is apart from all lower orders.
 fn higher_orders(u: f64) -> [f64; 2] {
     let v = u * u;
@@ -80,10 +77,6 @@ impl Candidate for ThirdOrder {
             columns.extend((0..2).map(|k| map(&c.u, |u| higher_orders(u)[k])));
         }
         columns
-    }
-
-    fn surcharge(&self, _c: &Channels, point: &Point) -> f64 {
-        if point.form == BENT { CHOICE } else { 0.0 }
     }
 
     fn admits(&self, _c: &Channels, _point: &Point, beta: &[f64]) -> bool {

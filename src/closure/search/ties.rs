@@ -77,7 +77,11 @@ impl Search<'_> {
                 terms.insert(k, Term::of(rival, Vec::new()));
                 let with = self.tried(&terms, k)?;
                 let id = rival.candidate.id();
-                if self.is_tie(&place, &with, rival) && !rivals.contains(&id) {
+                // A bend may follow what the noise makes of the course: then the course itself is asked as well.
+                let bent = with.terms[k].point.form != rival.point.form;
+                let tie = self.is_tie(&place, &with, rival)
+                    || bent && self.is_tie(&place, &self.model(&terms)?, rival);
+                if tie && !rivals.contains(&id) {
                     rivals.push(id.clone());
                 }
                 let net = self.net(&with);
