@@ -117,6 +117,40 @@ fn whitening_is_the_inverse_cholesky_factor() {
     }
 }
 
+/// Even times, whose gains become steady, with what ends that: a gap, a row that counts less, a row that is not used.
+fn even(n: usize) -> Timeline {
+    let time = |k: usize| 0.1 * k as f64 + if k >= 300 { 7.0 } else { 0.0 };
+    let times: Vec<f64> = (0..n).map(time).collect();
+    let factor = |k: usize| match k {
+        150 => f64::INFINITY,
+        400 => 6.0,
+        _ => 1.0,
+    };
+    Timeline::new(&times, (0..n).map(factor).collect()).unwrap()
+}
+
+#[test]
+fn steady_gains_are_those_of_the_covariance() {
+    let n = 500;
+    let line = even(n);
+    let column = Stream::new(3, 1).normals(n);
+    for (flicker, walk) in [(0.0, 0.5), (0.0, 5.0), (0.3, 0.0), (0.1, 0.5)] {
+        let shape = Shape { flicker, walk };
+        let (rows, v) = dense(&line, shape);
+        let cholesky = v.cholesky().unwrap();
+        let whitener = Whitener::new(&line, shape);
+        let log_det = 2.0 * cholesky.l().diagonal().map(f64::ln).sum();
+        assert!((whitener.log_det - log_det).abs() < 1e-8, "{shape:?}");
+        assert_eq!(whitener.used, rows.len());
+        let white = whitener.apply(&column);
+        let chosen = DVector::from_iterator(rows.len(), rows.iter().map(|i| column[*i]));
+        let reference = cholesky.l().solve_lower_triangular(&chosen).unwrap();
+        for (k, i) in rows.iter().enumerate() {
+            assert!((white[*i] - reference[k]).abs() < 1e-9, "{shape:?} row {i}");
+        }
+    }
+}
+
 #[test]
 fn least_squares_on_whitened_columns_is_generalised_least_squares() {
     let n = 160;
