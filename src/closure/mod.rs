@@ -35,6 +35,7 @@ pub mod search;
 mod smooth;
 pub mod staircase;
 pub mod sweep;
+mod trend;
 pub mod verdict;
 pub mod weights;
 

@@ -104,8 +104,10 @@ impl Told<'_> {
             reasons.push("it has the readings as they are, and what was taken out of them for the model is in its error");
         }
         let without_rounding = carried.unrounded_rms_dps / model;
-        if reasons.is_empty() || without_rounding < MORE {
+        if without_rounding < MORE {
             reasons.push("its words are too short for this correction");
+        } else if reasons.is_empty() {
+            reasons.push("it has each reading with its noise or its rounding, where the model has the course without them");
         }
         (firmware > MORE * model).then(|| {
             let said = format!(

@@ -149,11 +149,12 @@ impl Candidate for Deadband {
         (vec![along.collect()], Vec::new())
     }
 
-    fn least(&self, c: &Channels, point: &Point, seen: &[bool]) -> Option<Point> {
+    fn open(&self, c: &Channels, point: &Point, seen: &[bool]) -> Vec<Point> {
         let sizes = seen_magnitudes(c, seen);
         let within = sizes.partition_point(|s| s.ln() <= point.theta[0]);
-        let widest = sizes.get(within.checked_sub(1)?)?.ln();
-        (!is_smooth(point)).then(|| Point::at(0, &[widest + ROUNDING]))
+        let widest = sizes[..within].last().filter(|_| !is_smooth(point));
+        let least = widest.map(|s| Point::at(0, &[s.ln() + ROUNDING]));
+        least.into_iter().collect()
     }
 
     fn spacing(&self, _c: &Channels, _point: &Point) -> Vec<f64> {

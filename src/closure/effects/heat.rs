@@ -9,6 +9,7 @@ use crate::closure::channels::{Channels, lag};
 use crate::closure::firmware::{Trial, Words, knots};
 use crate::closure::likelihood::linear::add_scaled;
 use crate::closure::smooth::slope;
+use crate::closure::trend;
 use crate::correction::Term;
 
 /// All of this file.
@@ -286,17 +287,15 @@ impl Candidate for TemperatureRate {
     }
 
     fn points(&self, c: &Channels) -> Vec<Point> {
-        // Forms: how far the slope looks to both sides, for each reading of the temperature. Corners
-        // want it short, noise long.
+        // Forms: how closely the rate follows the readings, for each reading of the temperature. Corners want it close,
+        // noise far.
         (0..c.histories() * SLOPES.len()).map(Point::form).collect()
     }
 
     fn columns(&self, c: &Channels, _bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
         // Per record length, so that the column is of order one.
         let span = c.span_s().max(f64::MIN_POSITIVE);
-        let rows = SLOPES[point.form % SLOPES.len()];
-        let (heat, _, _) = c.history(point.form / SLOPES.len());
-        vec![map(&slope(&c.time_s, heat, rows), |v| v * span)]
+        vec![map(&rate_of_heat(c, point.form), |v| v * span)]
     }
 
     fn correction(&self, c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
@@ -306,9 +305,7 @@ impl Candidate for TemperatureRate {
         }
         let (input, trial) = read(c, f, which)?;
         let gain_dps_s = e.beta.first()? * c.span_s();
-        let rows = SLOPES[e.point.form % SLOPES.len()];
-        let wanted = slope(&c.time_s, c.history(which).0, rows);
-        let wanted = map(&wanted, |s| gain_dps_s * s);
+        let wanted = map(&rate_of_heat(c, e.point.form), |s| gain_dps_s * s);
         past_slopes(c, f, (input, &trial), gain_dps_s, &wanted)
     }
 
@@ -320,5 +317,31 @@ impl Candidate for TemperatureRate {
     }
 }
 
-/// Rows to each side of a slope.
-const SLOPES: [usize; 5] = [1, 2, 3, 5, 9];
+/// How the temperature's rate is found.
+enum Slope {
+    /// By lines through so many rows to each side: they see nothing of a corner beyond.
+    Rows(usize),
+    /// By a spline of this suppleness ([`trend::slope`]): all rows say something of the rate at each.
+    Spline(f64),
+}
+
+/// The ways that are tried.
+const SLOPES: [Slope; 8] = [
+    Slope::Rows(1),
+    Slope::Rows(2),
+    Slope::Rows(3),
+    Slope::Rows(5),
+    Slope::Spline(1.0),
+    Slope::Spline(0.1),
+    Slope::Spline(0.01),
+    Slope::Spline(0.001),
+];
+
+/// The rate of change, per second, of a reading of the temperature, as a form has it.
+fn rate_of_heat(c: &Channels, form: usize) -> Vec<f64> {
+    let (heat, _, _) = c.history(form / SLOPES.len());
+    match SLOPES[form % SLOPES.len()] {
+        Slope::Rows(rows) => slope(&c.time_s, heat, rows),
+        Slope::Spline(suppleness) => trend::slope(&c.time_s, heat, suppleness),
+    }
+}

@@ -194,10 +194,10 @@ pub trait Candidate: Send + Sync {
         (Vec::new(), Vec::new())
     }
 
-    /// The shape that the rows `seen` do not tell from the given one, and that claims least of the others: a dead band no
-    /// wider than the rates that showed it.
-    fn least(&self, _c: &Channels, _point: &Point, _seen: &[bool]) -> Option<Point> {
-        None
+    /// Shapes that the rows `seen` do not tell from the given one, and that say something else of the others: a dead band no
+    /// wider than the rates that showed it, thresholds at the ends of what lies between two readings.
+    fn open(&self, _c: &Channels, _point: &Point, _seen: &[bool]) -> Vec<Point> {
+        Vec::new()
     }
 
     /// The columns of a shape, one value a row.

@@ -46,8 +46,16 @@ const STRESS_JUMP: Sheet = Sheet {
     reference: "InterPACK 2007 (lead frames); Polimi 2025 (strain-gauge gyroscope)",
 };
 
-/// Form of a step that is spread over a width.
+/// Forms of a step: at one temperature; with a gap; one that happens once; spread over a width; with a gap in which the record
+/// begins, on the side that its first reading is farther from (what was before it decides that, and the record does not say it).
+const SHARP: usize = 0;
+const RELAY: usize = 1;
+const ONCE: usize = 2;
 const SPREAD: usize = 3;
+const OTHER_SIDE: usize = 4;
+
+/// What the side costs on which a relay begins.
+const OF_TWO: f64 = 1.0;
 
 /// Widths that are tried, in u, the narrowest (a narrower one is sharp) and the widest (a wider one is a bend of the bias).
 const WIDTHS: [f64; 3] = [0.012, 0.03, 0.08];
@@ -147,13 +155,13 @@ fn at_jumps(c: &Channels, seen: &[bool]) -> Vec<Point> {
     let jumps = jumps(c, seen);
     let mut out = Vec::new();
     for jump in &jumps {
-        out.push(Point::at(0, &[jump.at]));
-        out.push(Point::at(2, &[jump.at]));
+        out.push(Point::at(SHARP, &[jump.at]));
+        out.push(Point::at(ONCE, &[jump.at]));
         let back = |b: &&Jump| b.rising != jump.rising && b.by_dps * jump.by_dps < 0.0;
         for other in jumps.iter().filter(back).filter(|_| jump.rising) {
             let (up, down) = (jump.at, other.at);
             if up > down {
-                out.push(Point::at(1, &[0.5 * (up + down), up - down]));
+                out.push(Point::at(RELAY, &[0.5 * (up + down), up - down]));
             }
         }
     }
@@ -208,7 +216,12 @@ fn in_readings(
 
 /// 0 below, 1 above `centre`, by half the gap later in each direction; `once`: it never comes back.
 pub fn step(u: &[f64], centre: f64, gap: f64, once: bool) -> Vec<f64> {
-    let mut above = u.first().is_some_and(|u| *u > centre);
+    let above = u.first().is_some_and(|u| *u > centre);
+    stepped(u, (centre, gap), once, above)
+}
+
+/// The same from a side on which it begins.
+fn stepped(u: &[f64], (centre, gap): (f64, f64), once: bool, mut above: bool) -> Vec<f64> {
     u.iter()
         .map(|u| {
             if *u > centre + 0.5 * gap {
@@ -230,6 +243,18 @@ fn once(u: &[f64], centre: f64) -> Vec<f64> {
     step(u, centre, 0.0, true)
 }
 
+/// The other side of a relay's beginning, where the record begins in its gap.
+fn other_side(c: &Channels, point: &Point) -> Option<Point> {
+    let (centre, gap) = (point.theta.first()?, point.theta.get(1)?.abs());
+    let first = c.smooth_u.first()?;
+    let form = match point.form {
+        RELAY => OTHER_SIDE,
+        OTHER_SIDE => RELAY,
+        _ => return None,
+    };
+    ((first - centre).abs() < 0.5 * gap).then(|| Point::at(form, &point.theta))
+}
+
 impl Candidate for StressJump {
     fn sheet(&self) -> &Sheet {
         &STRESS_JUMP
@@ -239,18 +264,21 @@ impl Candidate for StressJump {
         Ok(vec![heated(c)?, "time_s".to_owned()])
     }
 
-    fn points(&self, _c: &Channels) -> Vec<Point> {
+    fn points(&self, c: &Channels) -> Vec<Point> {
         let mut out = Vec::new();
         let centres =
             |count: usize| (0..count).map(move |k| -0.85 + 1.7 * k as f64 / (count - 1) as f64);
         for (k, gap) in GAPS.into_iter().enumerate() {
-            let form = usize::from(k > 0);
             for centre in centres(if k == 0 { 40 } else { 30 }) {
-                let theta = [centre, gap];
-                out.push(Point::at(form, &theta[..1 + form]));
+                out.push(match k {
+                    0 => Point::at(SHARP, &[centre]),
+                    _ => Point::at(RELAY, &[centre, gap]),
+                });
             }
         }
-        out.extend(centres(24).map(|centre| Point::at(2, &[centre])));
+        let others: Vec<Point> = out.iter().filter_map(|p| other_side(c, p)).collect();
+        out.extend(others);
+        out.extend(centres(24).map(|centre| Point::at(ONCE, &[centre])));
         for width in WIDTHS {
             out.extend(centres(24).map(|centre| Point::at(SPREAD, &[centre, width.ln()])));
         }
@@ -260,8 +288,12 @@ impl Candidate for StressJump {
     fn columns(&self, c: &Channels, _bias: &Bias, point: &Point) -> Vec<Vec<f64>> {
         let centre = point.theta[0];
         vec![match point.form {
-            0 => step(&c.smooth_u, centre, 0.0, false),
-            1 => step(&c.smooth_u, centre, point.theta[1].abs(), false),
+            SHARP => step(&c.smooth_u, centre, 0.0, false),
+            RELAY => step(&c.smooth_u, centre, point.theta[1].abs(), false),
+            OTHER_SIDE => {
+                let begins = c.smooth_u.first().is_some_and(|u| *u <= centre);
+                stepped(&c.smooth_u, (centre, point.theta[1].abs()), false, begins)
+            }
             SPREAD => map(&c.smooth_u, |u| spread(point, u)),
             _ => once(&c.smooth_u, centre),
         }]
@@ -273,7 +305,11 @@ impl Candidate for StressJump {
 
     fn surcharge(&self, _c: &Channels, point: &Point) -> f64 {
         // What happened once may be anything: a law that fits as well says what comes next.
-        if point.form == 2 { 4.0 } else { 0.0 }
+        match point.form {
+            ONCE => 4.0,
+            OTHER_SIDE => OF_TWO,
+            _ => 0.0,
+        }
     }
 
     fn fine(&self, c: &Channels, _point: &Point, seen: &[bool]) -> Vec<Point> {
@@ -281,18 +317,20 @@ impl Candidate for StressJump {
         let mut out = at_jumps(c, seen);
         for j in 0..75 {
             let centre = -0.9 + 1.8 * f64::from(j) / 74.0;
-            out.push(Point::at(0, &[centre]));
-            out.push(Point::at(2, &[centre]));
-            out.extend((1..25).map(|k| Point::at(1, &[centre, 0.04 * f64::from(k)])));
+            out.push(Point::at(SHARP, &[centre]));
+            out.push(Point::at(ONCE, &[centre]));
+            out.extend((1..25).map(|k| Point::at(RELAY, &[centre, 0.04 * f64::from(k)])));
             out.extend(WIDTHS.map(|width| Point::at(SPREAD, &[centre, width.ln()])));
         }
+        let others: Vec<Point> = out.iter().filter_map(|p| other_side(c, p)).collect();
+        out.extend(others);
         out
     }
 
     fn spacing(&self, _c: &Channels, point: &Point) -> Vec<f64> {
         match point.form {
             SPREAD => vec![width(point), 0.5],
-            1 => vec![0.05; 2],
+            RELAY | OTHER_SIDE => vec![0.05; 2],
             _ => vec![0.05],
         }
     }
@@ -303,30 +341,54 @@ impl Candidate for StressJump {
         }
         let centre = point.theta[0];
         let gap = point.theta.get(1).map_or(0.0, |g| g.abs());
-        if point.form != 1 {
+        if !matches!(point.form, RELAY | OTHER_SIDE) {
             let along = thresholds(&c.smooth_u, centre);
             let along = along.into_iter().map(|t| Point::at(point.form, &[t]));
             return (vec![along.collect()], Vec::new());
         }
         let (up, down) = (centre + 0.5 * gap, centre - 0.5 * gap);
-        let of = |up: f64, down: f64| Point::at(1, &[0.5 * (up + down), up - down]);
+        let of = |up: f64, down: f64| Point::at(point.form, &[0.5 * (up + down), up - down]);
         let ups = thresholds(&c.smooth_u, up).into_iter();
         let downs = thresholds(&c.smooth_u, down).into_iter();
         let axes = vec![
             ups.filter(|t| *t >= down).map(|t| of(t, down)).collect(),
             downs.filter(|t| *t <= up).map(|t| of(up, t)).collect(),
         ];
-        (axes, [up, centre, down].map(|t| Point::at(0, &[t])).into())
+        (
+            axes,
+            [up, centre, down].map(|t| Point::at(SHARP, &[t])).into(),
+        )
+    }
+
+    fn open(&self, c: &Channels, point: &Point, seen: &[bool]) -> Vec<Point> {
+        let of_seen = |point: &Point| -> Vec<f64> {
+            let columns = self.columns(c, &Bias::default(), point);
+            let pairs = columns[0].iter().zip(seen);
+            pairs.filter(|(_, seen)| **seen).map(|(v, _)| *v).collect()
+        };
+        let own = of_seen(point);
+        let mut out = vec![point.clone()];
+        for axis in 0..self.stairs(c, point).0.len() {
+            let ends = |from: &Point| -> Vec<Point> {
+                let along = self.stairs(c, from).0.into_iter().nth(axis);
+                let same = |p: &Point| of_seen(p) == own;
+                let mut open = along.unwrap_or_default().into_iter().filter(same);
+                let first = open.next();
+                first.into_iter().chain(open.last()).collect()
+            };
+            out = out.iter().flat_map(ends).collect();
+        }
+        out
     }
 
     fn correction(&self, c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
         let centre = e.point.theta[0];
-        if e.point.form == 2 && c.smooth_u.first().is_some_and(|u| *u > centre) {
+        if e.point.form == ONCE && c.smooth_u.first().is_some_and(|u| *u > centre) {
             // It waits for the cold: the relay of the firmware waits for the warm only.
             return None;
         }
         let gap = match e.point.form {
-            1 => e.point.theta[1].abs(),
+            RELAY | OTHER_SIDE => e.point.theta[1].abs(),
             _ => 0.0,
         };
         let (gain_dps, input) = (*e.beta.first()?, f.thermometer()?);
@@ -339,7 +401,7 @@ impl Candidate for StressJump {
                 values_dps: knots(count).map(shape).collect(),
             }]);
         }
-        let once = e.point.form == 2;
+        let once = e.point.form == ONCE;
         let term = |centre: f64, gap: f64| Term::Step {
             gain_dps,
             input,
@@ -366,7 +428,7 @@ impl Candidate for StressJump {
         ]
         .into_iter()
         .collect();
-        if e.point.form == 1 {
+        if matches!(e.point.form, RELAY | OTHER_SIDE) {
             let gap = e.point.theta[1].abs();
             out.insert("gap_k".to_owned(), ((k * gap).abs(), (k * std(1)).abs()));
         }
@@ -375,8 +437,13 @@ impl Candidate for StressJump {
             let std = (k * width * std(1)).abs();
             out.insert("width_k".to_owned(), ((k * width).abs(), std));
         }
-        if e.point.form == 2 {
+        if e.point.form == ONCE {
             out.insert("returns".to_owned(), (0.0, 0.0));
+        }
+        if e.point.form == OTHER_SIDE {
+            let begins = c.smooth_u.first().is_some_and(|u| *u <= e.point.theta[0]);
+            let warm = begins == (k > 0.0);
+            out.insert("begins_warm".to_owned(), (f64::from(u8::from(warm)), 0.0));
         }
         out
     }

@@ -1,6 +1,6 @@
 //! A bias that steps at a temperature, closed: where the firmware's relay switches.
 
-use super::{Point, at_jumps};
+use super::{Bias, Candidate, Point, at_jumps};
 use crate::closure::channels::Channels;
 use crate::closure::close::close;
 use crate::closure::effects::Reported;
@@ -208,4 +208,77 @@ fn a_loop_switches_at_the_row_where_the_error_jumps() {
                 .all(|p| p.form != 1)
         );
     }
+}
+
+/// What a record of triangles between 0 and 60 degC from `first_degc` on, up or down at first, says of a step up at 45 and down at 25
+/// degC that begins above: the names and the parameters of the first.
+fn begun(seed: u64, first_row: usize) -> (Vec<String>, Reported) {
+    let (rows, mut random) = (480, Random::new(seed));
+    let degc: Vec<f64> = (0..rows)
+        .map(|k| {
+            let way = ((k + first_row) % 120) as f64 / 60.0;
+            60.0 * way.min(2.0 - way)
+        })
+        .collect();
+    let mut up = true;
+    let output = degc.iter().map(|t| {
+        up = *t > 45.0 || up && *t > 25.0;
+        2.0 - 0.05 * t + if up { 0.1 } else { 0.0 } + 0.01 * random.normal()
+    });
+    let columns = BTreeMap::from([
+        ("rate_out_dps".to_owned(), output.collect()),
+        ("die_degc".to_owned(), degc.clone()),
+    ]);
+    let time_s: Vec<f64> = (0..rows).map(|k| 10.0 * k as f64).collect();
+    let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+    let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+    let found = search.run().unwrap();
+    let estimate = search.estimates(&search.model(&found.terms).unwrap());
+    let names = found.terms.iter().map(|t| t.id()).collect();
+    let reported = found.terms[0].candidate.report(&c, &estimate[0]);
+    (names, reported)
+}
+
+#[test]
+fn a_record_that_begins_within_the_gap_begins_on_either_side() {
+    for seed in 0..3 {
+        // At 30 degC, nearer to where it is down, but it has not come back yet.
+        let (names, reported) = begun(seed, 30);
+        assert_eq!(names, ["stress_jump"], "{seed}");
+        assert_eq!(reported["begins_warm"].0, 1.0, "{seed} {reported:?}");
+        // At 40 degC and falling: the usual guess.
+        let (names, reported) = begun(seed, 80);
+        assert_eq!(names, ["stress_jump"], "{seed}");
+        assert!(!reported.contains_key("begins_warm"), "{seed}");
+    }
+}
+
+#[test]
+fn thresholds_are_open_between_the_readings_that_are_seen() {
+    let degc: Vec<f64> = synthetic::triangle(200);
+    let columns = BTreeMap::from([
+        ("rate_out_dps".to_owned(), vec![0.0; 200]),
+        ("die_degc".to_owned(), degc),
+    ]);
+    let time_s: Vec<f64> = (0..200).map(|k| 10.0 * k as f64).collect();
+    let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+    let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+    let is_it = |k: &&std::sync::Arc<dyn Candidate>| k.id() == "stress_jump";
+    let jump = search.candidates().iter().find(is_it).unwrap();
+    // Rows around the way up over 0.1 are not seen.
+    let seen: Vec<bool> = (0..200).map(|k| !(50..60).contains(&k)).collect();
+    let point = Point::at(1, &[0.0, 0.2]);
+    let column = |point: &Point| jump.columns(&c, &Bias::default(), point).remove(0);
+    let own = column(&point);
+    let open = jump.open(&c, &point, &seen);
+    assert_eq!(open.len(), 4);
+    let mut apart = 0;
+    for other in &open {
+        let other = column(other);
+        let pairs = own.iter().zip(&other).zip(&seen);
+        assert!(pairs.clone().all(|((a, b), seen)| a == b || !seen));
+        apart += pairs.filter(|((a, b), _)| a != b).count();
+    }
+    assert!(apart >= 8, "{apart}");
+    assert!(jump.open(&c, &Point::at(3, &[0.0, -2.0]), &seen).len() <= 1);
 }

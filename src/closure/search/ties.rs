@@ -5,11 +5,11 @@
 //! in the next.
 
 use super::declared::declared;
-use super::judge::{EQUAL, Judged};
+use super::judge::{EQUAL, Judged, price};
 use super::reading::reads_temperature;
 use super::sweep::BETTER;
 use super::{Found, LEVEL, MOST_RIVALS, Model, Search, Term};
-use crate::closure::effects::Candidate;
+use crate::closure::effects::{Candidate, tone};
 use crate::closure::likelihood::Unusable;
 use crate::closure::likelihood::linear::{Basis, dot};
 use crate::closure::smooth::reading_noise;
@@ -138,7 +138,12 @@ impl Search<'_> {
 
     /// Whether a model with another name in a step's place is as good.
     fn is_tie(&self, of: &Place<'_>, with: &Model, rival: &Judged) -> bool {
-        let behind = self.net(of.model) - self.net(with) - rival.odds_against;
+        let unlikely = match self.is_of_own_channel(rival, &of.model.terms[of.k]) {
+            // That it has just the channel's frequency speaks against it, but nothing in the record does.
+            true => price(rival.candidate.as_ref(), self.channels, &rival.point),
+            false => rival.odds_against,
+        };
+        let behind = self.net(of.model) - self.net(with) - unlikely;
         let blur = (self.blur_of(with, of.k) - self.blur_of(of.model, of.k)).max(0.0);
         // What the noise takes away is itself by chance: its variance is twice its mean.
         let allowed = match self.is_shape_and_noise(of, with) {
@@ -180,8 +185,19 @@ impl Search<'_> {
         let names = judged.iter().filter(|j| j.candidate.named());
         let others = names.filter(|j| j.candidate.id() != own.id());
         let near = others.filter(|j| j.net + j.odds_against > same.net - BEHIND);
-        near.filter(|j| !self.is_another_channels(&j.candidate.id(), &j.point))
-            .take(LOOKED)
+        near.filter(|j| {
+            !self.is_another_channels(&j.candidate.id(), &j.point) || self.is_of_own_channel(j, own)
+        })
+        .take(LOOKED)
+    }
+
+    /// Whether a rival is a sinusoid that a channel of the step is as well.
+    fn is_of_own_channel(&self, rival: &Judged, step: &Term) -> bool {
+        let frequency_hz = rival.point.theta.first();
+        let frequency_hz = frequency_hz.filter(|_| rival.candidate.id() == tone::NAMED);
+        let channel = frequency_hz.and_then(|hz| self.another_channels(*hz));
+        let own = step.candidate.channels_at(self.channels, &step.point);
+        channel.is_some_and(|name| own.contains(&name) && name != "time_s")
     }
 
     /// Log-likelihood that the noise of what a term is a function of takes away.

@@ -64,3 +64,39 @@ fn a_channel_that_is_the_steps_shape_and_noise_is_listed_however_much_the_noise_
         assert_eq!(both, ["bias_third_order", "supply_sensitivity"], "{seed}");
     }
 }
+
+/// The acceleration swings as a table tilts, `own` of it beyond a sinusoid, and acts on the output: the names and what is as good.
+fn swung(seed: u64, own: f64) -> (Vec<String>, Vec<String>) {
+    let mut random = Random::new(seed);
+    let degc = [triangle(ROWS / 2), triangle(ROWS - ROWS / 2)].concat();
+    let accel = (0..ROWS).map(|k| {
+        let angle = std::f64::consts::TAU * 37.0 * k as f64 / ROWS as f64;
+        angle.sin() + own * (3.0 * angle).sin()
+    });
+    let accel: Vec<f64> = accel.collect();
+    let pairs = degc.iter().zip(&accel);
+    let output = pairs.map(|(t, g)| 0.3 - 0.01 * t + 0.1 * g + NOISE_DPS * random.normal());
+    let columns = BTreeMap::from([
+        ("rate_out_dps".to_owned(), output.collect()),
+        ("accel_g".to_owned(), accel),
+        ("die_degc".to_owned(), degc),
+    ]);
+    let time_s: Vec<f64> = (0..ROWS).map(|k| 30.0 * k as f64).collect();
+    let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+    let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+    let found = search.run().unwrap();
+    let rivals = found.terms.iter().flat_map(|t| t.rivals.clone());
+    let rivals = rivals.collect();
+    (found.terms.iter().map(|t| t.id()).collect(), rivals)
+}
+
+#[test]
+fn a_sinusoid_of_a_channel_may_be_a_pickup_of_its_frequency() {
+    for seed in 0..3 {
+        let (names, rivals) = swung(seed, 0.0);
+        assert_eq!(names, ["g_sensitivity"], "{seed}");
+        assert_eq!(rivals, ["periodic_pickup"], "{seed}");
+        let (names, rivals) = swung(seed, 0.2);
+        assert_eq!((names, rivals.len()), (vec!["g_sensitivity".to_owned()], 0));
+    }
+}

@@ -32,6 +32,9 @@ const LEAST_PERIODS: f64 = 3.0;
 /// Frequencies per independent one.
 const OVERSAMPLING: f64 = 2.0;
 
+/// Most frequencies for one of a record without gaps.
+const GAPS: f64 = 3.0;
+
 /// A noise of less posterior weight is not looked at.
 const LIGHT: f64 = 0.1;
 
@@ -74,6 +77,13 @@ impl Turning {
     }
 }
 
+/// Half the rate of a fit's rows, where they do not pause, in periods over the record: rows with gaps are fewer than their
+/// distance says. No more than [`GAPS`] times what the rows' number says.
+fn nyquist_periods(c: &Channels, fit: &Fit) -> f64 {
+    let rows = 0.5 * fit.problem.y.len() as f64;
+    (0.5 * c.span_s() / fit.problem.line.period_s).clamp(rows, GAPS * rows)
+}
+
 /// Scans frequencies from three periods over the record to the rows' Nyquist frequency, under the
 /// likeliest noises of the grid.
 pub fn strongest(c: &Channels, fit: &Fit, grid: &Grid) -> Option<Tone> {
@@ -83,7 +93,7 @@ pub fn strongest(c: &Channels, fit: &Fit, grid: &Grid) -> Option<Tone> {
     if rows < 16 || span <= 0.0 {
         return None;
     }
-    let highest = 0.5 * rows as f64;
+    let highest = nyquist_periods(c, fit);
     let count = ((highest - LEAST_PERIODS) * OVERSAMPLING) as usize;
     let frequency = |k: usize| (LEAST_PERIODS + k as f64 / OVERSAMPLING) / span;
     let mut p_value = 0.0;
@@ -233,7 +243,7 @@ impl Search<'_> {
     pub(super) fn has_overtones(&self, model: &Model, frequency_hz: f64) -> bool {
         let c = self.channels;
         let bench = Bench::new(model, model.fit.at.shape);
-        let fastest_hz = 0.5 * model.fit.problem.y.len() as f64 / c.span_s();
+        let fastest_hz = nyquist_periods(c, &model.fit) / c.span_s();
         let orders = (2..=HARMONICS).map(|k| frequency_hz * f64::from(k));
         let within: Vec<f64> = orders.filter(|hz| *hz < fastest_hz).collect();
         let further = model.terms.iter().filter(|t| t.id() == tone::FURTHER);

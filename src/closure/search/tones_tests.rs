@@ -29,6 +29,31 @@ fn a_fast_tone_at_uneven_times_is_found() {
     }
 }
 
+/// As fast as the rows tell where they do not pause, and faster than their number says.
+#[test]
+fn a_fast_tone_in_a_record_with_a_pause_is_found() {
+    let mut random = Random::new(8);
+    let at: Vec<usize> = (0..200).chain(500..700).collect();
+    let degc = triangle(at.len());
+    let cycles_a_row = 0.47;
+    let output = at.iter().zip(&degc).map(|(at, degc)| {
+        let tone = (std::f64::consts::TAU * cycles_a_row * *at as f64).sin();
+        0.3 - 0.01 * degc + 0.05 * tone + 0.01 * random.normal()
+    });
+    let columns = BTreeMap::from([
+        ("rate_out_dps".to_owned(), output.collect()),
+        ("die_degc".to_owned(), degc.clone()),
+    ]);
+    let time_s: Vec<f64> = at.iter().map(|at| *at as f64).collect();
+    let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+    let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+    let found = search.run().unwrap();
+    let names: Vec<String> = found.terms.iter().map(|t| t.id()).collect();
+    assert_eq!(names, ["periodic_pickup"]);
+    let hz = found.terms[0].point.theta[0];
+    assert!((hz - cycles_a_row).abs() < 0.05 / c.span_s(), "{hz}");
+}
+
 /// The tone is the only name, and nothing is left. Rows come by up to `uneven` of a row too late.
 fn keeps_its_frequency(seed: u64, cycles_a_row: f64, uneven: f64) {
     let rows = 2000;

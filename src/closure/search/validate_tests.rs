@@ -353,3 +353,40 @@ fn a_tone_beside_more_that_is_not_known_is_a_part_of_that() {
         "{names:?}, {left:?}"
     );
 }
+
+#[test]
+fn a_line_that_is_no_neighbour_and_no_harmonic_does_not_take_a_tones_name() {
+    let wave = |periods: f64| move |k: usize| (TAU * periods * k as f64 / ROWS as f64).sin();
+    let with = |second: f64| {
+        let (own, other) = (wave(67.0), wave(second));
+        closed(3, &[], move |k, _| 4.0 * own(k) + 1.8 * other(k))
+    };
+    let (names, left) = with(30.3);
+    assert_eq!(names, ["periodic_pickup"], "{left:?}");
+    assert_eq!(left.as_deref(), Some("time_s"));
+    for second in [134.0, 33.5, 71.0] {
+        let (names, left) = with(second);
+        assert!(names.is_empty() && left.is_some(), "{second} {names:?}");
+    }
+}
+
+#[test]
+fn a_load_that_comes_and_goes_is_no_tone() {
+    for seed in 0..4 {
+        let mut random = Random::new(50 + seed);
+        let (mut on, mut rows) = (false, 0);
+        let load: Vec<f64> = (0..ROWS)
+            .map(|_| {
+                if rows == 0 {
+                    on = !on;
+                    rows = if on { 3 } else { 6 } + usize::from(random.uniform() < 0.3);
+                }
+                rows -= 1;
+                f64::from(u8::from(on))
+            })
+            .collect();
+        let (names, left) = closed(seed, &[], |k, _| 8.0 * load[k]);
+        assert!(names.is_empty(), "{seed} {names:?}");
+        assert_eq!(left.as_deref(), Some("time_s"), "{seed}");
+    }
+}
