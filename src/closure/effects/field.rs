@@ -1,8 +1,8 @@
 //! Effects of supply and acceleration: one channel, one column.
 
 use super::{
-    Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, gain, map, moving,
-    product,
+    Bias, Candidate, Estimate, MOST_BENT, Missing, Parameter, Point, Reported, Sheet, gain, map,
+    moving, product,
 };
 use crate::closure::channels::{Channels, mean, scaled};
 use crate::closure::firmware::Words;
@@ -42,9 +42,6 @@ const BEND: Parameter = Parameter {
     name: "bend_dps",
     plausible: (0.0001, 1.0),
 };
-
-/// Most that a bend is of the law, rms over the record: more is no bend of it.
-const MOST_BENT: f64 = 0.15;
 
 /// Forms that have a bend with them, and what it costs that one of them is chosen, none of which the law needs.
 const BENT: usize = 3;
@@ -159,5 +156,78 @@ impl Candidate for Direct {
             out.extend([gain(BEND.name, e, 1, 1.0)]);
         }
         out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::structure;
+    use super::*;
+    use crate::closure::synthetic::triangle;
+    use std::collections::BTreeMap;
+
+    /// A supply from 4.5 to 5.5 V beside a temperature that goes up and down.
+    fn channels() -> Channels {
+        let columns = BTreeMap::from([
+            ("rate_out_dps".to_owned(), vec![0.0; 300]),
+            ("die_degc".to_owned(), triangle(300)),
+            (
+                "supply_v".to_owned(),
+                (0..300).map(|k| 4.5 + f64::from(k % 11) / 10.0).collect(),
+            ),
+        ]);
+        let time_s: Vec<f64> = (0..300).map(f64::from).collect();
+        Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap()
+    }
+
+    #[test]
+    fn a_bend_is_little_beside_its_law() {
+        let c = channels();
+        let is_it = |k: &Box<dyn Candidate>| k.id() == "supply_sensitivity";
+        let supply = all().into_iter().find(is_it).unwrap();
+        for point in supply.beside(&c, &Point::form(0)) {
+            let columns = supply.columns(&c, &Bias::default(), &point);
+            let rms = |column: &[f64]| {
+                let moved = map(column, |v| v - mean(column));
+                stats::rms(&moved)
+            };
+            let (law, bend) = (rms(&columns[0]), rms(&columns[1]));
+            for (share, is_bend) in [(0.14, true), (-0.14, true), (0.16, false)] {
+                let beta = [1.0, share * law / bend];
+                assert_eq!(
+                    supply.admits(&c, &point, &beta),
+                    is_bend,
+                    "{point:?} {share}"
+                );
+            }
+            assert!(supply.surcharge(&c, &point) > supply.surcharge(&c, &Point::form(0)));
+        }
+        assert!(supply.admits(&c, &Point::form(0), &[1e-9]));
+    }
+
+    #[test]
+    fn higher_orders_are_less_than_half_of_the_third() {
+        let c = channels();
+        let is_it = |k: &Box<dyn Candidate>| k.id() == "bias_third_order";
+        let third = structure::all().into_iter().find(is_it).unwrap();
+        let bent = third.beside(&c, &Point::form(0)).remove(0);
+        // Rms over -1 to 1 of the third Legendre polynomial in u^3, and of the fourth and fifth.
+        let (of_third, of_fourth, of_fifth) = (0.4 / 7f64.sqrt(), 1.0 / 3.0, 1.0 / 11f64.sqrt());
+        for (share, is_bend) in [(0.45, true), (0.55, false)] {
+            for [l4, l5] in [
+                [share * of_third / of_fourth, 0.0],
+                [0.0, share * of_third / of_fifth],
+            ] {
+                assert_eq!(
+                    third.admits(&c, &bent, &[1.0, l4, l5]),
+                    is_bend,
+                    "{share} {l4} {l5}"
+                );
+                assert_eq!(
+                    third.admits(&c, &bent, &[-2.0, 2.0 * l4, 2.0 * l5]),
+                    is_bend
+                );
+            }
+        }
     }
 }

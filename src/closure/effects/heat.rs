@@ -331,10 +331,10 @@ const SLOPES: [Slope; 8] = [
     Slope::Rows(2),
     Slope::Rows(3),
     Slope::Rows(5),
+    Slope::Rows(9),
     Slope::Spline(1.0),
     Slope::Spline(0.1),
     Slope::Spline(0.01),
-    Slope::Spline(0.001),
 ];
 
 /// The rate of change, per second, of a reading of the temperature, as a form has it.

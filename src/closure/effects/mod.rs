@@ -61,6 +61,9 @@ pub struct Sheet {
     pub reference: &'static str,
 }
 
+/// Most that a bend is of its law, rms over the record: more is no bend of it.
+pub const MOST_BENT: f64 = 0.15;
+
 /// The declared bias as it stands: deg/s over powers of u. Some effects act on it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Bias {

@@ -43,7 +43,7 @@ const THIRD_ORDER: Sheet = Sheet {
 
 /// The form with higher orders, and the most that these are of the third, rms over an evenly filled range.
 const BENT: usize = 1;
-const MOST_BENT: f64 = 0.5;
+const MOST_HIGHER: f64 = 0.5;
 
 /// Legendre's polynomials of fourth and fifth order: each is apart from all lower orders.
 fn higher_orders(u: f64) -> [f64; 2] {
@@ -83,7 +83,7 @@ impl Candidate for ThirdOrder {
         let [c3, l4, l5] = *beta else { return true };
         // u^3 is 2/5 P3 and lower orders; the mean square of Pn is 1 / (2 n + 1).
         let third = 0.4 * c3;
-        l4 * l4 / 9.0 + l5 * l5 / 11.0 <= MOST_BENT.powi(2) * third * third / 7.0
+        l4 * l4 / 9.0 + l5 * l5 / 11.0 <= MOST_HIGHER.powi(2) * third * third / 7.0
     }
 
     fn correction(&self, _c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {

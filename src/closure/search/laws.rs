@@ -8,11 +8,12 @@
 use super::forward::STRANGER;
 use super::judge::Judged;
 use super::{Model, Search, Term};
+use crate::closure::effects::MOST_BENT;
 use crate::closure::likelihood::Unusable;
 
 /// Share of what a shape without a name explains, in squares, that a law of its channel may be short of; the same of what a law
 /// explains, up to which it is the law's own bend. A second name may be a cause of its own: a smaller share.
-const BEND: f64 = 0.02;
+const BEND: f64 = MOST_BENT * MOST_BENT;
 const NAMED: f64 = 0.006;
 
 /// Names of a channel that are asked.

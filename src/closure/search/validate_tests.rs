@@ -374,18 +374,15 @@ fn a_line_that_is_no_neighbour_and_no_harmonic_does_not_take_a_tones_name() {
 fn a_load_that_comes_and_goes_is_no_tone() {
     for seed in 0..4 {
         let mut random = Random::new(50 + seed);
-        let (mut on, mut rows) = (false, 0);
-        let load: Vec<f64> = (0..ROWS)
-            .map(|_| {
-                if rows == 0 {
-                    on = !on;
-                    rows = if on { 3 } else { 6 } + usize::from(random.uniform() < 0.3);
-                }
-                rows -= 1;
-                f64::from(u8::from(on))
-            })
-            .collect();
-        let (names, left) = closed(seed, &[], |k, _| 8.0 * load[k]);
+        // On for four rows of every eleven, give or take two.
+        let mut next = 0.0;
+        let mut load = vec![0.0; ROWS];
+        while next < ROWS as f64 {
+            let from = (next + 2.0 * random.normal()).max(0.0) as usize;
+            load[from.min(ROWS)..(from + 4).min(ROWS)].fill(1.0);
+            next += 11.0;
+        }
+        let (names, left) = closed(seed, &[], |k, _| 12.0 * load[k]);
         assert!(names.is_empty(), "{seed} {names:?}");
         assert_eq!(left.as_deref(), Some("time_s"), "{seed}");
     }
