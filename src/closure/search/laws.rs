@@ -72,7 +72,8 @@ impl Search<'_> {
                 };
                 let with = self.with(model, &other)?;
                 let short = self.square(&with, &weights) - self.square(&all, &weights);
-                if short <= BEND * explained && with.admits(c, model.terms.len()) {
+                // In slow noise squares say little: a shape that has the law in it explains no less than the law.
+                if short.abs() <= BEND * explained && with.admits(c, model.terms.len()) {
                     return Ok(Some(name));
                 }
             }

@@ -387,3 +387,33 @@ fn a_load_that_comes_and_goes_is_no_tone() {
         assert_eq!(left.as_deref(), Some("time_s"), "{seed}");
     }
 }
+
+#[test]
+fn a_tone_with_what_it_leaves_on_two_levels_is_a_loads() {
+    let on_two = |of: &dyn Fn(f64) -> f64| {
+        let mut random = Random::new(4);
+        let degc = [triangle(ROWS / 2), triangle(ROWS / 2)].concat();
+        let periods = 41.0;
+        let output = (0..ROWS).map(|k| {
+            let wave = of((TAU * periods * k as f64 / ROWS as f64).sin());
+            0.3 + 0.1 * wave + 0.01 * random.normal()
+        });
+        let columns = BTreeMap::from([
+            ("rate_out_dps".to_owned(), output.collect()),
+            ("die_degc".to_owned(), degc.clone()),
+        ]);
+        let time_s: Vec<f64> = (0..ROWS).map(|k| 10.0 * k as f64).collect();
+        let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+        let split = c.split().unwrap();
+        let search = Search::new(&c, &split, Effort::default(), Vec::new());
+        let frequency_hz = periods / (10.0 * ROWS as f64);
+        let candidate: Arc<dyn Candidate> = Arc::new(Pickup {
+            frequency_hz,
+            further: false,
+        });
+        let term = Term::new(candidate, Point::at(0, &[frequency_hz]));
+        search.is_of_two_levels(&search.model(&[term]).unwrap(), 0)
+    };
+    assert!(on_two(&|sine| f64::from(u8::from(sine > 0.3))));
+    assert!(!on_two(&|sine| sine));
+}
