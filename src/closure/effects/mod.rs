@@ -18,6 +18,7 @@ pub mod rate;
 mod saturation;
 pub mod step;
 pub mod structure;
+mod switching;
 pub mod time;
 pub mod tone;
 pub mod user;

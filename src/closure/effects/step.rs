@@ -1,5 +1,6 @@
 //! Steps at a temperature.
 
+use super::switching::{at_jumps, ends, levels, thresholds};
 use super::{
     Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, entry, gain, heated, map,
 };
@@ -48,9 +49,9 @@ const STRESS_JUMP: Sheet = Sheet {
 
 /// Forms of a step: at one temperature; with a gap; one that happens once; spread over a width; with a gap in which the record
 /// begins, on the side that its first reading is farther from (what was before it decides that, and the record does not say it).
-const SHARP: usize = 0;
-const RELAY: usize = 1;
-const ONCE: usize = 2;
+pub(super) const SHARP: usize = 0;
+pub(super) const RELAY: usize = 1;
+pub(super) const ONCE: usize = 2;
 const SPREAD: usize = 3;
 const OTHER_SIDE: usize = 4;
 
@@ -74,99 +75,6 @@ fn spread(point: &Point, u: f64) -> f64 {
 
 /// Gaps of the hysteresis that are tried, in u.
 const GAPS: [f64; 10] = [0.0, 0.04, 0.08, 0.14, 0.21, 0.3, 0.41, 0.54, 0.7, 0.9];
-
-/// How far from a threshold others are tried, in u, and how many: all of the nearest to each side, and of the others.
-const NEAR: f64 = 0.1;
-const NEAREST: usize = 20;
-const MOST_STAIRS: usize = 60;
-
-/// Thresholds near `centre`, in order, each between two readings: the nearest ones, and every n-th where these are many.
-fn thresholds(u: &[f64], centre: f64) -> Vec<f64> {
-    let near = |v: &&f64| (**v - centre).abs() < NEAR;
-    let mut sorted: Vec<f64> = u.iter().filter(near).copied().collect();
-    sorted.sort_by(f64::total_cmp);
-    sorted.dedup();
-    let between: Vec<f64> = sorted.windows(2).map(|w| 0.5 * (w[0] + w[1])).collect();
-    let every = between.len().div_ceil(MOST_STAIRS).max(1);
-    let own = between.partition_point(|t| *t < centre);
-    let is_tried = |k: usize| k.abs_diff(own) <= NEAREST || k.is_multiple_of(every);
-    let tried = between.into_iter().enumerate();
-    tried
-        .filter(|(k, _)| is_tried(*k))
-        .map(|(_, t)| t)
-        .collect()
-}
-
-/// Rows to each side of a jump over which its size is taken, and how many jumps are looked at.
-const ASIDE: usize = 3;
-const JUMPS: usize = 8;
-
-/// A jump of the error between two rows.
-#[derive(Debug, Clone, Copy)]
-struct Jump {
-    /// u between them.
-    at: f64,
-    /// The temperature rises.
-    rising: bool,
-    /// By which the error does, deg/s.
-    by_dps: f64,
-}
-
-/// The largest jumps of the error in the rows that are seen, each the largest within [`ASIDE`] rows.
-fn jumps(c: &Channels, seen: &[bool]) -> Vec<Jump> {
-    let pairs = c.error_dps.iter().zip(seen);
-    let e: Vec<f64> = pairs.map(|(e, s)| if *s { *e } else { f64::NAN }).collect();
-    let mean = |rows: std::ops::Range<usize>| {
-        let (sum, count) = e[rows]
-            .iter()
-            .filter(|v| v.is_finite())
-            .fold((0.0, 0), |s, v| (s.0 + v, s.1 + 1));
-        if count > 0 {
-            sum / f64::from(count)
-        } else {
-            f64::NAN
-        }
-    };
-    let sizes: Vec<f64> = (ASIDE..e.len().saturating_sub(ASIDE - 1))
-        .map(|i| mean(i..i + ASIDE) - mean(i - ASIDE..i))
-        .map(|d| if d.is_finite() { d } else { 0.0 })
-        .collect();
-    let tops = (0..sizes.len()).filter(|k| {
-        let around = &sizes[k.saturating_sub(ASIDE)..(k + ASIDE + 1).min(sizes.len())];
-        around.iter().all(|d| d.abs() <= sizes[*k].abs())
-    });
-    let mut all: Vec<Jump> = tops
-        .map(|k| {
-            let (before, after) = (c.smooth_u[k + ASIDE - 1], c.smooth_u[k + ASIDE]);
-            Jump {
-                at: 0.5 * (before + after),
-                rising: after > before,
-                by_dps: sizes[k],
-            }
-        })
-        .collect();
-    all.sort_by(|a, b| b.by_dps.abs().total_cmp(&a.by_dps.abs()));
-    all.truncate(JUMPS);
-    all
-}
-
-/// Steps that switch where the error jumps: to the row, which a grid of thresholds does not hit where readings are many.
-fn at_jumps(c: &Channels, seen: &[bool]) -> Vec<Point> {
-    let jumps = jumps(c, seen);
-    let mut out = Vec::new();
-    for jump in &jumps {
-        out.push(Point::at(SHARP, &[jump.at]));
-        out.push(Point::at(ONCE, &[jump.at]));
-        let back = |b: &&Jump| b.rising != jump.rising && b.by_dps * jump.by_dps < 0.0;
-        for other in jumps.iter().filter(back).filter(|_| jump.rising) {
-            let (up, down) = (jump.at, other.at);
-            if up > down {
-                out.push(Point::at(RELAY, &[0.5 * (up + down), up - down]));
-            }
-        }
-    }
-    out
-}
 
 /// Gaps, in u, that firmware is tried with beyond the model's: what a noisy reading does not cross twice.
 const WIDER: [f64; 5] = [0.002, 0.005, 0.01, 0.02, 0.04];
@@ -361,22 +269,28 @@ impl Candidate for StressJump {
     }
 
     fn open(&self, c: &Channels, point: &Point, seen: &[bool]) -> Vec<Point> {
+        let centre = point.theta[0];
+        let starts = match point.form {
+            SPREAD => return Vec::new(),
+            // Where it comes back on the way down may not have been seen.
+            SHARP => vec![point.clone(), Point::at(RELAY, &[centre, 0.0])],
+            _ => vec![point.clone()],
+        };
         let of_seen = |point: &Point| -> Vec<f64> {
             let columns = self.columns(c, &Bias::default(), point);
             let pairs = columns[0].iter().zip(seen);
             pairs.filter(|(_, seen)| **seen).map(|(v, _)| *v).collect()
         };
         let own = of_seen(point);
-        let mut out = vec![point.clone()];
-        for axis in 0..self.stairs(c, point).0.len() {
-            let ends = |from: &Point| -> Vec<Point> {
-                let along = self.stairs(c, from).0.into_iter().nth(axis);
-                let same = |p: &Point| of_seen(p) == own;
-                let mut open = along.unwrap_or_default().into_iter().filter(same);
-                let first = open.next();
-                first.into_iter().chain(open.last()).collect()
-            };
-            out = out.iter().flat_map(ends).collect();
+        let levels = levels(&c.smooth_u);
+        let mut out = Vec::new();
+        for start in starts {
+            let mut open = vec![start];
+            for axis in 0..open[0].theta.len() {
+                let ends = |from: &Point| ends(from, axis, &levels, |p| of_seen(p) == own);
+                open = open.iter().flat_map(ends).collect();
+            }
+            out.extend(open);
         }
         out
     }

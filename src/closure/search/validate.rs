@@ -116,6 +116,10 @@ impl Search<'_> {
             let mut others = model.terms.clone();
             let term = others.remove(k);
             let without = self.model(&others)?;
+            let [of_own, of_none] = self.heldout_squares([&model, &without]);
+            if of_own <= of_none {
+                continue;
+            }
             let own = model.clone();
             for point in term.candidate.open(self.channels, &term.point, &self.used) {
                 let mut terms = model.terms.clone();
