@@ -180,11 +180,14 @@ mod tests {
         Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap()
     }
 
+    fn of(all: Vec<Box<dyn Candidate>>, id: &str) -> Box<dyn Candidate> {
+        all.into_iter().find(|k| k.id() == id).unwrap()
+    }
+
     #[test]
     fn a_bend_is_little_beside_its_law() {
         let c = channels();
-        let is_it = |k: &Box<dyn Candidate>| k.id() == "supply_sensitivity";
-        let supply = all().into_iter().find(is_it).unwrap();
+        let supply = of(all(), "supply_sensitivity");
         for point in supply.beside(&c, &Point::form(0)) {
             let columns = supply.columns(&c, &Bias::default(), &point);
             let rms = |column: &[f64]| {
@@ -208,8 +211,7 @@ mod tests {
     #[test]
     fn higher_orders_are_less_than_half_of_the_third() {
         let c = channels();
-        let is_it = |k: &Box<dyn Candidate>| k.id() == "bias_third_order";
-        let third = structure::all().into_iter().find(is_it).unwrap();
+        let third = of(structure::all(), "bias_third_order");
         let bent = third.beside(&c, &Point::form(0)).remove(0);
         // Rms over -1 to 1 of the third Legendre polynomial in u^3, and of the fourth and fifth.
         let (of_third, of_fourth, of_fifth) = (0.4 / 7f64.sqrt(), 1.0 / 3.0, 1.0 / 11f64.sqrt());
