@@ -110,8 +110,12 @@ mod tests {
             gram[(0, 0)] += 1.0 / DIFFUSE;
             gram[(1, 1)] += 1.0 / DIFFUSE;
             for k in 1..n {
-                let (move_on, added) = transition(readings[k].0 - readings[k - 1].0, q);
-                let weight = added.try_inverse().unwrap();
+                // The integrals of an integrated random walk of variance q a unit of time, written out.
+                let d = readings[k].0 - readings[k - 1].0;
+                let move_on = Matrix2::new(1.0, d, 0.0, 1.0);
+                let of = [d * d * d / 3.0, d * d / 2.0, d].map(|v| q * v);
+                let weight = Matrix2::new(of[0], of[1], of[1], of[2]);
+                let weight = weight.try_inverse().unwrap();
                 let mut both = DMatrix::zeros(2, 4);
                 both.view_mut((0, 0), (2, 2)).copy_from(&-move_on);
                 both.view_mut((0, 2), (2, 2))
