@@ -47,10 +47,7 @@ pub(super) fn ends(
 /// Thresholds near `centre`, in order, each between two readings: the nearest ones, and every n-th where these are many.
 pub(super) fn thresholds(u: &[f64], centre: f64) -> Vec<f64> {
     let near = |v: &&f64| (**v - centre).abs() < NEAR;
-    let mut sorted: Vec<f64> = u.iter().filter(near).copied().collect();
-    sorted.sort_by(f64::total_cmp);
-    sorted.dedup();
-    let between: Vec<f64> = sorted.windows(2).map(|w| 0.5 * (w[0] + w[1])).collect();
+    let between = levels(&u.iter().filter(near).copied().collect::<Vec<f64>>());
     let every = between.len().div_ceil(MOST_STAIRS).max(1);
     let own = between.partition_point(|t| *t < centre);
     let is_tried = |k: usize| k.abs_diff(own) <= NEAREST || k.is_multiple_of(every);
