@@ -83,7 +83,6 @@ fn a_relay_at_a_noisy_stair_does_not_chatter() {
 fn stepped(seed: u64, least_degc: f64) -> Reported {
     let mut random = Random::new(seed);
     let rows = 420;
-    let mut up = false;
     let degc: Vec<f64> = (0..rows)
         .map(|k| {
             let way = (k % 60) as f64 / 30.0;
@@ -91,22 +90,35 @@ fn stepped(seed: u64, least_degc: f64) -> Reported {
             least_degc + (most_degc - least_degc) * way.min(2.0 - way)
         })
         .collect();
+    let (names, reported) = switched(&mut random, &degc, 0.4, false);
+    assert_eq!(names, ["stress_jump"], "{seed}, {least_degc}");
+    reported
+}
+
+/// What a course of temperature says of a step of so much, deg/s, up at 45 and down at 25 degC, that begins up or not: the names and
+/// the parameters of the first.
+fn switched(
+    random: &mut Random,
+    degc: &[f64],
+    step_dps: f64,
+    mut up: bool,
+) -> (Vec<String>, Reported) {
     let output = degc.iter().map(|t| {
         up = *t > 45.0 || up && *t > 25.0;
-        2.0 - 0.05 * t + if up { 0.4 } else { 0.0 } + 0.01 * random.normal()
+        2.0 - 0.05 * t + if up { step_dps } else { 0.0 } + 0.01 * random.normal()
     });
     let columns = BTreeMap::from([
         ("rate_out_dps".to_owned(), output.collect()),
-        ("die_degc".to_owned(), degc.clone()),
+        ("die_degc".to_owned(), degc.to_vec()),
     ]);
-    let time_s: Vec<f64> = (0..rows).map(|k| 10.0 * k as f64).collect();
+    let time_s: Vec<f64> = (0..degc.len()).map(|k| 10.0 * k as f64).collect();
     let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
     let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
     let found = search.run().unwrap();
-    let names: Vec<String> = found.terms.iter().map(|t| t.id()).collect();
-    assert_eq!(names, ["stress_jump"], "{seed}, {least_degc}");
+    let names = found.terms.iter().map(|t| t.id()).collect();
     let estimate = search.estimates(&search.model(&found.terms).unwrap());
-    found.terms[0].candidate.report(&c, &estimate[0])
+    let reported = found.terms[0].candidate.report(&c, &estimate[0]);
+    (names, reported)
 }
 
 #[test]
@@ -210,33 +222,15 @@ fn a_loop_switches_at_the_row_where_the_error_jumps() {
     }
 }
 
-/// What a record of triangles between 0 and 60 degC from `first_degc` on, up or down at first, says of a step up at 45 and down at 25
-/// degC that begins above: the names and the parameters of the first.
+/// The same of triangles between 0 and 60 degC, from row `first_row` of one on, with a step of 0.1 deg/s that begins up.
 fn begun(seed: u64, first_row: usize) -> (Vec<String>, Reported) {
-    let (rows, mut random) = (480, Random::new(seed));
-    let degc: Vec<f64> = (0..rows)
+    let degc: Vec<f64> = (0..480)
         .map(|k| {
             let way = ((k + first_row) % 120) as f64 / 60.0;
             60.0 * way.min(2.0 - way)
         })
         .collect();
-    let mut up = true;
-    let output = degc.iter().map(|t| {
-        up = *t > 45.0 || up && *t > 25.0;
-        2.0 - 0.05 * t + if up { 0.1 } else { 0.0 } + 0.01 * random.normal()
-    });
-    let columns = BTreeMap::from([
-        ("rate_out_dps".to_owned(), output.collect()),
-        ("die_degc".to_owned(), degc.clone()),
-    ]);
-    let time_s: Vec<f64> = (0..rows).map(|k| 10.0 * k as f64).collect();
-    let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
-    let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
-    let found = search.run().unwrap();
-    let estimate = search.estimates(&search.model(&found.terms).unwrap());
-    let names = found.terms.iter().map(|t| t.id()).collect();
-    let reported = found.terms[0].candidate.report(&c, &estimate[0]);
-    (names, reported)
+    switched(&mut Random::new(seed), &degc, 0.1, true)
 }
 
 #[test]

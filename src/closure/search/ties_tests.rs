@@ -26,6 +26,11 @@ fn found(seed: u64, reading: f64, noise_dps: f64) -> (Vec<String>, Vec<String>) 
         ("supply_v".to_owned(), supply.collect()),
         ("die_degc".to_owned(), degc),
     ]);
+    said(columns)
+}
+
+/// The names and what is as good of a record of these columns.
+fn said(columns: BTreeMap<String, Vec<f64>>) -> (Vec<String>, Vec<String>) {
     let time_s: Vec<f64> = (0..ROWS).map(|k| 30.0 * k as f64).collect();
     let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
     let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
@@ -81,13 +86,7 @@ fn swung(seed: u64, own: f64) -> (Vec<String>, Vec<String>) {
         ("accel_g".to_owned(), accel),
         ("die_degc".to_owned(), degc),
     ]);
-    let time_s: Vec<f64> = (0..ROWS).map(|k| 30.0 * k as f64).collect();
-    let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
-    let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
-    let found = search.run().unwrap();
-    let rivals = found.terms.iter().flat_map(|t| t.rivals.clone());
-    let rivals = rivals.collect();
-    (found.terms.iter().map(|t| t.id()).collect(), rivals)
+    said(columns)
 }
 
 #[test]
