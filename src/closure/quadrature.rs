@@ -3,9 +3,11 @@
 //! A demodulator of fixed frequency turns against the gyro as the drive's phase moves, so that part of the rate's signal and noise
 //! stands in the quadrature. What is in the output then is in the quadrature as well, and any cause looks like a leakage: the
 //! channel is no cause but a second, worse output. From row to row it shows: the slope of the output's noise over the quadrature's is then
-//! more than the sine of any phase error.
+//! more than the sine of any phase error. A leakage may have such a slope where the phase error is no demodulator's that is in use, but
+//! then the applied rate does not stand in the quadrature.
 
 use super::channels::Channels;
+use super::likelihood::linear::dot;
 use super::search::declared_by;
 use crate::record::{Warning, stats};
 
@@ -55,6 +57,32 @@ fn slope(error_dps: &[f64], quad_dps: &[f64], rate_dps: &[f64]) -> Option<(f64, 
     Some((slope, variance.sqrt()))
 }
 
+/// Factor of the slope that the applied rate in a quadrature lets its noise have, from which on it is another one's.
+const BY_FAR: f64 = 2.0;
+
+/// Rows in a row that tell the same of a slow course.
+const TOGETHER: f64 = 10.0;
+
+/// Whether a slope that is the sine of no phase error in use is a leakage's all the same, by what the declared bias leaves of the
+/// output, the quadrature and the applied rate: what a quadrature contains of the rate it contains of the output's noise. Where the
+/// rate does not move, nothing is known.
+fn leaks(slope: f64, output: &[f64], quad: &[f64], rate: &[f64]) -> bool {
+    let square = dot(rate, rate);
+    if square <= 0.0 {
+        return false;
+    }
+    let contained = dot(rate, quad) / square;
+    let left: Vec<f64> = quad
+        .iter()
+        .zip(rate)
+        .map(|(q, r)| q - contained * r)
+        .collect();
+    let std = (TOGETHER * dot(&left, &left) / left.len() as f64 / square).sqrt();
+    let most = contained.abs() + SURELY * std;
+    let ratio = stats::curvature_noise(output) / stats::curvature_noise(quad);
+    contained.abs() <= SURELY * std && slope.abs() > BY_FAR * most * ratio * ratio
+}
+
 /// What is said of a quadrature that contains the output; `None`: it does not, or is not there.
 pub fn contains_output(c: &Channels) -> Option<Warning> {
     let (_, rest) = declared_by(&c.u, &c.error_dps);
@@ -66,7 +94,15 @@ pub fn contains_output(c: &Channels) -> Option<Warning> {
     let quad_dps = measured(c.moving(NAME)?);
     let rate_dps = c.moving("rate_dps").map(measured).unwrap_or_default();
     let (slope, std) = slope(&rest, &quad_dps, &rate_dps)?;
-    (slope.abs() - SURELY * std > NO_PHASE_ERROR).then(|| {
+    let beyond = slope.abs() - SURELY * std > NO_PHASE_ERROR;
+    let beside = |name: &str| {
+        let column = c.moving(name)?.iter().zip(&c.error_dps);
+        let measured = column.map(|(v, e)| if e.is_finite() { *v } else { f64::NAN });
+        Some(declared_by(&c.u, &measured.collect::<Vec<f64>>()).1)
+    };
+    let rate = || beside("rate_dps").unwrap_or_default();
+    let leaks = || beside(NAME).is_some_and(|quad| leaks(slope, &rest, &quad, &rate()));
+    (beyond && !leaks()).then(|| {
         Warning::on(
             "quadrature_contains_output",
             NAME,

@@ -67,6 +67,33 @@ fn a_quadrature_with_the_outputs_noise_is_left_out_and_said() {
 }
 
 #[test]
+fn a_leakage_of_no_plausible_angle_keeps_the_channel_where_the_applied_rate_is_not_in_it() {
+    // Steps of a table: from row to row the rate stands still.
+    let rate = |k: usize| 50.0 * ((k / 20 % 5) as f64 - 2.0);
+    let swept = |leaks: f64, turned: f64, seed: u64| {
+        let mut made = made(seed, leaks, turned);
+        let rates: Vec<f64> = (0..ROWS).map(rate).collect();
+        for (name, of_rate) in [(NAME, turned), ("rate_out_dps", 1.0)] {
+            let column = made.columns.get_mut(name).unwrap();
+            for (v, rate) in column.iter_mut().zip(&rates) {
+                *v += of_rate * rate;
+            }
+        }
+        made.columns.insert("rate_dps".to_owned(), rates);
+        made
+    };
+    for seed in 0..20 {
+        for leaks in [0.7, -3.0] {
+            let made = swept(leaks, 0.0, seed);
+            assert_eq!(said_of(&made), (false, false), "{seed} {leaks}");
+        }
+        let steep = made(seed, -3.0, 0.0);
+        assert_eq!(said_of(&steep), (true, true), "{seed}: without a rate");
+        assert_eq!(said_of(&swept(0.0, 0.6, seed)), (true, true), "{seed}");
+    }
+}
+
+#[test]
 fn what_the_output_shares_with_its_quadrature_is_no_leakage() {
     let design = reader::parse("", None).unwrap();
     for seed in 0..4 {
