@@ -2,7 +2,7 @@
 //! (the course of a hidden channel, a walk) does so for a while.
 
 use super::{Model, Search, Term};
-use crate::closure::likelihood::linear::{Basis, dot};
+use crate::closure::likelihood::linear::{Basis, add_scaled, dot};
 use crate::closure::likelihood::tail::chi_square_surprise;
 use crate::closure::likelihood::whiten::Whitener;
 
@@ -40,7 +40,13 @@ impl Search<'_> {
             .cloned()
             .collect();
         let mut basis = Basis::new(&whitener.apply_all(&others));
-        let mut rest = whitener.apply(&fit.problem.y);
+        let mut y = fit.problem.y.clone();
+        if term.candidate.is_sized(&term.point) {
+            // The fit has taken it off.
+            own.iter()
+                .for_each(|column| add_scaled(&mut y, 1.0, column));
+        }
+        let mut rest = whitener.apply(&y);
         basis.project_off(&mut rest);
         let without = dot(&rest, &rest);
         let off = |column: &Vec<f64>| {
