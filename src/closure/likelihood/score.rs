@@ -41,6 +41,7 @@ pub struct GroupScore {
 }
 
 /// The scores of a dictionary.
+#[derive(Clone)]
 pub struct Scores {
     /// One per group, in order.
     pub groups: Vec<GroupScore>,

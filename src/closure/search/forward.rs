@@ -2,6 +2,7 @@
 
 use super::judge::{Judged, PRICE, Round};
 use super::memo::Memo;
+use super::otherwise::Due;
 use super::{Found, LEVEL, MOST_RIVALS, Model, Search, Term};
 use crate::closure::effects::Candidate;
 use crate::closure::likelihood::robust::ACCIDENT;
@@ -52,20 +53,17 @@ pub enum Next {
 }
 
 impl Search<'_> {
-    /// One run of the search, and its model before names were dropped; with `names_only` it ends, with something left,
-    /// where a shape without a name leads.
+    /// One run of the search, and its model before names were dropped. One to which something is `due` ends, with something
+    /// left, where it will not come to that.
     ///
     /// # Errors
     /// Too few rows to fit anything.
-    pub(super) fn run_once(&self, names_only: bool) -> Result<(Found, Model), Unusable> {
+    pub(super) fn run_once(&self, due: Option<&Due>) -> Result<(Found, Model), Unusable> {
         let mut found = Found::default();
         let mut model = self.beginning()?;
         for _ in 0..ROUNDS {
-            model = self.forward(model, &mut found, names_only)?;
-            if let Some(stranger) = model.terms.iter().find(|t| !t.candidate.named())
-                && names_only
-            {
-                found.left = self.channel(stranger);
+            model = self.forward(model, &mut found, due)?;
+            if due.is_some() && found.left.is_some() {
                 return Ok((found, model));
             }
             let before: Vec<String> = model.terms.iter().map(Term::id).collect();
@@ -96,21 +94,24 @@ impl Search<'_> {
         Ok((found, reached))
     }
 
-    /// Steps until nothing is called for, or, with `names_only`, a shape without a name.
+    /// Steps until nothing is called for, or, where something is due, until that is out of reach.
     fn forward(
         &self,
         mut model: Model,
         found: &mut Found,
-        names_only: bool,
+        due: Option<&Due>,
     ) -> Result<Model, Unusable> {
         loop {
             let named = model.terms.iter().filter(|t| t.candidate.named()).count();
             let strangers = model.terms.len() - named;
-            let most = if names_only { 1 } else { STRANGERS };
-            if named >= self.effort.steps || strangers >= most {
+            if named >= self.effort.steps || strangers >= STRANGERS {
                 return Ok(model);
             }
             let round = self.round(&model, self.effort.surrogates);
+            if due.is_some_and(|due| self.falls_short(&model, &round, due)) {
+                found.left = Some("time_s".to_owned());
+                return Ok(model);
+            }
             if found.first.is_empty() {
                 found.first = round.judged.clone();
             }
@@ -128,6 +129,12 @@ impl Search<'_> {
                 }
                 Next::Add(mut term) => {
                     term.beside = model.terms.iter().map(Term::id).collect();
+                    let names: Vec<String> = [term.beside.as_slice(), &[term.id()]].concat();
+                    let in_vain = |due| !term.candidate.named() || self.is_back(&names, due);
+                    if due.is_some_and(in_vain) {
+                        found.left = self.channel(&term);
+                        return Ok(model);
+                    }
                     let mut terms = model.terms.clone();
                     terms.push(term);
                     let with = self.polished(self.model(&terms)?)?;

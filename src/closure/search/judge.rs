@@ -83,6 +83,37 @@ impl Judged {
 /// Candidates with their shapes, in order.
 type Running = Vec<(Arc<dyn Candidate>, Vec<Point>)>;
 
+/// What the shapes of all candidates gain beside a model, before any is looked at finely.
+#[derive(Clone)]
+pub(super) struct Scored {
+    /// A tone, of which `scores` does not know, is the last.
+    running: Running,
+    missing: Vec<(Arc<dyn Candidate>, Missing)>,
+    scores: Scores,
+    /// Probabilities of the leader for which more surrogates would be drawn; `None`: all were that were asked for.
+    doubt: Option<Doubt>,
+    tone_p: f64,
+}
+
+impl Scored {
+    /// The same of the candidates that are not `out`; `None` where their leader's probability is not clear by the surrogates
+    /// that were drawn. By chance all candidates are as good as they were, those that are out among them: probabilities are
+    /// never too small.
+    pub fn without(&self, out: &dyn Fn(&dyn Candidate) -> bool) -> Option<Scored> {
+        let mut rest = self.clone();
+        let is_in: Vec<bool> = self.running.iter().map(|r| !out(r.0.as_ref())).collect();
+        let mut running = is_in.iter();
+        rest.running.retain(|_| *running.next().unwrap_or(&true));
+        let mut groups = is_in.iter();
+        let of_groups = &mut rest.scores.groups;
+        of_groups.retain(|_| *groups.next().unwrap_or(&true));
+        rest.missing
+            .retain(|(candidate, _)| !out(candidate.as_ref()));
+        let clear = self.doubt.is_none_or(|doubt| rest.scores.is_clear(doubt));
+        clear.then_some(rest)
+    }
+}
+
 /// A round's result.
 #[derive(Clone)]
 pub struct Round {
@@ -139,12 +170,39 @@ impl Search<'_> {
         self.judge_among(model, 0, are)
     }
 
+    /// What all candidates gain that are not among the model's terms.
+    pub(super) fn scored(&self, model: &Model, surrogates: usize) -> Scored {
+        self.scored_among(model, surrogates, &|_| true)
+    }
+
     fn judge_among(
         &self,
         model: &Model,
         surrogates: usize,
         are: &dyn Fn(&dyn Candidate) -> bool,
     ) -> Round {
+        self.judged(model, &self.scored_among(model, surrogates, are))
+    }
+
+    /// Candidates at their best shapes.
+    pub(super) fn judged(&self, model: &Model, scored: &Scored) -> Round {
+        let leads = scored.scores.greatest();
+        let mut judged = self.refined(model, scored);
+        judged.sort_by(|a, b| b.net.total_cmp(&a.net));
+        Round {
+            judged,
+            equal: equal(self.channels),
+            missing: scored.missing.clone(),
+            leads: leads.map(|g| scored.running[g].0.id()),
+        }
+    }
+
+    fn scored_among(
+        &self,
+        model: &Model,
+        surrogates: usize,
+        are: &dyn Fn(&dyn Candidate) -> bool,
+    ) -> Scored {
         let c = self.channels;
         let fit = &model.fit;
         let mut missing = Vec::new();
@@ -173,8 +231,7 @@ impl Search<'_> {
                     .collect(),
             })
             .collect();
-        let scores = self.scored(fit, &groups, surrogates);
-        let leads = scores.greatest().map(|g| running[g].0.id());
+        let (scores, doubt) = self.scores(fit, &groups, surrogates);
         let grid = match surrogates {
             0 => scores.grid.thinned(),
             _ => scores.grid.clone(),
@@ -192,15 +249,13 @@ impl Search<'_> {
                 running.push((Arc::new(pickup), points));
             }
         }
-        // Two tests, the tones' and all others', share the level.
-        let tone_p = tone.map_or(1.0, |t| (2.0 * t.p_value).min(1.0));
-        let mut judged = self.refined(model, &running, &scores, tone_p);
-        judged.sort_by(|a, b| b.net.total_cmp(&a.net));
-        Round {
-            judged,
-            equal: equal(c),
+        Scored {
+            running,
             missing,
-            leads,
+            scores,
+            doubt,
+            // Two tests, the tones' and all others', share the level.
+            tone_p: tone.map_or(1.0, |t| (2.0 * t.p_value).min(1.0)),
         }
     }
 
@@ -220,14 +275,11 @@ impl Search<'_> {
     }
 
     /// The best shape of every group that is near the leader, its non-linear parameters
-    /// estimated; `scores` does not know the last one, a tone.
-    fn refined(
-        &self,
-        model: &Model,
-        running: &Running,
-        scores: &Scores,
-        tone_p: f64,
-    ) -> Vec<Judged> {
+    /// estimated.
+    fn refined(&self, model: &Model, scored: &Scored) -> Vec<Judged> {
+        let Scored {
+            running, scores, ..
+        } = scored;
         let c = self.channels;
         let fit = &model.fit;
         let best = scores.groups.iter().map(|g| g.gain).fold(0.0, f64::max);
@@ -240,7 +292,7 @@ impl Search<'_> {
                     let point = g.point.and_then(|p| points.get(p));
                     (point, g.shape, g.p_bootstrap.unwrap_or(1.0), g.gain)
                 }
-                None => (points.first(), fit.at.shape, tone_p, best),
+                None => (points.first(), fit.at.shape, scored.tone_p, best),
             };
             let Some(point) = point else { continue };
             let near = is_near(gain, best);
@@ -283,15 +335,18 @@ impl Search<'_> {
 /// Surrogates of a first look, and probabilities at which it decides: far from the level, more
 /// surrogates change nothing.
 const FIRST_LOOK: usize = 30;
-const CLEAR: (f64, f64) = (1e-4, 0.12);
+const CLEAR: Doubt = (1e-4, 0.12);
+
+/// Probabilities between which more surrogates may decide otherwise.
+type Doubt = (f64, f64);
 
 /// The same with the surrogates of another round of the record: by chance the best of a dictionary is as good beside other
 /// terms as beside these, nearly.
-const BEYOND_DOUBT: (f64, f64) = (1e-8, 0.5);
+const BEYOND_DOUBT: Doubt = (1e-8, 0.5);
 
 impl Search<'_> {
-    /// Scores with as many surrogates as it takes, `surrogates` at most.
-    fn scored(&self, fit: &Fit, groups: &[Group], surrogates: usize) -> Scores {
+    /// Scores with as many surrogates as it takes, `surrogates` at most, and the probabilities at which it would take more.
+    fn scores(&self, fit: &Fit, groups: &[Group], surrogates: usize) -> (Scores, Option<Doubt>) {
         let with = |surrogates: usize| {
             let options = score::Options {
                 surrogates,
@@ -300,21 +355,23 @@ impl Search<'_> {
             score::score(fit, groups, &options)
         };
         if surrogates == 0 {
-            return with(0);
+            return (with(0), None);
         }
         let known = self.by_chance.borrow().clone();
         if let Some(tail) = known {
             let scores = with(0).judged_by(&tail);
             if scores.is_clear(BEYOND_DOUBT) {
-                return scores;
+                return (scores, Some(BEYOND_DOUBT));
             }
         }
         let mut scores = with(surrogates.min(FIRST_LOOK));
-        if surrogates > FIRST_LOOK && !scores.is_clear(CLEAR) {
+        let mut doubt = (surrogates > FIRST_LOOK).then_some(CLEAR);
+        if doubt.is_some_and(|doubt| !scores.is_clear(doubt)) {
             scores = with(surrogates);
+            doubt = None;
         }
         self.by_chance.replace(scores.by_chance.clone());
-        scores
+        (scores, doubt)
     }
 }
 

@@ -7,7 +7,7 @@
 //! other finds its place taken: what comes second may have to come first.
 
 use super::forward::STRANGER;
-use super::judge::{Judged, PRICE, price};
+use super::judge::{Judged, PRICE, Round, price};
 use super::reported::{BEYOND, WANDER};
 use super::together::WORTH;
 use super::{Found, LEVEL, Model, Search, Term};
@@ -35,6 +35,12 @@ const ALL_BUT: f64 = 0.02;
 /// Share of the error's range that is nothing.
 const NOTHING: f64 = 1e-4;
 
+/// Log-likelihood that the shapes of two names gain at most by being found again side by side.
+const UNPOLISHED: f64 = 60.0;
+
+/// Log-likelihood that a step gains at most above what it does before other steps are in.
+const UNSEEN: f64 = 15.0;
+
 /// Slow noise, in units of the white, from which on two names are tried in place of one.
 const SOME: f64 = 0.3;
 
@@ -51,9 +57,12 @@ const BY_CHANCE: f64 = 3.5;
 
 /// What another run has to be worth, log-likelihood less the price of the terms: to explain as much as the first, and all
 /// but a little of it.
-struct Due {
+#[derive(Clone)]
+pub(super) struct Due {
     whole: f64,
     all_but: f64,
+    /// The names of the first run, where they explain everything to it.
+    names: Vec<String>,
     /// Names that the first run took and that did not hold: what they would say beside others leaves something where
     /// it did so there.
     refuted: Vec<String>,
@@ -65,7 +74,7 @@ impl Due {
         Due {
             whole: self.whole + net,
             all_but: self.all_but + net,
-            refuted: self.refuted.clone(),
+            ..self.clone()
         }
     }
 }
@@ -126,7 +135,7 @@ impl Search<'_> {
 
     /// The first run, or another one that explains more.
     fn run_any(&self) -> Result<Found, Unusable> {
-        let (mut first, reached) = self.run_once(false)?;
+        let (mut first, reached) = self.run_once(None)?;
         let model = self.model(&first.terms)?;
         let clustered = self.clustered(&model);
         // Names that leave a wander may be the wrong ones, or not all.
@@ -146,7 +155,7 @@ impl Search<'_> {
         }
         let mut others = Vec::new();
         if wanders {
-            let given = self.together(&model)?;
+            let given = self.together(&model, &|_, _| true)?;
             others.extend(given.map(|given| Beginning {
                 given,
                 ..Beginning::default()
@@ -154,7 +163,7 @@ impl Search<'_> {
         }
         let doubted = first.left.is_some() || clustered;
         if doubted || !first.terms.is_empty() {
-            others.extend(beginnings(&reached.terms, &first));
+            others.extend(beginnings(&reached.terms, &first, &due));
         }
         for beginning in others {
             self.begin(beginning);
@@ -179,18 +188,24 @@ impl Search<'_> {
         if first.terms.is_empty() || self.wander(model) <= SOME {
             return Ok(None);
         }
-        let Some(given) = self.together(&self.model(&[])?)? else {
+        let due = due.more_by(WORTH);
+        let none = self.model(&[])?;
+        let least = due.all_but - self.net(&none) - UNPOLISHED;
+        let names: Vec<String> = first.terms.iter().map(Term::id).collect();
+        let other = |set: &[String], worth: f64| {
+            worth >= least && set.iter().any(|name| !names.contains(name))
+        };
+        let Some(given) = self.together(&none, &other)? else {
             return Ok(None);
         };
-        let known = |t: &Term| first.terms.iter().any(|f| f.id() == t.id());
-        if given.iter().all(known) || self.has_mend(&given)? {
+        if self.has_mend(&given)? {
             return Ok(None);
         }
         self.begin(Beginning {
             given,
             ..Beginning::default()
         });
-        self.run_instead(first, model, &due.more_by(WORTH))
+        self.run_instead(first, model, &due)
     }
 
     /// As [`Search::run_again`], in place of names whose model is given: no farther from the rows that no estimate used.
@@ -218,6 +233,9 @@ impl Search<'_> {
         let stands = |id: &String| first.terms.iter().any(|t| t.id() == *id);
         let taken = reached.terms.iter().filter(|t| t.candidate.named());
         let refuted = taken.map(Term::id).filter(|id| !stands(id)).collect();
+        let explained = first.left.is_none() && first.strangers.is_empty();
+        let names = first.terms.iter().filter(|_| explained);
+        let names = names.map(Term::id).collect();
         if !strange {
             // Names that did not hold are no measure for others.
             let measure = if first.strangers.is_empty() {
@@ -229,6 +247,7 @@ impl Search<'_> {
             return Ok(Due {
                 whole,
                 all_but: whole,
+                names,
                 refuted,
             });
         }
@@ -239,6 +258,7 @@ impl Search<'_> {
         Ok(Due {
             whole,
             all_but: whole.min(worth - ALL_BUT * gained),
+            names,
             refuted,
         })
     }
@@ -246,7 +266,7 @@ impl Search<'_> {
     /// A run from the beginning that is set, if it is worth what is due. A name that does all but a little of what a shape
     /// without one does is the cause; then the little is left.
     fn run_again(&self, first: &Found, due: &Due) -> Result<Option<Found>, Unusable> {
-        let (other, _) = self.run_once(true)?;
+        let (other, _) = self.run_once(Some(due))?;
         let own = self.begin(Beginning::default());
         let Some(mut found) = self.better(other, due)? else {
             return Ok(None);
@@ -264,6 +284,19 @@ impl Search<'_> {
             missing: first.missing.clone(),
             ..found
         }))
+    }
+
+    /// Whether a run with these names came back to those of the first run, beside which what it began with was judged there.
+    pub(super) fn is_back(&self, names: &[String], due: &Due) -> bool {
+        let opened = self.beginning.borrow().opening.is_some();
+        opened && !due.names.is_empty() && due.names.iter().all(|name| names.contains(name))
+    }
+
+    /// Whether a run will not come to what is due with steps that gain no more than the best one beside a model.
+    pub(super) fn falls_short(&self, model: &Model, round: &Round, due: &Due) -> bool {
+        let steps = self.effort.steps.saturating_sub(model.terms.len());
+        let best = round.judged.first().map_or(0.0, |j| j.net.max(0.0));
+        self.net(model) + steps as f64 * (best + UNSEEN) < due.all_but
     }
 
     /// Whether the rows that stand out of a model stand together: accidents do not.
@@ -371,8 +404,9 @@ pub(super) fn stand_together(out: &[bool]) -> bool {
 }
 
 /// What to do without, one at a time: the shapes of a model without a name, and those at one temperature; then which of
-/// the first round's names to begin with instead of its best.
-fn beginnings(terms: &[Term], first: &Found) -> Vec<Beginning> {
+/// the first round's names to begin with instead of its best. Beside one that is in, where nothing is left, all others have been
+/// tried in the best one's place ([`super::sweep`]).
+fn beginnings(terms: &[Term], first: &Found, due: &Due) -> Vec<Beginning> {
     let doubted = |t: &&Term| !t.candidate.named() || t.candidate.is_local();
     let without = terms.iter().filter(doubted).take(BEGINNINGS);
     let mut out: Vec<Beginning> = without
@@ -383,6 +417,7 @@ fn beginnings(terms: &[Term], first: &Found) -> Vec<Beginning> {
         .collect();
     let names = first.first.iter().filter(|j| Judged::is_found(j));
     let openings = names.map(|j| j.candidate.id()).skip(1).take(OPENINGS);
+    let openings = openings.filter(|id| !due.names.contains(id));
     out.extend(openings.map(|id| Beginning {
         opening: Some(id),
         ..Beginning::default()

@@ -1,10 +1,10 @@
 //! Rounds that are known: a search comes back to the same terms when it sweeps, when it reports, and from another beginning.
 //!
 //! A beginning that does without some candidates finds of the others what was found with them, except where one of those it
-//! does without led: what is near the leader is looked at finely, the rest is not. The probabilities are then those
-//! of the best of all candidates, those that are out among them: never too small.
+//! does without led: what is near the leader is looked at finely, the rest is not, so that the finer looks are taken anew.
+//! The probabilities are then those of the best of all candidates, those that are out among them: never too small.
 
-use super::judge::Round;
+use super::judge::{Round, Scored};
 use super::memo::Memo;
 use super::{Model, Search, Term};
 use std::sync::Arc;
@@ -15,29 +15,41 @@ pub(super) struct Known {
     /// Candidates that were out.
     barred: Vec<String>,
     surrogates: usize,
+    scored: Arc<Scored>,
     round: Arc<Round>,
 }
 
+/// What is known of a round with other candidates out.
+enum Rest {
+    Round(Arc<Round>),
+    /// Not how the rest looks finely: what led is out.
+    Scored(Scored),
+}
+
 impl Known {
-    /// The round for other candidates out and so many surrogates, if it is known.
-    fn with(&self, barred: &[String], surrogates: usize) -> Option<Arc<Round>> {
+    /// What is known of the round for other candidates out and so many surrogates.
+    fn with(&self, barred: &[String], surrogates: usize) -> Option<Rest> {
         let further: Vec<&String> = barred
             .iter()
             .filter(|id| !self.barred.contains(id))
             .collect();
-        let leads = |id: &&String| self.round.leads.as_ref() == Some(*id);
         let all = self.barred.iter().all(|id| barred.contains(id));
-        if !all || self.surrogates < surrogates || further.iter().any(leads) {
+        if !all || self.surrogates < surrogates {
             return None;
         }
         if further.is_empty() {
-            return Some(self.round.clone());
+            return Some(Rest::Round(self.round.clone()));
+        }
+        let is_out = |id: String| further.contains(&&id);
+        if self.round.leads.clone().is_some_and(is_out) {
+            let rest = self.scored.without(&|candidate| is_out(candidate.id()))?;
+            return Some(Rest::Scored(rest));
         }
         let mut round = (*self.round).clone();
-        let is_in = |id: String| !further.contains(&&id);
-        round.judged.retain(|j| is_in(j.candidate.id()));
-        round.missing.retain(|(candidate, _)| is_in(candidate.id()));
-        Some(Arc::new(round))
+        round.judged.retain(|j| !is_out(j.candidate.id()));
+        let missing = &mut round.missing;
+        missing.retain(|(candidate, _)| !is_out(candidate.id()));
+        Some(Rest::Round(Arc::new(round)))
     }
 }
 
@@ -65,13 +77,16 @@ impl Search<'_> {
         let terms = in_order(&model.terms);
         let barred = self.beginning.borrow().barred.clone();
         let known = rounds.get(&terms);
-        if let Some(round) = known.and_then(|known| known.with(&barred, surrogates)) {
-            return round;
-        }
-        let round = Arc::new(self.judge(model, surrogates));
+        let scored = match known.and_then(|known| known.with(&barred, surrogates)) {
+            Some(Rest::Round(round)) => return round,
+            Some(Rest::Scored(scored)) => scored,
+            None => self.scored(model, surrogates),
+        };
+        let round = Arc::new(self.judged(model, &scored));
         let known = Known {
             barred,
             surrogates,
+            scored: Arc::new(scored),
             round: round.clone(),
         };
         rounds.keep(&terms, known);

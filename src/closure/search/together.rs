@@ -18,6 +18,11 @@ use std::sync::Arc;
 pub(super) const WORTH: f64 = 15.0;
 const AS_A_PAIR: f64 = 10.0;
 
+/// The same that the best of all sets has to be worth at least before its shapes are found again side by side: beside names that are in, and
+/// beside none.
+const HOPE: f64 = 5.0;
+const HOPE_ALONE: f64 = 0.0;
+
 /// The same by which two names have to be better than one.
 const MORE: f64 = 6.0;
 
@@ -38,14 +43,23 @@ struct Beside<'a> {
 
 impl Search<'_> {
     /// The terms of a model and one, two or more names, if these are worth more than the slow noise that the model has in
-    /// their place, and each is beyond chance beside the others.
+    /// their place, and each is beyond chance beside the others. Of all sets of names, those that `may` be, by what they are worth
+    /// in the shapes in which each was found alone.
     ///
     /// # Errors
     /// Too few rows.
-    pub(super) fn together(&self, model: &Model) -> Result<Option<Vec<Term>>, Unusable> {
+    pub(super) fn together(
+        &self,
+        model: &Model,
+        may: &dyn Fn(&[String], f64) -> bool,
+    ) -> Result<Option<Vec<Term>>, Unusable> {
         let mut with = model.clone();
-        for _ in 0..TIMES {
-            match self.with_more(&with)? {
+        for time in 0..TIMES {
+            let more = match time {
+                0 => self.with_more(&with, may)?,
+                _ => self.with_more(&with, &|_, _| true)?,
+            };
+            match more {
                 Some(more) => with = more,
                 None => break,
             }
@@ -86,16 +100,34 @@ impl Search<'_> {
 
     /// The model with the one or two names more that are worth most, if they are worth enough; two where they are worth
     /// clearly more than one.
-    fn with_more(&self, model: &Model) -> Result<Option<Model>, Unusable> {
+    fn with_more(
+        &self,
+        model: &Model,
+        may: &dyn Fn(&[String], f64) -> bool,
+    ) -> Result<Option<Model>, Unusable> {
         let known = self.net(model);
-        let mut of_one: Option<(Model, f64)> = None;
-        let mut of_two: Option<(Model, f64)> = None;
+        let mut sets = Vec::new();
         for added in self.sets(model) {
+            let names: Vec<String> = added.iter().map(|j| j.candidate.id()).collect();
             let mut terms = model.terms.clone();
             terms.extend(added.iter().map(|j| Term::of(j, Vec::new())));
+            let worth = self.net(&self.model(&terms)?) - known;
+            sets.push((added.len(), terms, worth, may(&names, worth)));
+        }
+        let hope = if model.terms.is_empty() {
+            HOPE_ALONE
+        } else {
+            HOPE
+        };
+        if sets.iter().all(|(_, _, worth, _)| *worth < hope) {
+            return Ok(None);
+        }
+        let mut of_one: Option<(Model, f64)> = None;
+        let mut of_two: Option<(Model, f64)> = None;
+        for (added, terms, ..) in sets.into_iter().filter(|(_, _, _, may)| *may) {
             let with = self.tried(&terms, 0)?;
             let worth = self.net(&with) - known;
-            let best = match added.len() {
+            let best = match added {
                 1 => &mut of_one,
                 _ => &mut of_two,
             };
