@@ -233,7 +233,13 @@ impl Search<'_> {
             if let Some(with) = known.get(&terms) {
                 return Ok(with);
             }
-            let with = Arc::new(self.model_with(&terms, &self.near(model))?);
+            let mut with = self.model_with(&terms, &self.near(model))?;
+            let is_worth = |with: &Model| with.value - j.gain + j.net - model.value > WORTH_WHOLE;
+            // A clip's level in the plain fit, which holds every spike, is not where the rows are that it holds.
+            if j.candidate.is_last() && j.net > WORTH_WHOLE && !is_worth(&with) {
+                with = self.tried(&terms, model.terms.len())?;
+            }
+            let with = Arc::new(with);
             known.keep(&terms, with.clone());
             Ok(with)
         };
