@@ -14,6 +14,7 @@ fn scored(simulated: &Simulated, stream: u64, surrogates: usize) -> Scores {
     let groups = dictionary(simulated, stream, 1);
     let options = score::Options {
         surrogates,
+        is_thin: surrogates == 0,
         seed: stream,
     };
     score::score(&fit, &groups, &options)

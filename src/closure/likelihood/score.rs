@@ -19,6 +19,9 @@ use super::whiten::Whitener;
 pub struct Options {
     /// Surrogate records; 0 = no bootstrap. 200 resolve p = 0.01.
     pub surrogates: usize,
+    /// A third of the shapes: enough for the best point of each group, which is the same for neighbouring shapes, not for
+    /// probabilities (a whiter noise may be the likeliest beside a candidate).
+    pub is_thin: bool,
     /// Key of all draws.
     pub seed: u64,
 }
@@ -62,8 +65,16 @@ impl Scores {
 
     /// Whether the leader's probability, or there being none, lies outside an interval.
     pub fn is_clear(&self, doubt: (f64, f64)) -> bool {
-        let p = self.leader().and_then(|g| self.groups[g].p_bootstrap);
-        p.is_none_or(|p| p < doubt.0 || p > doubt.1)
+        self.leading_p().is_none_or(|p| p < doubt.0 || p > doubt.1)
+    }
+
+    /// Whether there is a leader whose probability is smaller.
+    pub fn is_below(&self, p: f64) -> bool {
+        self.leading_p().is_some_and(|own| own < p)
+    }
+
+    fn leading_p(&self) -> Option<f64> {
+        self.leader().and_then(|g| self.groups[g].p_bootstrap)
     }
 
     /// The group with the greatest gain.
@@ -105,11 +116,9 @@ pub fn score(fit: &Fit, groups: &[Group], options: &Options) -> Scores {
     let grid = Grid::new(fit);
     let mut signals = vec![fit.problem.y.clone()];
     signals.extend(surrogates(fit, &grid, options));
-    // Without surrogates only the best point of each group is asked for, and it is the same for
-    // neighbouring shapes.
-    let looked = match options.surrogates {
-        0 => grid.thinned(),
-        _ => grid.clone(),
+    let looked = match options.is_thin {
+        true => grid.thinned(),
+        false => grid.clone(),
     };
     let mut profile = Profile::default();
     for shape in &looked.shapes {

@@ -12,6 +12,7 @@ use nalgebra::{DMatrix, DVector};
 /// Gains alone, at every third shape of the grid.
 const GAINS: score::Options = score::Options {
     surrogates: 0,
+    is_thin: true,
     seed: 1,
 };
 
@@ -145,6 +146,7 @@ fn null_and_candidate_each_choose_their_shape() {
     // With surrogates every shape is looked at.
     let options = score::Options {
         surrogates: 1,
+        is_thin: false,
         ..GAINS
     };
     let scores = score::score(&fit, &groups, &options);
@@ -165,6 +167,7 @@ fn surrogates_of_another_round_decide_what_is_clear() {
         &groups(&simulated),
         &score::Options {
             surrogates: 40,
+            is_thin: false,
             ..GAINS
         },
     );

@@ -340,34 +340,39 @@ const CLEAR: Doubt = (1e-4, 0.12);
 /// Probabilities between which more surrogates may decide otherwise.
 type Doubt = (f64, f64);
 
-/// The same with the surrogates of another round of the record: by chance the best of a dictionary is as good beside other
-/// terms as beside these, nearly.
-const BEYOND_DOUBT: Doubt = (1e-8, 0.5);
+/// The same with the surrogates of another round of the record: by chance the best of a dictionary is nearly as good beside other
+/// terms as beside these.
+const BEYOND_DOUBT: Doubt = (1e-3, 0.05);
 
 impl Search<'_> {
     /// Scores with as many surrogates as it takes, `surrogates` at most, and the probabilities at which it would take more.
     fn scores(&self, fit: &Fit, groups: &[Group], surrogates: usize) -> (Scores, Option<Doubt>) {
-        let with = |surrogates: usize| {
+        let with = |surrogates: usize, is_thin: bool| {
             let options = score::Options {
                 surrogates,
+                is_thin,
                 seed: 1,
             };
             score::score(fit, groups, &options)
         };
         if surrogates == 0 {
-            return (with(0), None);
+            return (with(0, true), None);
         }
         let known = self.by_chance.borrow().clone();
         if let Some(tail) = known {
-            let scores = with(0).judged_by(&tail);
+            let scores = with(0, true).judged_by(&tail);
+            if scores.is_below(BEYOND_DOUBT.0) {
+                return (scores, Some(BEYOND_DOUBT));
+            }
+            let scores = with(0, false).judged_by(&tail);
             if scores.is_clear(BEYOND_DOUBT) {
                 return (scores, Some(BEYOND_DOUBT));
             }
         }
-        let mut scores = with(surrogates.min(FIRST_LOOK));
+        let mut scores = with(surrogates.min(FIRST_LOOK), false);
         let mut doubt = (surrogates > FIRST_LOOK).then_some(CLEAR);
         if doubt.is_some_and(|doubt| !scores.is_clear(doubt)) {
-            scores = with(surrogates);
+            scores = with(surrogates, false);
             doubt = None;
         }
         self.by_chance.replace(scores.by_chance.clone());

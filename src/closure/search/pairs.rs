@@ -108,6 +108,7 @@ impl Search<'_> {
         }
         let options = score::Options {
             surrogates: self.effort.surrogates,
+            is_thin: false,
             seed: SEED,
         };
         let scores = score::score(&model.fit, &groups, &options);
