@@ -9,7 +9,7 @@
 use super::forward::STRANGER;
 use super::judge::{Judged, PRICE, Round, price};
 use super::reported::{BEYOND, WANDER};
-use super::together::WORTH;
+use super::together::{HOPE, WORTH};
 use super::{Found, LEVEL, Model, Search, Term};
 use crate::closure::channels::range;
 use crate::closure::likelihood::Unusable;
@@ -155,7 +155,7 @@ impl Search<'_> {
         }
         let mut others = Vec::new();
         if wanders {
-            let given = self.together(&model, &|_, _| true)?;
+            let given = self.together(&model)?;
             others.extend(given.map(|given| Beginning {
                 given,
                 ..Beginning::default()
@@ -195,7 +195,13 @@ impl Search<'_> {
         let other = |set: &[String], worth: f64| {
             worth >= least && set.iter().any(|name| !names.contains(name))
         };
-        let Some(given) = self.together(&none, &other)? else {
+        let Some(two) = self.worthier(&none, &other)? else {
+            return Ok(None);
+        };
+        if self.is_beyond(&two, &due) {
+            return Ok(None);
+        }
+        let Some(given) = self.beyond_chance(&none, two)? else {
             return Ok(None);
         };
         if self.has_mend(&given)? {
@@ -292,9 +298,21 @@ impl Search<'_> {
         opened && !due.names.is_empty() && due.names.iter().all(|name| names.contains(name))
     }
 
-    /// Whether a run will not come to what is due with steps that gain no more than the best one beside a model.
+    /// Whether what is due is out of reach of a model and the best that there is beside it.
+    fn is_beyond(&self, model: &Model, due: &Due) -> bool {
+        let round = self.round(model, 0);
+        let best = round.judged.first().map_or(0.0, |j| j.net.max(0.0));
+        self.net(model) + best + HOPE < due.all_but
+    }
+
+    /// Whether a run will not come to what is due with steps that gain no more than the best one beside a model; in place of names
+    /// that explain everything, with one name more than these at most.
     pub(super) fn falls_short(&self, model: &Model, round: &Round, due: &Due) -> bool {
-        let steps = self.effort.steps.saturating_sub(model.terms.len());
+        let most = match due.names.len() {
+            0 => self.effort.steps,
+            names => self.effort.steps.min(names + 1),
+        };
+        let steps = most.saturating_sub(model.terms.len());
         let best = round.judged.first().map_or(0.0, |j| j.net.max(0.0));
         self.net(model) + steps as f64 * (best + UNSEEN) < due.all_but
     }

@@ -20,7 +20,7 @@ const AS_A_PAIR: f64 = 10.0;
 
 /// The same that the best of all sets has to be worth at least before its shapes are found again side by side: beside names that are in, and
 /// beside none.
-const HOPE: f64 = 5.0;
+pub(super) const HOPE: f64 = 5.0;
 const HOPE_ALONE: f64 = 0.0;
 
 /// The same by which two names have to be better than one.
@@ -43,34 +43,53 @@ struct Beside<'a> {
 
 impl Search<'_> {
     /// The terms of a model and one, two or more names, if these are worth more than the slow noise that the model has in
-    /// their place, and each is beyond chance beside the others. Of all sets of names, those that `may` be, by what they are worth
-    /// in the shapes in which each was found alone.
+    /// their place, and each is beyond chance beside the others.
     ///
     /// # Errors
     /// Too few rows.
-    pub(super) fn together(
+    pub(super) fn together(&self, model: &Model) -> Result<Option<Vec<Term>>, Unusable> {
+        match self.worthier(model, &|_, _| true)? {
+            Some(with) => self.beyond_chance(model, with),
+            None => Ok(None),
+        }
+    }
+
+    /// A model with one, two or more names more, if these are worth more: of all sets of names, those first that `may` be, by what
+    /// they are worth in the shapes in which each was found alone.
+    ///
+    /// # Errors
+    /// Too few rows.
+    pub(super) fn worthier(
         &self,
         model: &Model,
         may: &dyn Fn(&[String], f64) -> bool,
-    ) -> Result<Option<Vec<Term>>, Unusable> {
-        let mut with = model.clone();
-        for time in 0..TIMES {
-            let more = match time {
-                0 => self.with_more(&with, may)?,
-                _ => self.with_more(&with, &|_, _| true)?,
-            };
-            match more {
-                Some(more) => with = more,
-                None => break,
-            }
+    ) -> Result<Option<Model>, Unusable> {
+        let Some(mut with) = self.with_more(model, may)? else {
+            return Ok(None);
+        };
+        for _ in 1..TIMES {
             if self.wander(&with) <= WANDER {
                 break;
             }
+            match self.with_more(&with, &|_, _| true)? {
+                Some(more) => with = more,
+                None => break,
+            }
         }
+        Ok(Some(with))
+    }
+
+    /// The terms of a model with names more than another one, if each of these is beyond chance beside the others, or they are
+    /// as a pair.
+    ///
+    /// # Errors
+    /// Too few rows.
+    pub(super) fn beyond_chance(
+        &self,
+        model: &Model,
+        with: Model,
+    ) -> Result<Option<Vec<Term>>, Unusable> {
         let known = model.terms.len();
-        if with.terms.len() == known {
-            return Ok(None);
-        }
         if self.net(&with) < self.net(model) + WORTH {
             return Ok(self.as_a_pair(model, with));
         }
