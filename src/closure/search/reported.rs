@@ -24,7 +24,10 @@ const THREEFOLD: f64 = 3.0;
 /// What a name needs where more is left than the names explain. A probability: that record's noise is not the one that
 /// it is reckoned with. A selection frequency (Meinshausen & Buhlmann 2010: 0.6 to 0.9). A share of its square
 /// that gains of its own in parts of the record add at most.
+/// Or a held-out error without the name, times the one with it: slow noise that takes a name's course by chance does not keep to it
+/// that closely.
 pub(super) const BEYOND: f64 = 1e-5;
+const TENFOLD: f64 = 10.0;
 const STABLE: f64 = 0.6;
 const SHARE: f64 = 0.2;
 
@@ -73,14 +76,19 @@ impl Search<'_> {
             if found.terms[k].p_value <= asked.max(SURELY) || found.terms[k].evident {
                 continue;
             }
-            let mut others = model.terms.clone();
-            others.remove(k);
-            let [without, with] = self.heldout_squares([&self.model(&others)?, &model]);
-            if without <= THREEFOLD.powi(2) * with {
+            if self.lessens(&model, k)? <= THREEFOLD {
                 self.drop(found, k);
             }
         }
         Ok(())
+    }
+
+    /// The held-out error without one of a model's terms, times the one with it.
+    fn lessens(&self, model: &Model, own: usize) -> Result<f64, Unusable> {
+        let mut others = model.terms.clone();
+        others.remove(own);
+        let [without, with] = self.heldout_squares([&self.model(&others)?, model]);
+        Ok((without / with.max(f64::MIN_POSITIVE)).sqrt())
     }
 
     /// Drops names until the held-out error is not above that of the declared model, or clearly below it where
@@ -127,7 +135,8 @@ impl Search<'_> {
             let steady = self.constancy(&model, term);
             let steady = steady.is_none_or(|c| c.p_value > UNSTEADY || c.share < SHARE);
             let often = || self.selected_beside(&model, k, &term.rivals);
-            let stands = term.p_value <= BEYOND && steady && self.rules(&model, k)?;
+            let far = term.p_value <= BEYOND || self.lessens(&model, k)? > TENFOLD;
+            let stands = far && steady && self.rules(&model, k)?;
             stable.push(term.evident || stands && often()? >= STABLE);
         }
         let mut stable = stable.into_iter();
@@ -141,10 +150,7 @@ impl Search<'_> {
         if model.terms[own].id() != "periodic_pickup" {
             return Ok(true);
         }
-        let mut others = model.terms.clone();
-        others.remove(own);
-        let [with, without] = self.heldout_squares([model, &self.model(&others)?]);
-        Ok(with <= RULES.powi(2) * without)
+        Ok(self.lessens(model, own)? >= 1.0 / RULES)
     }
 
     /// Takes a name back.
