@@ -160,6 +160,27 @@ fn null_and_candidate_each_choose_their_shape() {
 }
 
 #[test]
+fn a_third_of_the_shapes_may_be_without_the_noise_beside_a_candidate() {
+    let mut hidden = 0;
+    for seed in 0..12 {
+        let mut simulated = record(seed, 200, (1.0, 0.0, 0.0));
+        let truth = lag(&simulated.p, 30.0);
+        for (y, c) in simulated.y.iter_mut().zip(&truth) {
+            *y += 10.0 * c;
+        }
+        let (fit, groups) = (fit(&simulated), groups(&simulated));
+        let gain = |is_thin: bool| {
+            let options = score::Options { is_thin, ..GAINS };
+            score::score(&fit, &groups, &options).groups[0].gain
+        };
+        let lost = gain(false) - gain(true);
+        assert!(lost >= 0.0);
+        hidden += usize::from(lost > 3.0);
+    }
+    assert!(hidden >= 3, "{hidden} of 12");
+}
+
+#[test]
 fn surrogates_of_another_round_decide_what_is_clear() {
     let mut simulated = record(1, 200, (1.0, 0.0, 0.0));
     let noise = score::score(

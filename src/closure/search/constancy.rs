@@ -116,7 +116,7 @@ mod tests {
     use crate::closure::effects::{Candidate, Point};
     use crate::closure::likelihood::blocks::Split;
     use crate::closure::search::Effort;
-    use crate::closure::synthetic::{Random, triangle};
+    use crate::closure::synthetic::{Pull, Random, triangle};
     use std::collections::BTreeMap;
     use std::sync::Arc;
 
@@ -145,8 +145,12 @@ mod tests {
         Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap()
     }
 
-    /// Of the named effect at its first point.
+    /// Of the named effect at its first point, or at the one that is given.
     fn constancy(c: &Channels, effect: &str) -> Option<Constancy> {
+        constancy_at(c, effect, None)
+    }
+
+    fn constancy_at(c: &Channels, effect: &str, point: Option<Point>) -> Option<Constancy> {
         let split: Split = c.split().unwrap();
         let effort = Effort {
             rows: ROWS,
@@ -155,7 +159,7 @@ mod tests {
         let search = Search::new(c, &split, effort, Vec::new());
         let is_it = |candidate: &&Arc<dyn Candidate>| candidate.id() == effect;
         let candidate = search.candidates().iter().find(is_it).unwrap().clone();
-        let point: Point = candidate.points(c).remove(0);
+        let point: Point = point.unwrap_or_else(|| candidate.points(c).remove(0));
         let term = Term::new(candidate, point);
         let model = search.model(std::slice::from_ref(&term)).unwrap();
         search.constancy(&model, &term)
@@ -199,6 +203,15 @@ mod tests {
         let millivolts = constancy(&channels(3, 1000.0, course), SUPPLY).unwrap();
         assert!((volts.p_value / millivolts.p_value).ln().abs() < 1e-6);
         assert!((volts.share - millivolts.share).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_share_of_a_shape_with_its_size_in_it_is_of_what_the_shape_explains() {
+        let pulled = Pull::default().made();
+        let point = Point::at(0, &[pulled.most_u]);
+        let found = constancy_at(&pulled.channels, "amplitude_phase_coupling", Some(point));
+        let found = found.unwrap();
+        assert!((0.0..0.001).contains(&found.share), "{found:?}");
     }
 
     #[test]

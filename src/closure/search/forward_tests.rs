@@ -112,3 +112,51 @@ fn spikes_are_no_concern_of_names_that_would_not_lead_with_all_of_them_explained
         tone(true, 0.0).candidate.as_ref()
     ));
 }
+
+/// Names in a record of a table that turns up to 257 deg/s beside a supply and a scale factor that goes with temperature, the
+/// output being clipped a little before that.
+fn of_a_small_clip(seed: u64, clip_dps: f64) -> Vec<String> {
+    let (rows, mut random) = (790, Random::new(seed));
+    let degc: Vec<f64> = (0..rows)
+        .map(|k| 22.0 - 35.0 * (std::f64::consts::TAU * k as f64 / 136.0).cos())
+        .collect();
+    // Every 72 rows the table goes through its rates.
+    let turns = [0.2, 0.4, 0.6, 0.8, 1.0, 0.8, 0.6, 0.4, 0.2, 0.0];
+    let rate = |k: usize| match k % 72 {
+        step @ 0..20 => {
+            let sign = if step < 10 { 1.0 } else { -1.0 };
+            256.86 * sign * turns[step % 10]
+        }
+        _ => 0.0,
+    };
+    let supply = |k: usize| [4.65, 5.0, 5.36][k / 90 * 5 % 3];
+    let output = (0..rows).map(|k| {
+        let (u, rate) = ((degc[k] - 22.0) / 35.0, rate(k));
+        let bias = 0.9 - 1.6 * u + 0.3 * u * u - 0.15 * (supply(k) - 5.0);
+        let total = rate * (1.0 - 6.6e-5 * (degc[k] - 35.0)) + bias;
+        total.clamp(-clip_dps, clip_dps) + 0.0186 * random.normal()
+    });
+    let columns = BTreeMap::from([
+        ("rate_out_dps".to_owned(), output.collect::<Vec<f64>>()),
+        ("rate_dps".to_owned(), (0..rows).map(rate).collect()),
+        ("supply_v".to_owned(), (0..rows).map(supply).collect()),
+        ("die_degc".to_owned(), degc.clone()),
+    ]);
+    let time_s: Vec<f64> = (0..rows).map(|k| 80.0 * k as f64).collect();
+    let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+    let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+    let found = search.run().unwrap();
+    let mut names: Vec<String> = found.terms.iter().map(Term::id).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn a_clip_of_a_few_rows_is_found_beside_two_other_causes() {
+    let two = ["scale_factor_temperature", "supply_sensitivity"];
+    for seed in 0..4 {
+        let with = of_a_small_clip(seed, 255.89);
+        assert_eq!(with, [&["output_saturation"], &two[..]].concat(), "{seed}");
+        assert_eq!(of_a_small_clip(seed, 300.0), two, "{seed}");
+    }
+}
