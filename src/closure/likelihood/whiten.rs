@@ -45,7 +45,12 @@ impl Whitener {
     /// The gains for a timeline and a shape.
     pub fn new(line: &Timeline, shape: Shape) -> Self {
         let states = line.states(shape);
-        sized!(states.len(), gains(line, shape, &states))
+        let recursion = Recursion {
+            line,
+            shape,
+            states: &states,
+        };
+        pulp::Arch::new().dispatch(recursion)
     }
 
     /// One column, whitened; 0 in rows that are not used, whatever the column has there.
@@ -193,8 +198,26 @@ impl<const N: usize> Settled<N> {
     }
 }
 
+/// The recursion below for the processor's registers; every number comes from the same operations in the same order.
+struct Recursion<'a> {
+    line: &'a Timeline,
+    shape: Shape,
+    states: &'a [State],
+}
+
+impl pulp::WithSimd for Recursion<'_> {
+    type Output = Whitener;
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) -> Whitener {
+        let states = self.states;
+        sized!(states.len(), gains(self.line, self.shape, states))
+    }
+}
+
 /// The covariance recursion (Durbin & Koopman 2012, 4.3) for states that are observed as their
 /// sum.
+#[inline(always)]
 fn gains<const N: usize>(line: &Timeline, shape: Shape, states: &[State]) -> Whitener {
     let mut out = Whitener {
         shape,
