@@ -107,6 +107,12 @@ impl Search<'_> {
             if named >= self.effort.steps || strangers >= STRANGERS {
                 return Ok(model);
             }
+            let here = self.visited(&model);
+            if due.is_some_and(|due| self.was_there(&here, due)) {
+                found.left = Some("time_s".to_owned());
+                return Ok(model);
+            }
+            found.visited.push(here);
             let round = self.round(&model, self.effort.surrogates);
             if due.is_some_and(|due| self.falls_short(&model, &round, due)) {
                 found.left = Some("time_s".to_owned());

@@ -167,6 +167,15 @@ pub struct Found {
     pub within_rounding: Vec<(String, f64)>,
     /// Names of steps that may as well be changes at one moment.
     pub once: Vec<String>,
+    /// What the search came by.
+    visited: Vec<Visited>,
+}
+
+/// Terms, in order of their ids, that were in before a step, and what they were worth, log-likelihood less the price.
+#[derive(Debug, Clone)]
+struct Visited {
+    ids: Vec<String>,
+    net: f64,
 }
 
 /// A search over one record.

@@ -10,7 +10,7 @@ use super::forward::STRANGER;
 use super::judge::{Judged, PRICE, Round, price};
 use super::reported::{BEYOND, WANDER};
 use super::together::{HOPE, WORTH};
-use super::{Found, LEVEL, Model, Search, Term};
+use super::{Found, LEVEL, Model, Search, Term, Visited};
 use crate::closure::channels::range;
 use crate::closure::likelihood::Unusable;
 use crate::record::stats;
@@ -41,6 +41,9 @@ const UNPOLISHED: f64 = 60.0;
 /// Log-likelihood that a step gains at most above what it does before other steps are in.
 const UNSEEN: f64 = 15.0;
 
+/// Log-likelihood by which the same terms have to be better to be in another place.
+const BETTER: f64 = 1.0;
+
 /// Slow noise, in units of the white, from which on two names are tried in place of one.
 const SOME: f64 = 0.3;
 
@@ -66,6 +69,8 @@ pub(super) struct Due {
     /// Names that the first run took and that did not hold: what they would say beside others leaves something where
     /// it did so there.
     refuted: Vec<String>,
+    /// What the first run came by.
+    visited: Vec<Visited>,
 }
 
 impl Due {
@@ -242,6 +247,7 @@ impl Search<'_> {
         let explained = first.left.is_none() && first.strangers.is_empty();
         let names = first.terms.iter().filter(|_| explained);
         let names = names.map(Term::id).collect();
+        let visited = first.visited.clone();
         if !strange {
             // Names that did not hold are no measure for others.
             let measure = if first.strangers.is_empty() {
@@ -255,6 +261,7 @@ impl Search<'_> {
                 all_but: whole,
                 names,
                 refuted,
+                visited,
             });
         }
         let worth = self.net(reached);
@@ -266,6 +273,7 @@ impl Search<'_> {
             all_but: whole.min(worth - ALL_BUT * gained),
             names,
             refuted,
+            visited,
         })
     }
 
@@ -305,7 +313,24 @@ impl Search<'_> {
         self.net(model) + best + HOPE < due.all_but
     }
 
-    /// Whether a run will not come to what is due with steps that gain no more than the best one beside a model; in place of names
+    /// A model's place in a search.
+    pub(super) fn visited(&self, model: &Model) -> Visited {
+        let mut ids: Vec<String> = model.terms.iter().map(Term::id).collect();
+        ids.sort();
+        Visited {
+            ids,
+            net: self.net(model),
+        }
+    }
+
+    /// Whether a run that was opened is where the first run was, and no better: what follows did, and was not enough.
+    pub(super) fn was_there(&self, here: &Visited, due: &Due) -> bool {
+        let opened = self.beginning.borrow().opening.is_some();
+        let same = |there: &Visited| there.ids == here.ids && here.net < there.net + BETTER;
+        opened && !here.ids.is_empty() && due.visited.iter().any(same)
+    }
+
+    /// Whether a run will not come to what is due with steps that gain no more than the best name beside a model; in place of names
     /// that explain everything, with one name more than these at most.
     pub(super) fn falls_short(&self, model: &Model, round: &Round, due: &Due) -> bool {
         let most = match due.names.len() {
@@ -313,7 +338,8 @@ impl Search<'_> {
             names => self.effort.steps.min(names + 1),
         };
         let steps = most.saturating_sub(model.terms.len());
-        let best = round.judged.first().map_or(0.0, |j| j.net.max(0.0));
+        let name = round.judged.iter().find(|j| j.is_named());
+        let best = name.map_or(0.0, |j| j.net.max(0.0));
         self.net(model) + steps as f64 * (best + UNSEEN) < due.all_but
     }
 
@@ -421,12 +447,16 @@ pub(super) fn stand_together(out: &[bool]) -> bool {
     pairs > PAIRS * (1.0 + count * count / out.len().max(1) as f64)
 }
 
-/// What to do without, one at a time: the shapes of a model without a name, and those at one temperature; then which of
-/// the first round's names to begin with instead of its best. Beside one that is in, where nothing is left, all others have been
+/// What to do without, one at a time: the shapes of a model without a name, and those at one temperature (where a shape without a
+/// name came first, that one alone: without another it comes first again); then which of the first round's names to begin with
+/// instead of its best. Beside one that is in, where nothing is left, all others have been
 /// tried in the best one's place ([`super::sweep`]).
 fn beginnings(terms: &[Term], first: &Found, due: &Due) -> Vec<Beginning> {
     let doubted = |t: &&Term| !t.candidate.named() || t.candidate.is_local();
-    let without = terms.iter().filter(doubted).take(BEGINNINGS);
+    let is_first = |t: &&Term| !t.candidate.named() && t.beside.is_empty();
+    let strange = terms.iter().any(|t| is_first(&t));
+    let without = terms.iter().filter(doubted);
+    let without = without.filter(|t| !strange || is_first(t)).take(BEGINNINGS);
     let mut out: Vec<Beginning> = without
         .map(|t| Beginning {
             barred: vec![t.id()],

@@ -105,3 +105,109 @@ fn accidents_stand_alone() {
     let half: Vec<usize> = (0..300).filter(|_| random.normal() > 0.0).collect();
     assert!(!marked(&half));
 }
+
+/// A quadratic in temperature and a supply.
+fn of_a_supply(rows: usize, gain: f64) -> Channels {
+    let mut random = Random::new(11);
+    let degc = [triangle(rows / 2), triangle(rows / 2)].concat();
+    let supply = |k: usize| f64::from(u8::from(k / 11 % 3 == 1));
+    let output =
+        (0..rows).map(|k| 0.3 - 0.002 * degc[k] + gain * supply(k) + 0.01 * random.normal());
+    let columns = BTreeMap::from([
+        ("rate_out_dps".to_owned(), output.collect::<Vec<f64>>()),
+        ("supply_v".to_owned(), (0..rows).map(supply).collect()),
+        ("die_degc".to_owned(), degc.clone()),
+    ]);
+    let time_s: Vec<f64> = (0..rows).map(|k| 8.0 * k as f64).collect();
+    Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap()
+}
+
+#[test]
+fn a_run_ends_where_its_steps_cannot_come_to_what_is_due() {
+    let c = of_a_supply(300, 0.05);
+    let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+    let none = search.model(&[]).unwrap();
+    let round = search.round(&none, 0);
+    let is_best = |j: &&Judged| j.is_named();
+    let best = round.judged.iter().find(is_best).unwrap().net;
+    assert!(best > 2.0 * UNSEEN, "{best}");
+    let with = |more: f64, names: &[&str]| {
+        let due = Due {
+            whole: search.net(&none) + more,
+            all_but: search.net(&none) + more,
+            names: names.iter().map(|n| (*n).to_owned()).collect(),
+            refuted: Vec::new(),
+            visited: Vec::new(),
+        };
+        (
+            search.falls_short(&none, &round, &due),
+            search.is_beyond(&none, &due),
+        )
+    };
+    let step = best + UNSEEN;
+    // Where the first run left something, as many steps as a run has; else one more than it has names.
+    assert!(!with(4.9 * step, &[]).0);
+    assert!(with(5.1 * step, &[]).0);
+    assert!(!with(1.9 * step, &["a"]).0);
+    assert!(with(2.1 * step, &["a"]).0);
+    assert!(!with(3.1 * step, &["a", "b", "c"]).0);
+    // The best beside a model, and a little.
+    assert!(!with(best + 0.9 * HOPE, &[]).1);
+    assert!(with(best + 1.1 * HOPE, &[]).1);
+}
+
+#[test]
+fn a_run_that_was_opened_is_back_with_all_names_of_the_first() {
+    let c = of_a_supply(300, 0.05);
+    let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+    let of = |names: &[&str]| -> Vec<String> { names.iter().map(|n| (*n).to_owned()).collect() };
+    let due = |names: &[&str]| Due {
+        whole: 0.0,
+        all_but: 0.0,
+        names: of(names),
+        refuted: Vec::new(),
+        visited: Vec::new(),
+    };
+    let back = |own: &[&str], first: &[&str]| search.is_back(&of(own), &due(first));
+    assert!(!back(&["a", "b"], &["a", "b"]), "nothing was opened");
+    search.begin(Beginning {
+        opening: Some("b".to_owned()),
+        ..Beginning::default()
+    });
+    assert!(back(&["b", "a"], &["a", "b"]) && back(&["b", "c", "a"], &["a", "b"]));
+    assert!(!back(&["b", "c"], &["a", "b"]));
+    assert!(!back(&["b"], &[]), "the first run left something");
+}
+
+#[test]
+fn a_run_that_was_opened_has_to_be_better_where_the_first_one_was() {
+    let c = of_a_supply(300, 0.05);
+    let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+    let at = |ids: &[&str], net: f64| Visited {
+        ids: ids.iter().map(|id| (*id).to_owned()).collect(),
+        net,
+    };
+    let due = Due {
+        whole: 0.0,
+        all_but: 0.0,
+        names: Vec::new(),
+        refuted: Vec::new(),
+        visited: vec![at(&[], 0.0), at(&["a"], 30.0), at(&["a", "b"], 50.0)],
+    };
+    let here = at(&["a", "b"], 50.0 + 0.9 * BETTER);
+    assert!(!search.was_there(&here, &due), "nothing was opened");
+    search.begin(Beginning {
+        opening: Some("b".to_owned()),
+        ..Beginning::default()
+    });
+    assert!(search.was_there(&here, &due));
+    assert!(!search.was_there(&at(&["a", "b"], 50.0 + 1.1 * BETTER), &due));
+    assert!(!search.was_there(&at(&["b"], 20.0), &due));
+    assert!(
+        !search.was_there(&at(&[], 0.0), &due),
+        "where every run begins"
+    );
+    let model = search.model(&[]).unwrap();
+    let here = search.visited(&model);
+    assert!(here.ids.is_empty() && here.net == search.net(&model));
+}
