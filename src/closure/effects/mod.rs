@@ -252,8 +252,9 @@ pub trait Candidate: Send + Sync {
         false
     }
 
-    /// The shape with its upper and its lower level moved, deg/s, for a clip; `None` if that is not of the same form.
-    fn moved(&self, _point: &Point, _by_dps: [f64; 2]) -> Option<Point> {
+    /// The shape with its levels moved to where the rows at its upper and at its lower one lie, by so much, deg/s, for a clip; one
+    /// level of both signs by the mean of what there is.
+    fn moved(&self, _point: &Point, _by_dps: [Option<f64>; 2]) -> Option<Point> {
         None
     }
 

@@ -141,11 +141,18 @@ impl Candidate for Saturation {
         true
     }
 
-    fn moved(&self, point: &Point, by_dps: [f64; 2]) -> Option<Point> {
+    fn moved(&self, point: &Point, by_dps: [Option<f64>; 2]) -> Option<Point> {
+        let [of_upper, of_lower] = by_dps;
+        let (upper, lower) = (of_upper.unwrap_or(0.0), of_lower.unwrap_or(0.0));
         match (point.form, point.theta.as_slice()) {
-            (1, [upper]) => Some(Point::at(1, &[upper + by_dps[0]])),
-            (2, [lower]) => Some(Point::at(2, &[lower + by_dps[1]])),
-            (3, [upper, lower]) => Some(Point::at(3, &[upper + by_dps[0], lower + by_dps[1]])),
+            (0, [level]) => {
+                let outwards: Vec<f64> = of_upper.into_iter().chain(of_lower.map(|l| -l)).collect();
+                let mean = outwards.iter().sum::<f64>() / outwards.len().max(1) as f64;
+                Some(Point::at(0, &[level.abs() + mean]))
+            }
+            (1, [level]) => Some(Point::at(1, &[level + upper])),
+            (2, [level]) => Some(Point::at(2, &[level + lower])),
+            (3, [high, low]) => Some(Point::at(3, &[high + upper, low + lower])),
             _ => None,
         }
     }

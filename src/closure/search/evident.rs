@@ -113,10 +113,9 @@ impl Search<'_> {
     /// common beside slow noise says less of it, for a clip holds back what wanders before it.
     fn off_level(&self, model: &Model) -> f64 {
         let [upper, lower] = self.off_levels(model, &model.terms[0]);
-        match self.rails.as_ref().is_some_and(|r| r.upper_dps.is_none()) {
-            true => upper,
-            false => lower,
-        }
+        let is_upper = self.rails.as_ref().is_some_and(|r| r.upper_dps.is_none());
+        let off_dps = if is_upper { upper } else { lower };
+        off_dps.unwrap_or(0.0)
     }
 
     /// Levels to try on the side without a rail.

@@ -240,9 +240,10 @@ impl Search<'_> {
                 return Ok(with);
             }
             let mut with = self.model_with(&terms, &self.near(model))?;
-            let is_worth = |with: &Model| with.value - j.gain + j.net - model.value > WORTH_WHOLE;
+            let least = worth(j.candidate.as_ref());
+            let above = with.value - j.gain + j.net - model.value;
             // A clip's level in the plain fit, which holds every spike, is not where the rows are that it holds.
-            if j.candidate.is_last() && j.net > WORTH_WHOLE && !is_worth(&with) {
+            if j.candidate.is_last() && j.net > least && above <= least {
                 with = self.tried(&terms, model.terms.len())?;
             }
             let with = Arc::new(with);

@@ -240,13 +240,19 @@ impl Search<'_> {
     /// A clip's levels where its rows lie: what all clipped rows have in common is a constant beside the model,
     /// which no likelihood tells from other levels, and what tells the two sides apart is a few rows.
     fn levelled(&self, model: Model) -> Result<Model, Unusable> {
+        let most = |off_dps: [Option<f64>; 2]| {
+            off_dps
+                .iter()
+                .flatten()
+                .fold(0.0, |m: f64, v| m.max(v.abs()))
+        };
         let mut terms = model.terms.clone();
         let mut away_dps = 0.0;
         for term in terms.iter_mut().filter(|t| is_loose(t)) {
             let off_dps = self.off_levels(&model, term);
             if let Some(point) = term.candidate.moved(&term.point, off_dps) {
                 term.point = point;
-                away_dps = off_dps[0].abs().max(off_dps[1].abs());
+                away_dps = most(off_dps);
             }
         }
         if away_dps == 0.0 {
@@ -254,16 +260,13 @@ impl Search<'_> {
         }
         let levelled = self.model(&terms)?;
         let mut clips = levelled.terms.iter().filter(|t| is_loose(t));
-        let nearer = clips.all(|t| {
-            let off_dps = self.off_levels(&levelled, t);
-            off_dps[0].abs().max(off_dps[1].abs()) < 0.5 * away_dps
-        });
+        let nearer = clips.all(|t| most(self.off_levels(&levelled, t)) < 0.5 * away_dps);
         Ok(if nearer { levelled } else { model })
     }
 
     /// How far the fitted rows that a clip holds at its upper and at its lower level lie from there on average, deg/s;
-    /// 0 where none does.
-    pub(super) fn off_levels(&self, model: &Model, term: &Term) -> [f64; 2] {
+    /// nothing where none does.
+    pub(super) fn off_levels(&self, model: &Model, term: &Term) -> [Option<f64>; 2] {
         let c = self.channels;
         let columns = term.candidate.columns(c, &model.acting, &term.point);
         let residual = model.residual(c);
@@ -273,7 +276,7 @@ impl Search<'_> {
                 sum += model.fit.row_weights[i] * residual[i];
                 weight += model.fit.row_weights[i];
             }
-            if weight > 0.0 { sum / weight } else { 0.0 }
+            (weight > 0.0).then(|| sum / weight)
         };
         [mean(&|by| by < 0.0), mean(&|by| by > 0.0)]
     }
