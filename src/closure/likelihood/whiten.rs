@@ -9,6 +9,7 @@
 
 use super::filter::filter;
 use super::noise::{Shape, State, Timeline};
+use pulp::{Arch, Simd, WithSimd};
 
 /// Gains of the filter for one timeline and one shape of the noise, the white variance being 1.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,7 +51,7 @@ impl Whitener {
             shape,
             states: &states,
         };
-        pulp::Arch::new().dispatch(recursion)
+        Arch::new().dispatch(recursion)
     }
 
     /// One column, whitened; 0 in rows that are not used, whatever the column has there.
@@ -205,11 +206,11 @@ struct Recursion<'a> {
     states: &'a [State],
 }
 
-impl pulp::WithSimd for Recursion<'_> {
+impl WithSimd for Recursion<'_> {
     type Output = Whitener;
 
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) -> Whitener {
+    fn with_simd<S: Simd>(self, _: S) -> Whitener {
         let states = self.states;
         sized!(states.len(), gains(self.line, self.shape, states))
     }

@@ -247,8 +247,13 @@ impl Search<'_> {
         let explained = first.left.is_none() && first.strangers.is_empty();
         let names = first.terms.iter().filter(|_| explained);
         let names = names.map(Term::id).collect();
-        let visited = first.visited.clone();
-        if !strange {
+        let (whole, all_but) = if strange {
+            let worth = self.net(reached);
+            // Such a shape has to be better than names by as much here as where it is taken.
+            let whole = worth - STRANGER;
+            let gained = worth - self.net(&self.model(&[])?);
+            (whole, whole.min(worth - ALL_BUT * gained))
+        } else {
             // Names that did not hold are no measure for others.
             let measure = if first.strangers.is_empty() {
                 model
@@ -256,24 +261,14 @@ impl Search<'_> {
                 reached
             };
             let whole = self.net(measure);
-            return Ok(Due {
-                whole,
-                all_but: whole,
-                names,
-                refuted,
-                visited,
-            });
-        }
-        let worth = self.net(reached);
-        // Such a shape has to be better than names by as much here as where it is taken.
-        let whole = worth - STRANGER;
-        let gained = worth - self.net(&self.model(&[])?);
+            (whole, whole)
+        };
         Ok(Due {
             whole,
-            all_but: whole.min(worth - ALL_BUT * gained),
+            all_but,
             names,
             refuted,
-            visited,
+            visited: first.visited.clone(),
         })
     }
 

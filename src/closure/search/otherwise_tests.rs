@@ -1,5 +1,6 @@
 use super::*;
 use crate::closure::channels::Channels;
+use crate::closure::effects::Candidate;
 use crate::closure::search::{Effort, Search};
 use crate::closure::synthetic::{Random, triangle};
 use std::collections::BTreeMap;
@@ -106,13 +107,13 @@ fn accidents_stand_alone() {
     assert!(!marked(&half));
 }
 
-/// A quadratic in temperature and a supply.
-fn of_a_supply(rows: usize, gain: f64) -> Channels {
-    let mut random = Random::new(11);
+/// A bias that falls with temperature, and a supply's effect.
+fn of_a_supply() -> Channels {
+    let (rows, mut random) = (300, Random::new(11));
     let degc = [triangle(rows / 2), triangle(rows / 2)].concat();
     let supply = |k: usize| f64::from(u8::from(k / 11 % 3 == 1));
     let output =
-        (0..rows).map(|k| 0.3 - 0.002 * degc[k] + gain * supply(k) + 0.01 * random.normal());
+        (0..rows).map(|k| 0.3 - 0.002 * degc[k] + 0.05 * supply(k) + 0.01 * random.normal());
     let columns = BTreeMap::from([
         ("rate_out_dps".to_owned(), output.collect::<Vec<f64>>()),
         ("supply_v".to_owned(), (0..rows).map(supply).collect()),
@@ -122,9 +123,24 @@ fn of_a_supply(rows: usize, gain: f64) -> Channels {
     Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap()
 }
 
+fn owned(names: &[&str]) -> Vec<String> {
+    names.iter().map(|name| (*name).to_owned()).collect()
+}
+
+/// What is due after a first run with these names, which explain everything.
+fn due(net: f64, names: &[&str]) -> Due {
+    Due {
+        whole: net,
+        all_but: net,
+        names: owned(names),
+        refuted: Vec::new(),
+        visited: Vec::new(),
+    }
+}
+
 #[test]
 fn a_run_ends_where_its_steps_cannot_come_to_what_is_due() {
-    let c = of_a_supply(300, 0.05);
+    let c = of_a_supply();
     let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
     let none = search.model(&[]).unwrap();
     let round = search.round(&none, 0);
@@ -132,13 +148,7 @@ fn a_run_ends_where_its_steps_cannot_come_to_what_is_due() {
     let best = round.judged.iter().find(is_best).unwrap().net;
     assert!(best > 2.0 * UNSEEN, "{best}");
     let with = |more: f64, names: &[&str]| {
-        let due = Due {
-            whole: search.net(&none) + more,
-            all_but: search.net(&none) + more,
-            names: names.iter().map(|n| (*n).to_owned()).collect(),
-            refuted: Vec::new(),
-            visited: Vec::new(),
-        };
+        let due = due(search.net(&none) + more, names);
         (
             search.falls_short(&none, &round, &due),
             search.is_beyond(&none, &due),
@@ -158,17 +168,9 @@ fn a_run_ends_where_its_steps_cannot_come_to_what_is_due() {
 
 #[test]
 fn a_run_that_was_opened_is_back_with_all_names_of_the_first() {
-    let c = of_a_supply(300, 0.05);
+    let c = of_a_supply();
     let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
-    let of = |names: &[&str]| -> Vec<String> { names.iter().map(|n| (*n).to_owned()).collect() };
-    let due = |names: &[&str]| Due {
-        whole: 0.0,
-        all_but: 0.0,
-        names: of(names),
-        refuted: Vec::new(),
-        visited: Vec::new(),
-    };
-    let back = |own: &[&str], first: &[&str]| search.is_back(&of(own), &due(first));
+    let back = |own: &[&str], first: &[&str]| search.is_back(&owned(own), &due(0.0, first));
     assert!(!back(&["a", "b"], &["a", "b"]), "nothing was opened");
     search.begin(Beginning {
         opening: Some("b".to_owned()),
@@ -181,18 +183,15 @@ fn a_run_that_was_opened_is_back_with_all_names_of_the_first() {
 
 #[test]
 fn a_run_that_was_opened_has_to_be_better_where_the_first_one_was() {
-    let c = of_a_supply(300, 0.05);
+    let c = of_a_supply();
     let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
     let at = |ids: &[&str], net: f64| Visited {
-        ids: ids.iter().map(|id| (*id).to_owned()).collect(),
+        ids: owned(ids),
         net,
     };
     let due = Due {
-        whole: 0.0,
-        all_but: 0.0,
-        names: Vec::new(),
-        refuted: Vec::new(),
         visited: vec![at(&[], 0.0), at(&["a"], 30.0), at(&["a", "b"], 50.0)],
+        ..due(0.0, &[])
     };
     let here = at(&["a", "b"], 50.0 + 0.9 * BETTER);
     assert!(!search.was_there(&here, &due), "nothing was opened");
@@ -210,4 +209,36 @@ fn a_run_that_was_opened_has_to_be_better_where_the_first_one_was() {
     let model = search.model(&[]).unwrap();
     let here = search.visited(&model);
     assert!(here.ids.is_empty() && here.net == search.net(&model));
+}
+
+#[test]
+fn where_a_shape_without_a_name_came_first_it_alone_is_left_out() {
+    let c = of_a_supply();
+    let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+    let term = |is: &dyn Fn(&dyn Candidate) -> bool, beside: &[&str]| {
+        let candidate = search.candidates().iter().find(|k| is(k.as_ref())).unwrap();
+        let point = candidate.points(&c).remove(0);
+        Term {
+            beside: owned(beside),
+            ..Term::new(candidate.clone(), point)
+        }
+    };
+    let stranger = |beside: &[&str]| term(&|k| !k.named(), beside);
+    let jump = |beside: &[&str]| term(&|k| k.id() == "stress_jump", beside);
+    let supply = term(&|k| k.id() == "supply_sensitivity", &[]);
+    let barred = |terms: &[Term]| -> Vec<String> {
+        let others = beginnings(terms, &Found::default(), &due(0.0, &[]));
+        others.into_iter().flat_map(|b| b.barred).collect()
+    };
+    let strange = stranger(&[]).id();
+    assert_eq!(
+        barred(&[stranger(&[]), jump(&[&strange])]),
+        [strange.clone()]
+    );
+    let after = [
+        supply,
+        jump(&["supply_sensitivity"]),
+        stranger(&["stress_jump"]),
+    ];
+    assert_eq!(barred(&after), ["stress_jump".to_owned(), strange]);
 }

@@ -22,10 +22,9 @@ const SURELY: f64 = 1e-20;
 const THREEFOLD: f64 = 3.0;
 
 /// What a name needs where more is left than the names explain. A probability: that record's noise is not the one that
-/// it is reckoned with. A selection frequency (Meinshausen & Buhlmann 2010: 0.6 to 0.9). A share of its square
-/// that gains of its own in parts of the record add at most.
-/// Or a held-out error without the name, times the one with it: slow noise that takes a name's course by chance does not keep to it
-/// that closely.
+/// it is reckoned with; or, in its place, a held-out error without the name, times the one with it: slow noise that takes a name's
+/// course by chance does not keep to it that closely. A selection frequency (Meinshausen & Buhlmann 2010: 0.6 to 0.9). A share of
+/// its square that gains of its own in parts of the record add at most.
 pub(super) const BEYOND: f64 = 1e-5;
 const TENFOLD: f64 = 10.0;
 const STABLE: f64 = 0.6;

@@ -250,3 +250,11 @@ fn a_lag_that_only_the_first_hour_tells_from_a_rate_keeps_its_name_beside_slow_n
         );
     }
 }
+
+#[test]
+fn a_name_without_which_ten_times_as_much_is_left_needs_no_smaller_probability() {
+    let kept = |supply: f64| kept(&channels(|_| supply, 30.0), 1e-4, 0, true).0;
+    assert_eq!(kept(40.0), BOTH);
+    // In a third of the rows: not quite five times.
+    assert_eq!(kept(10.0), BOTH[1..]);
+}
