@@ -30,6 +30,17 @@ impl Told<'_> {
                 ),
             ));
         }
+        if let Some((ppm, std_ppm)) = self.found.scale_ppm {
+            warnings.push(Warning::on(
+                "scale_factor_off",
+                "rate_dps",
+                format!(
+                    "the scale factor is {:.6} times the nominal one ({ppm:.0} +- {std_ppm:.0} ppm), and as far as the record \
+                     says everywhere the same: no effect of the catalogue. Give rate_out_dps at its own scale, divided by that",
+                    1.0 + 1e-6 * ppm
+                ),
+            ));
+        }
         if !self.found.undecided.is_empty() {
             warnings.push(Warning::general(
                 "undecided",

@@ -241,6 +241,11 @@ pub trait Candidate: Send + Sync {
         0.0
     }
 
+    /// The id of a shape without a name that this shape has in it, so that it is only where it is more than that one.
+    fn contains(&self, _point: &Point) -> Option<&'static str> {
+        None
+    }
+
     /// True for a shape at one temperature, which chance finds somewhere: it has to be found in most halves
     /// of the record.
     fn is_local(&self) -> bool {

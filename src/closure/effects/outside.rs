@@ -4,8 +4,8 @@
 //! is a likeness, not a cause: what is left is reported with its channel, and without a name.
 
 use super::covariate::spline;
-use super::{Bias, Candidate, Estimate, Missing, Point, Reported, Sheet, map, product};
-use crate::closure::channels::{Channels, lag};
+use super::{Bias, Candidate, Estimate, Missing, Point, Reported, Sheet, gain, map, product};
+use crate::closure::channels::{Channels, lag, range};
 use crate::closure::likelihood::linear::Basis;
 use crate::record::columns::is_known;
 
@@ -31,6 +31,9 @@ enum Kind {
     /// A constant error of the scale factor.
     Scale,
 }
+
+/// The id of a constant error of the scale factor.
+pub const SCALE: &str = "outside:scale_factor";
 
 /// A shape without a name.
 pub struct Outside {
@@ -98,7 +101,7 @@ impl Candidate for Outside {
             Kind::TimesHeat(n) => format!("outside:{n}_times_temperature"),
             Kind::TimesRate(n) => format!("outside:{n}_times_rate"),
             Kind::Late(n) => format!("outside:past_of:{n}"),
-            Kind::Scale => "outside:scale_factor".to_owned(),
+            Kind::Scale => SCALE.to_owned(),
         }
     }
 
@@ -188,8 +191,13 @@ impl Candidate for Outside {
         }
     }
 
-    fn report(&self, _c: &Channels, _estimate: &Estimate) -> Reported {
-        Reported::new()
+    fn report(&self, c: &Channels, estimate: &Estimate) -> Reported {
+        if self.kind != Kind::Scale {
+            return Reported::new();
+        }
+        let (low, high) = range(c.column("rate_dps").unwrap_or(&[]));
+        let ppm = 2e6 / (high - low);
+        [gain("linear_ppm", estimate, 0, ppm)].into_iter().collect()
     }
 }
 

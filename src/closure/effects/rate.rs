@@ -1,5 +1,6 @@
 //! Effects of the applied rate and of the output stage.
 
+use super::outside::SCALE;
 use super::{
     Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, entry, gain, heated,
     map, moving, product,
@@ -60,6 +61,17 @@ fn scale_zero(slope: f64, constant: f64, bend: f64) -> f64 {
     constant / q
 }
 
+/// Standard deviation of that place, the coefficients' errors being small and independent of each other: a zero far from the
+/// record's temperatures is where the slope says.
+fn scale_zero_std(e: &Estimate, zero: f64) -> f64 {
+    let at = |k: usize| e.beta.get(k).copied().unwrap_or(0.0);
+    let by_zero = at(0) + 2.0 * at(2) * zero;
+    // What each coefficient is of: u, 1, u^2.
+    let of = [zero, 1.0, zero * zero];
+    let parts = of.iter().zip(&e.beta_std).map(|(u, std)| (u * std).powi(2));
+    parts.sum::<f64>().sqrt() / by_zero.abs()
+}
+
 const SCALE_TEMPERATURE: Sheet = Sheet {
     id: "scale_factor_temperature",
     physics: "the modes' split, the gap and the references move with temperature, and the scale \
@@ -109,6 +121,10 @@ impl Candidate for ScaleTemperature {
         if is_bent(c, point) { BENT } else { 0.0 }
     }
 
+    fn contains(&self, _point: &Point) -> Option<&'static str> {
+        Some(SCALE)
+    }
+
     fn correction(&self, c: &Channels, e: &Estimate, f: &mut Words) -> Option<Vec<Term>> {
         if e.point.form > 0 && !is_bent(c, &e.point) {
             return None;
@@ -138,10 +154,11 @@ impl Candidate for ScaleTemperature {
                 }
                 out.extend([gain("curvature_ppm_per_k2", e, 2, factor / c.kelvin_per_u)]);
             }
-            let zero = c.middle_degc + c.kelvin_per_u * zero;
-            let std = e.beta_std.get(1).copied().unwrap_or(0.0);
-            let std = (c.kelvin_per_u * std / slope).abs();
-            out.insert("zero_degc".to_owned(), (zero, std));
+            let std = c.kelvin_per_u * scale_zero_std(e, zero);
+            out.insert(
+                "zero_degc".to_owned(),
+                (c.middle_degc + c.kelvin_per_u * zero, std),
+            );
         }
         out
     }
@@ -191,6 +208,10 @@ impl Candidate for Nonlinearity {
     fn surcharge(&self, _c: &Channels, point: &Point) -> f64 {
         // A scale factor that is wrong at small rates is another effect.
         3.0 * point.form as f64
+    }
+
+    fn contains(&self, point: &Point) -> Option<&'static str> {
+        (point.form == 1).then_some(SCALE)
     }
 
     fn correction(&self, c: &Channels, e: &Estimate, _f: &mut Words) -> Option<Vec<Term>> {

@@ -86,3 +86,29 @@ fn a_scale_is_nominal_at_the_root_next_to_the_lines() {
     // None at all: the line's.
     assert_eq!(scale_zero(1.0, 2.0, 5.0), -2.0);
 }
+
+#[test]
+fn where_a_scale_is_nominal_is_as_uncertain_as_each_coefficient_makes_it() {
+    for (beta, beta_std) in [
+        ([2.0, -1.0, 0.0], [0.01, 0.03, 0.0]),
+        ([-0.3, 0.9, 0.0], [0.004, 0.001, 0.0]),
+        ([1.0, -0.4, 0.2], [0.002, 0.003, 0.004]),
+    ] {
+        let zero = |b: &[f64]| scale_zero(b[0], b[1], b[2]);
+        let estimate = Estimate {
+            beta: beta.to_vec(),
+            beta_std: beta_std.to_vec(),
+            point: Point::form(0),
+            theta_std: Vec::new(),
+        };
+        let by = (0..3).map(|k| {
+            let (mut above, mut below) = (beta, beta);
+            above[k] += 1e-3 * beta_std[k];
+            below[k] -= 1e-3 * beta_std[k];
+            (zero(&above) - zero(&below)) / 2e-3
+        });
+        let std = by.map(|d| d * d).sum::<f64>().sqrt();
+        let own = scale_zero_std(&estimate, zero(&beta));
+        assert!((own / std - 1.0).abs() < 1e-4, "{own} {std}");
+    }
+}

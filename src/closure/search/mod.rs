@@ -7,7 +7,7 @@
 //! out are spikes, unless a candidate explains them ([`forward`]). At the end every
 //! step is tried again with the others in, against all other names ([`sweep`]), must hold ([`validate`]) and lower the error of
 //! held-out rows ([`heldout`]). Where a shape without a name wins, it is kept as what is left; a step that happens once may
-//! be one of time, and that is said beside it (`once`).
+//! be one of time, and a scale factor may be off by the same everywhere; that is said beside the name (`once`).
 
 mod acting;
 mod clip;
@@ -167,6 +167,8 @@ pub struct Found {
     pub within_rounding: Vec<(String, f64)>,
     /// Names of steps that may as well be changes at one moment.
     pub once: Vec<String>,
+    /// An error of the scale factor, parts per million with its standard deviation, that is the same everywhere.
+    pub scale_ppm: Option<(f64, f64)>,
     /// What the search came by.
     visited: Vec<Visited>,
 }

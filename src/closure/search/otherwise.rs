@@ -131,6 +131,10 @@ impl Search<'_> {
         if !found.once.is_empty() {
             found.left = found.left.or_else(|| Some("time_s".to_owned()));
         }
+        found.scale_ppm = self.bare_scale(&found)?;
+        if found.scale_ppm.is_some() {
+            found.left = found.left.or_else(|| Some("rate_dps".to_owned()));
+        }
         // A clip that did not hold is of the output, in which no cause is to be looked for.
         if found.left.as_deref() == Some("rate_out_dps") {
             found.left = Some("time_s".to_owned());
