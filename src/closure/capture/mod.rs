@@ -49,6 +49,7 @@ pub mod keys;
 pub mod latency;
 pub mod line_places;
 pub mod mains;
+pub mod memory;
 pub mod missing;
 pub mod missing_moves;
 pub mod nonlinearity;

@@ -11,6 +11,12 @@ use super::{harmonics, mains, rounding, skirts, spur, steps};
 /// Lines at places of truncation that are tried together in a bend's place: a spur of the phase is a pair.
 const PAIR: usize = 2;
 
+/// Resolutions by which a line of the quantiser may be off its place where the tone comes back to its codes after few rows,
+/// and how many rows a place such a capture has: slow noise moves the codes over the steps by and by, and the places are too
+/// few to be met by chance.
+const BESIDE: f64 = 3.0;
+const ROWS_OF_A_PLACE: usize = 120;
+
 /// What stands out around a model.
 struct Standing<'a> {
     known: &'a Known,
@@ -24,12 +30,19 @@ struct Standing<'a> {
     sharp: bool,
     /// Turns a sample.
     resolution: f64,
+    /// Turns a sample by which a line of the quantiser may be off its place.
+    beside: f64,
 }
 
 impl<'a> Standing<'a> {
     fn of(capture: &Capture, known: &'a Known, model: &'a Model, around: &'a Around) -> Self {
         let spectrum = around.spectrum(capture);
         let lines = skirts::with_hidden(capture, around, &spectrum, &model.tone, (12, 3.0));
+        let resolution = 1.0 / capture.rows() as f64;
+        let period = model
+            .tone
+            .period()
+            .filter(|p| p * ROWS_OF_A_PLACE <= capture.rows());
         Standing {
             known,
             model,
@@ -37,16 +50,17 @@ impl<'a> Standing<'a> {
             lines: without_wander(model, around, lines),
             tones: around.free.map(|[sin, cos]| sin.hypot(cos)),
             sharp: steps::is_sharp(&model.neutral, model),
-            resolution: 1.0 / capture.rows() as f64,
+            resolution,
+            beside: resolution * if period.is_some() { BESIDE } else { 1.0 },
         }
     }
 
     /// Where the steps show, those lines that are none of the quantiser's own, unless they are the mains', are lines.
     fn is_rounding(&self, line: &Line) -> bool {
-        let (tone, within) = (&self.model.tone, self.resolution);
+        let tone = &self.model.tone;
         self.sharp
-            && !mains::is_mains(self.known, line.turns, 0.5 * within)
-            && rounding::explains(tone, self.tones, line.turns, within, line.amplitudes)
+            && !mains::is_mains(self.known, line.turns, 0.5 * self.resolution)
+            && rounding::explains(tone, self.tones, line.turns, self.beside, line.amplitudes)
     }
 
     fn refined(&self, line: &Line) -> f64 {

@@ -1,12 +1,16 @@
-//! What is left after the last step: lines, and a mean that goes with the phase or with the code.
+//! What is left after the last step: lines, a mean that goes with the phase or with the code, and instants that remember each
+//! other.
 
 use super::columns::{CHUNK, Model, Rows, chunks};
 use super::errors::residuals;
 use super::input::Capture;
+use super::memory;
 use super::spectrum::Spectrum;
 use crate::closure::likelihood::tail::chi_square_surprise;
 use crate::closure::verdict::Structure;
 
+/// Names of the columns.
+const CHANNELS: [&str; 2] = ["drive_code", "sense_code"];
 /// Bins of the phase and of the code.
 const BINS: usize = 64;
 /// Least variance of noise that whitens the quantiser's pattern, codes squared.
@@ -21,24 +25,29 @@ pub fn left(capture: &Capture, model: &Model, coefficients: &[Vec<f64>; 2]) -> S
     for (channel, residual) in residuals.iter().enumerate() {
         for (surprise, what) in binned(capture, model, channel, residual) {
             if surprise > worst.0 {
-                let name = ["drive_code", "sense_code"]
-                    .get(channel)
-                    .copied()
-                    .unwrap_or("");
-                worst = (surprise, Some(format!("{name} against {what}")));
+                worst = (
+                    surprise,
+                    Some(format!("{} against {what}", CHANNELS[channel])),
+                );
             }
         }
     }
     let [drive, sense] = &residuals;
+    if let Some((channel, surprise)) = memory::remembered(capture, model, [drive, sense])
+        && surprise > worst.0
+    {
+        let name = CHANNELS[channel];
+        worst = (
+            surprise,
+            Some(format!("{name}, instants that remember each other")),
+        );
+    }
     let spectrum = Spectrum::of([drive, sense], capture.used_rows());
     let lines = spectrum.lines(&model.tone, 1, 3.0, [LEAST_WHITE; 2]);
     if let Some(line) = lines.first() {
         let surprise = line.surprise - (capture.rows() as f64).ln();
         if surprise > worst.0 {
-            let name = ["drive_code", "sense_code"]
-                .get(line.channel)
-                .copied()
-                .unwrap_or("");
+            let name = CHANNELS.get(line.channel).copied().unwrap_or("");
             let place = match capture.meta.fs_hz {
                 Some(fs) => format!("{:.3} Hz", line.turns * fs),
                 None => format!("{:.6} per sample", line.turns),

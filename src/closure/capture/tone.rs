@@ -44,6 +44,12 @@ impl Tone {
         }
     }
 
+    /// Rows after which the phase comes back, where the tuning word is known.
+    pub fn period(&self) -> Option<usize> {
+        let word = self.word.filter(|word| *word != 0)?;
+        Some(1 << (32 - word.trailing_zeros()))
+    }
+
     /// Turns a sample folded into 0 ..= 1/2.
     pub fn folded(&self) -> f64 {
         fold(self.turns)
@@ -181,6 +187,20 @@ fn near_strongest(capture: &Capture) -> Option<Tone> {
 mod tests {
     use super::super::synthetic::Made;
     use super::*;
+
+    #[test]
+    fn a_phase_comes_back_after_its_period_and_not_before() {
+        for (word, period) in [(5 << 25, 128), (1 << 31, 2), (0x0030_0000, 4096)] {
+            let tone = Tone {
+                word: Some(word),
+                turns: f64::from(word) * WORD,
+                offset_turns: 0.0,
+            };
+            assert_eq!(tone.period(), Some(period));
+            assert_eq!(tone.phase(period), 0.0);
+            assert!((1..period).all(|row| tone.phase(row) != 0.0));
+        }
+    }
 
     #[test]
     fn the_strongest_line_is_found_without_what_leaks_into_it() {
