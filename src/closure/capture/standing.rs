@@ -14,8 +14,8 @@ const PAIR: usize = 2;
 /// Resolutions by which a line of the quantiser may be off its place where the tone comes back to its codes after few rows,
 /// and how many rows a place such a capture has: slow noise moves the codes over the steps by and by, and the places are too
 /// few to be met by chance.
-const BESIDE: f64 = 3.0;
-const ROWS_OF_A_PLACE: usize = 120;
+const BESIDE: f64 = 8.0;
+const ROWS_OF_A_PLACE: usize = 320;
 
 /// What stands out around a model.
 struct Standing<'a> {
@@ -184,7 +184,35 @@ pub fn add_spurs(
 #[cfg(test)]
 mod tests {
     use super::super::synthetic_rows::{WORDS, codes, judged, meta, names};
+    use crate::closure::synthetic::Random;
     use std::f64::consts::TAU;
+
+    #[test]
+    fn beside_its_place_a_line_of_the_quantiser_is_one_where_slow_noise_moves_the_codes() {
+        const ROWS: usize = 65_536;
+        let word: u32 = 5 << 25;
+        for seed in 1..5 {
+            let mut random = Random::new(seed);
+            let made = [0, 1].map(|channel| {
+                let slow: Vec<Vec<f64>> = [0.999, 0.9999]
+                    .iter()
+                    .map(|rho| random.coloured(ROWS, *rho))
+                    .collect();
+                let code = |row: usize| {
+                    let angle = TAU * f64::from(word.wrapping_mul(row as u32)) / 4_294_967_296.0;
+                    let tone = match channel {
+                        0 => -1500.0 * angle.cos(),
+                        _ => 300.0 * (angle + 0.3).sin() + 90.0 * (angle + 0.3).cos(),
+                    };
+                    let slow: f64 = slow.iter().map(|s| s[row]).sum();
+                    (tone + 0.03 * slow + 0.05 * random.normal()).round() as i32
+                };
+                (0..ROWS).map(code).collect::<Vec<i32>>()
+            });
+            let (_, _, found) = judged(made, meta(word));
+            assert!(names(&found).is_empty(), "{seed}: {:?}", names(&found));
+        }
+    }
 
     #[test]
     fn a_spur_of_the_phase_that_goes_with_it_is_no_bend() {

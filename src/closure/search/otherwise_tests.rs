@@ -233,7 +233,7 @@ fn where_a_shape_without_a_name_came_first_it_alone_is_left_out() {
     let strange = stranger(&[]).id();
     assert_eq!(
         barred(&[stranger(&[]), jump(&[&strange])]),
-        [strange.clone()]
+        std::slice::from_ref(&strange)
     );
     let after = [
         supply,

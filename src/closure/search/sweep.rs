@@ -7,6 +7,10 @@ use crate::closure::likelihood::Unusable;
 /// Net gain by which another candidate takes a term's place.
 pub(super) const BETTER: f64 = 1.5;
 
+/// Net gain that a second shape at one temperature has to bring beside a first one: noise of the thermometer, where the first is
+/// steep, makes some.
+const LIKENESS: f64 = 20.0;
+
 /// Passes over all terms.
 const SWEEPS: usize = 2;
 
@@ -74,7 +78,8 @@ impl Search<'_> {
     }
 
     /// Two names that the same third one would do for, each beside the other, give their place to it where it is worth as much
-    /// as both: a shape that is not quite the one that is there needs a second one for what it is off.
+    /// as both: a shape that is not quite the one that is there needs a second one for what it is off. So do two shapes at one
+    /// temperature to either of them, somewhere else and in another size.
     ///
     /// # Errors
     /// Too few rows.
@@ -85,12 +90,15 @@ impl Search<'_> {
             for second in &names[i + 1..] {
                 let (a, b) = (&model.terms[*first], &model.terms[*second]);
                 let common = a.rivals.iter().filter(|r| b.rivals.contains(r));
-                for id in common {
+                let both_local = a.candidate.is_local() && b.candidate.is_local();
+                let either = [a.id(), b.id()].into_iter().filter(|_| both_local);
+                let least = self.net(&model) - if both_local { LIKENESS } else { 0.0 };
+                for id in common.cloned().chain(either) {
                     let mut terms = model.terms.clone();
                     terms.remove(*second);
                     terms.remove(*first);
-                    if let Some(united) = self.with_instead(terms, id)?
-                        && self.net(&united) >= self.net(&model)
+                    if let Some(united) = self.with_instead(terms, &id)?
+                        && self.net(&united) >= least
                     {
                         return Ok(united);
                     }

@@ -84,3 +84,53 @@ fn a_tone_takes_no_names_place_whose_channel_has_its_frequency() {
         ["g_sensitivity", "supply_sensitivity"]
     );
 }
+
+/// What stays of a jump and a broad crossing beside a narrow crossing that swings to both sides, and a step (or none) elsewhere.
+fn united(seed: u64, step_dps: f64) -> Vec<String> {
+    let (rows, mut random) = (600, Random::new(seed));
+    let degc = [triangle(rows / 2), triangle(rows / 2)].concat();
+    let output = degc.iter().map(|t| {
+        let x = (t - 20.0) / 2.0;
+        let step = if *t > 55.0 { step_dps } else { 0.0 };
+        0.3 - 0.01 * t + 0.45 * 2.0 * x / (1.0 + x * x) + step + 0.02 * random.normal()
+    });
+    let output = output.collect();
+    let read = degc.iter().map(|t| t + 0.03 * random.normal());
+    let columns = BTreeMap::from([
+        ("rate_out_dps".to_owned(), output),
+        ("die_degc".to_owned(), read.collect()),
+    ]);
+    let time_s: Vec<f64> = (0..rows).map(|k| 20.0 * k as f64).collect();
+    let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+    let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
+    let term = |id: &str, point: Point| {
+        let is_it = |c: &&Arc<dyn Candidate>| c.id() == id;
+        let candidate = search.candidates().iter().find(is_it).unwrap().clone();
+        Term::new(candidate, point)
+    };
+    let at = |degc: f64| (degc - 35.0) / 35.0;
+    // A gradual step and a broad swing look like a narrow one.
+    let terms = match step_dps {
+        0.0 => [
+            term("stress_jump", Point::at(3, &[at(20.0), -3.4])),
+            term("mode_crossing", Point::at(0, &[at(20.0), -1.2])),
+        ],
+        _ => [
+            term("stress_jump", Point::at(0, &[at(55.0)])),
+            term("mode_crossing", Point::at(0, &[at(20.0), -2.9])),
+        ],
+    };
+    let model = search.polished(search.model(&terms).unwrap()).unwrap();
+    assert_eq!(model.terms.len(), 2);
+    let united = search.united(model).unwrap();
+    united.terms.iter().map(Term::id).collect()
+}
+
+#[test]
+fn two_shapes_at_one_temperature_are_one_where_it_does_for_both() {
+    for seed in 1..5 {
+        assert_eq!(united(seed, 0.0), ["mode_crossing"], "{seed}");
+        let both = ["stress_jump", "mode_crossing"];
+        assert_eq!(united(seed, 0.1), both, "{seed}");
+    }
+}
