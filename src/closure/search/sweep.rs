@@ -3,12 +3,14 @@
 use super::judge::{EQUAL, Judged, PRICE, Round};
 use super::{MOST_RIVALS, Model, Search, Term};
 use crate::closure::likelihood::Unusable;
+use crate::closure::likelihood::linear::dot;
 
 /// Net gain by which another candidate takes a term's place.
 pub(super) const BETTER: f64 = 1.5;
 
-/// Net gain that a second shape at one temperature has to bring beside a first one: noise of the thermometer, where the first is
-/// steep, makes some.
+/// Cosine of what two local shapes contribute from which on they are of one place, and the net gain that the second has to
+/// bring there: noise of the thermometer, where the first is steep, makes some.
+const ALIKE: f64 = 0.5;
 const LIKENESS: f64 = 20.0;
 
 /// Passes over all terms.
@@ -78,8 +80,8 @@ impl Search<'_> {
     }
 
     /// Two names that the same third one would do for, each beside the other, give their place to it where it is worth as much
-    /// as both: a shape that is not quite the one that is there needs a second one for what it is off. So do two shapes at one
-    /// temperature to either of them, somewhere else and in another size.
+    /// as both: a shape that is not quite the one that is there needs a second one for what it is off. So do two local shapes
+    /// of one place to either of them in another size.
     ///
     /// # Errors
     /// Too few rows.
@@ -90,15 +92,15 @@ impl Search<'_> {
             for second in &names[i + 1..] {
                 let (a, b) = (&model.terms[*first], &model.terms[*second]);
                 let common = a.rivals.iter().filter(|r| b.rivals.contains(r));
-                let both_local = a.candidate.is_local() && b.candidate.is_local();
-                let either = [a.id(), b.id()].into_iter().filter(|_| both_local);
-                let least = self.net(&model) - if both_local { LIKENESS } else { 0.0 };
-                for id in common.cloned().chain(either) {
+                let common = common.map(|id| (id.clone(), 0.0));
+                let one_place = self.are_of_one_place(&model, *first, *second);
+                let either = [a.id(), b.id()].into_iter().filter(|_| one_place);
+                for (id, less) in common.chain(either.map(|id| (id, LIKENESS))) {
                     let mut terms = model.terms.clone();
                     terms.remove(*second);
                     terms.remove(*first);
                     if let Some(united) = self.with_instead(terms, &id)?
-                        && self.net(&united) >= least
+                        && self.net(&united) >= self.net(&model) - less
                     {
                         return Ok(united);
                     }
@@ -106,6 +108,17 @@ impl Search<'_> {
             }
         }
         Ok(model)
+    }
+
+    /// Whether two local shapes say the same of the same rows, or take each other back there.
+    fn are_of_one_place(&self, model: &Model, first: usize, second: usize) -> bool {
+        let is_local = |k: usize| model.terms[k].candidate.is_local();
+        if !is_local(first) || !is_local(second) {
+            return false;
+        }
+        let parts = self.contributions(model);
+        let (a, b) = (&parts[first], &parts[second]);
+        dot(a, b).powi(2) > ALIKE.powi(2) * dot(a, a) * dot(b, b)
     }
 
     /// The model with a name more, if it is called for.

@@ -120,17 +120,21 @@ fn united(seed: u64, step_dps: f64) -> Vec<String> {
             term("mode_crossing", Point::at(0, &[at(20.0), -2.9])),
         ],
     };
-    let model = search.polished(search.model(&terms).unwrap()).unwrap();
-    assert_eq!(model.terms.len(), 2);
+    let mut model = search.model(&terms).unwrap();
+    if step_dps == 0.0 {
+        model = search.polished(model).unwrap();
+    }
     let united = search.united(model).unwrap();
     united.terms.iter().map(Term::id).collect()
 }
 
 #[test]
-fn two_shapes_at_one_temperature_are_one_where_it_does_for_both() {
+fn two_shapes_of_one_place_are_one_where_it_does_for_both() {
     for seed in 1..5 {
         assert_eq!(united(seed, 0.0), ["mode_crossing"], "{seed}");
         let both = ["stress_jump", "mode_crossing"];
         assert_eq!(united(seed, 0.1), both, "{seed}");
+        // Worth less than the second of one place has to be.
+        assert_eq!(united(seed, 0.018), both, "{seed}");
     }
 }

@@ -66,7 +66,7 @@ impl Search<'_> {
     }
 
     /// What each term contributes, whitened, without what the declared model could take up; rows of the fit.
-    fn contributions(&self, model: &Model) -> Vec<Vec<f64>> {
+    pub(super) fn contributions(&self, model: &Model) -> Vec<Vec<f64>> {
         let c = self.channels;
         let fit = &model.fit;
         let whitener = Whitener::new(&fit.problem.line, fit.at.shape);
