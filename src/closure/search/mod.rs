@@ -7,9 +7,10 @@
 //! out are spikes, unless a candidate explains them ([`forward`]). At the end every
 //! step is tried again with the others in, against all other names ([`sweep`]), must hold ([`validate`]) and lower the error of
 //! held-out rows ([`heldout`]). Where a shape without a name wins, it is kept as what is left; a step that happens once may
-//! be one of time, and a scale factor may be off by the same everywhere; that is said beside the name (`once`).
+//! be one of time, and a scale factor may be off by the same everywhere; that is said beside the name (`once`, `bare_scale`).
 
 mod acting;
+mod bare_scale;
 mod clip;
 pub mod constancy;
 mod declared;
