@@ -15,7 +15,7 @@ const PAIR: usize = 2;
 /// and how many rows a place such a capture has: slow noise moves the codes over the steps by and by, and the places are too
 /// few to be met by chance.
 const BESIDE: f64 = 8.0;
-const ROWS_OF_A_PLACE: usize = 320;
+const ROWS_OF_A_PLACE: u64 = 320;
 
 /// What stands out around a model.
 struct Standing<'a> {
@@ -39,10 +39,8 @@ impl<'a> Standing<'a> {
         let spectrum = around.spectrum(capture);
         let lines = skirts::with_hidden(capture, around, &spectrum, &model.tone, (12, 3.0));
         let resolution = 1.0 / capture.rows() as f64;
-        let period = model
-            .tone
-            .period()
-            .filter(|p| p * ROWS_OF_A_PLACE <= capture.rows());
+        let is_short = |period: u64| period * ROWS_OF_A_PLACE <= capture.rows() as u64;
+        let short = model.tone.period().is_some_and(is_short);
         Standing {
             known,
             model,
@@ -51,7 +49,7 @@ impl<'a> Standing<'a> {
             tones: around.free.map(|[sin, cos]| sin.hypot(cos)),
             sharp: steps::is_sharp(&model.neutral, model),
             resolution,
-            beside: resolution * if period.is_some() { BESIDE } else { 1.0 },
+            beside: resolution * if short { BESIDE } else { 1.0 },
         }
     }
 

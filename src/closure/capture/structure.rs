@@ -47,7 +47,7 @@ pub fn left(capture: &Capture, model: &Model, coefficients: &[Vec<f64>; 2]) -> S
     if let Some(line) = lines.first() {
         let surprise = line.surprise - (capture.rows() as f64).ln();
         if surprise > worst.0 {
-            let name = CHANNELS.get(line.channel).copied().unwrap_or("");
+            let name = CHANNELS[line.channel];
             let place = match capture.meta.fs_hz {
                 Some(fs) => format!("{:.3} Hz", line.turns * fs),
                 None => format!("{:.6} per sample", line.turns),

@@ -45,7 +45,7 @@ impl Tone {
     }
 
     /// Rows after which the phase comes back, where the tuning word is known.
-    pub fn period(&self) -> Option<usize> {
+    pub fn period(&self) -> Option<u64> {
         let word = self.word.filter(|word| *word != 0)?;
         Some(1 << (32 - word.trailing_zeros()))
     }
@@ -197,8 +197,8 @@ mod tests {
                 offset_turns: 0.0,
             };
             assert_eq!(tone.period(), Some(period));
-            assert_eq!(tone.phase(period), 0.0);
-            assert!((1..period).all(|row| tone.phase(row) != 0.0));
+            assert_eq!(tone.phase(period as usize), 0.0);
+            assert!((1..period).all(|row| tone.phase(row as usize) != 0.0));
         }
     }
 

@@ -5,7 +5,7 @@
 
 use super::covariate::spline;
 use super::{Bias, Candidate, Estimate, Missing, Point, Reported, Sheet, gain, map, product};
-use crate::closure::channels::{Channels, lag, range};
+use crate::closure::channels::{Channels, lag, scaled};
 use crate::closure::likelihood::linear::Basis;
 use crate::record::columns::is_known;
 
@@ -195,9 +195,10 @@ impl Candidate for Outside {
         if self.kind != Kind::Scale {
             return Reported::new();
         }
-        let (low, high) = range(c.column("rate_dps").unwrap_or(&[]));
-        let ppm = 2e6 / (high - low);
-        [gain("linear_ppm", estimate, 0, ppm)].into_iter().collect()
+        let (_, _, half_dps) = scaled(c.column("rate_dps").unwrap_or(&[]));
+        [gain("linear_ppm", estimate, 0, 1e6 / half_dps)]
+            .into_iter()
+            .collect()
     }
 }
 
