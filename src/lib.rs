@@ -6,15 +6,17 @@
 //! (C and Rust, and that they are the model), [`report`]; [`selftest`] says what [`closure`] finds and what not.
 
 pub mod approx;
+pub mod capture;
 pub mod circuit;
 pub mod cli;
-pub mod closure;
+pub mod compensation;
 pub mod correction;
 pub mod cosim;
 pub mod design;
 pub mod emit;
 pub mod equivalence;
 pub mod error;
+pub mod firmware;
 pub mod job;
 pub mod numeric;
 pub mod output;
@@ -24,5 +26,10 @@ pub mod report;
 pub mod selftest;
 pub mod simulation;
 pub mod spectrum;
+pub mod statistics;
+pub mod tabulate;
+pub mod thermal;
 pub mod trace_file;
+pub mod vectors;
+pub mod verdict;
 pub mod verify;

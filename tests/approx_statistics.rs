@@ -1,8 +1,8 @@
 //! The proved bound against the greatest error that is met, over random requests of every kind.
 
-use gyrogen::approx::cost::Target;
+use gyrogen::tabulate::cost::Target;
 use gyrogen::approx::form::polynomial::{Monomials, Scheme};
-use gyrogen::approx::job::{Asked, Request, Weight, approximate};
+use gyrogen::tabulate::job::{Asked, Request, Weight, approximate};
 use gyrogen::numeric::format::Format;
 
 const FUNCTIONS: [(&str, &str, &str); 14] = [

@@ -8,7 +8,9 @@ mod blind_capture;
 use blind_capture::bench::{Bench, Dice};
 use blind_capture::faults::{Fault, Faults};
 use blind_capture::score::{Answer, Confusion, Mark, mark};
-use gyrogen::closure::capture::{self, input::Capture, report::Findings};
+use gyrogen::capture;
+use gyrogen::capture::input::Capture;
+use gyrogen::capture::report::Findings;
 use gyrogen::record::capture_meta::CaptureMeta;
 
 fn seeds(first: u64, committed: u64) -> std::ops::Range<u64> {

@@ -5,8 +5,8 @@
 mod blind;
 
 use blind::{Class, Scenario, tally};
-use gyrogen::closure::close;
-use gyrogen::closure::search::Effort;
+use gyrogen::thermal::close;
+use gyrogen::thermal::search::Effort;
 use gyrogen::design::reader;
 use serde_json::Value;
 use std::path::Path;

@@ -9,8 +9,8 @@ mod common {
 use common::closing::closed;
 use common::command::gyrogen_in;
 use common::design::design;
-use gyrogen::closure::close::Named;
-use gyrogen::closure::search::Effort;
+use gyrogen::thermal::close::Named;
+use gyrogen::thermal::search::Effort;
 use gyrogen::error::Result;
 use gyrogen::plant::noise::Noise;
 use gyrogen::record::{ThermalRecord, thermal};

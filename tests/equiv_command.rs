@@ -205,7 +205,7 @@ fn emitted(mismatches: u64) -> Emitted {
 #[test]
 fn a_damaged_bound_and_damaged_code_leave_a_short_counterexample() {
     let design = default();
-    let (drive, sense) = gyrogen::verify::stimulus::capture(&design, 20_000, 5);
+    let (drive, sense) = gyrogen::vectors::stimulus::capture(&design, 20_000, 5);
     let stimulus = Stimulus {
         drive: &drive,
         sense: &sense,

@@ -48,7 +48,7 @@ fn go_on(design: &mut Design) {
 fn codes(design: &Design, seed: u64) -> (Vec<i32>, Vec<i32>) {
     let ratio = design.circuit.decimator.ratio as usize;
     let samples = (40 * ratio).clamp(3000, 60_000);
-    gyrogen::verify::stimulus::segments(design, samples, samples / 9 + 1, seed)
+    gyrogen::vectors::stimulus::segments(design, samples, samples / 9 + 1, seed)
 }
 
 #[test]

@@ -4,7 +4,8 @@
 //! `GYROGEN_WRITE=1 cargo test --test generated` writes the folder anew.
 
 use gyrogen::emit::bundle::Part;
-use gyrogen::emit::files::{self, EmittedFile};
+use gyrogen::firmware::files;
+use gyrogen::firmware::files::EmittedFile;
 use gyrogen::emit::views::Language;
 use std::path::{Path, PathBuf};
 

@@ -6,8 +6,8 @@ mod common {
 }
 
 use common::closing;
-use gyrogen::closure::close::Closed;
-use gyrogen::closure::verdict::{Fate, Step};
+use gyrogen::thermal::close::Closed;
+use gyrogen::verdict::{Fate, Step};
 use gyrogen::plant::noise::Noise;
 use std::f64::consts::TAU;
 use std::fmt::Write as _;

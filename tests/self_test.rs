@@ -7,8 +7,9 @@ mod common {
 
 use common::command::gyrogen_in;
 use common::design::design;
-use gyrogen::closure::close::{self, Named};
-use gyrogen::closure::search::Effort;
+use gyrogen::thermal::close;
+use gyrogen::thermal::close::Named;
+use gyrogen::thermal::search::Effort;
 use gyrogen::error::Result;
 use gyrogen::record::ThermalRecord;
 use gyrogen::selftest::outcome::Outcome;

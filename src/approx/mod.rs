@@ -4,21 +4,9 @@
 //! forms; [`coefficients`] puts them together for a polynomial, [`choice`] among all forms; [`job`] does what
 //! `gyrogen approx` is asked, [`bundle`] emits it.
 
-pub mod bias;
-pub mod bundle;
-mod check;
-pub mod choice;
-pub mod coefficients;
-pub mod cost;
-mod datapath;
-mod describe;
 #[cfg(test)]
 pub(crate) mod draws;
 pub mod form;
-pub mod ideal;
-pub mod job;
 pub mod minimax;
-pub mod outcome;
 pub mod real;
 pub mod reference;
-pub mod selection;

@@ -1,6 +1,6 @@
 //! The table of forms that meet a bound.
 
-use crate::approx::cost::Cost;
+use crate::tabulate::cost::Cost;
 use comfy_table::{CellAlignment, Table};
 
 /// A line: form in words, cost, errors as they are shown, undominated, chosen.

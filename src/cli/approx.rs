@@ -1,13 +1,14 @@
 //! `gyrogen approx`: a function in fixed point, with its certified error.
 
 use super::{OutputFormat, alternatives};
-use crate::approx::bundle;
-use crate::approx::cost::Target;
+use crate::firmware::approximation;
+use crate::tabulate::cost::Target;
 use crate::approx::form::polynomial::{Monomials, Scheme};
-use crate::approx::job::{self, Asked, Request, Weight};
-use crate::approx::outcome::{Alternative, Outcome, Search};
-use crate::approx::selection::Reason;
-use crate::emit::files;
+use crate::tabulate::job;
+use crate::tabulate::job::{Asked, Request, Weight};
+use crate::tabulate::outcome::{Alternative, Outcome, Search};
+use crate::tabulate::selection::Reason;
+use crate::firmware::files;
 use crate::emit::views::Language;
 use crate::error::{Error, InputError, Result};
 use crate::numeric::format::Format;
@@ -98,10 +99,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     });
     bar.done();
     let made = made?;
-    let model = bundle::model(&made.settled)?;
-    let vectors = bundle::vectors(&made.settled, &model, threads);
+    let model = approximation::model(&made.settled)?;
+    let vectors = approximation::vectors(&made.settled, &model, threads);
     let emit = |language| {
-        bundle::emit(
+        approximation::emit(
             &made.settled,
             &model,
             &vectors,

@@ -1,15 +1,17 @@
 //! `gyrogen close`: what a measurement says beyond its declared model.
 
 use super::OutputFormat;
-use crate::closure::capture;
-use crate::closure::close::{self, Closed};
-use crate::closure::firmware::emitted::{self, Emitted, Told};
-use crate::closure::search::Effort;
-use crate::closure::verdict::{Closure, Verdict};
+use crate::capture;
+use crate::thermal::close;
+use crate::thermal::close::Closed;
+use crate::thermal::firmware::emitted;
+use crate::thermal::firmware::emitted::{Emitted, Told};
+use crate::thermal::search::Effort;
+use crate::verdict::{Closure, Verdict};
 use crate::correction::Planned;
 use crate::correction::firmware::{self, Origin};
 use crate::design::Design;
-use crate::emit::files::EmittedFile;
+use crate::firmware::files::EmittedFile;
 use crate::emit::views::Language;
 use crate::error::{Error, InputError, Result};
 use crate::record::{ThermalRecord, Warning};
@@ -252,9 +254,9 @@ fn write(
         .flatten()
         .zip(["firmware/c", "firmware/rust"])
     {
-        crate::emit::files::write(files, &out.join(folder))?;
+        crate::firmware::files::write(files, &out.join(folder))?;
     }
-    crate::closure::residuals::write(closed, &out.join("residuals.csv"))?;
+    crate::thermal::residuals::write(closed, &out.join("residuals.csv"))?;
     crate::output::write_whole(&out.join("report.html"), page.as_bytes())?;
     if let Some((diff, _)) = &augmented
         && std::io::stderr().is_terminal()

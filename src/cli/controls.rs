@@ -1,6 +1,6 @@
 //! `gyrogen close --controls`: what a name, and what silence is worth in this record.
 
-use crate::closure::close::Closed;
+use crate::thermal::close::Closed;
 use crate::design::Design;
 use crate::error::Result;
 use crate::record::ThermalRecord;

@@ -6,7 +6,8 @@
 use crate::correction::firmware::{self, Origin};
 use crate::design::{Compensation, Design};
 use crate::emit::bundle::Part;
-use crate::emit::files::{self, EmittedFile};
+use crate::firmware::files;
+use crate::firmware::files::EmittedFile;
 use crate::emit::views::Language;
 use crate::error::{InputError, Result};
 use std::path::PathBuf;

@@ -131,7 +131,7 @@ fn codes(design: &Design, arguments: &Arguments) -> Result<(Vec<i32>, Vec<i32>, 
             "the design's gyro in closed loop through its thermal run",
         ),
         Kind::Adversarial => (
-            crate::verify::stimulus::capture(design, samples, 1),
+            crate::vectors::stimulus::capture(design, samples, 1),
             "tones, squares, constants, steps and noise",
         ),
     };

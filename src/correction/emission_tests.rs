@@ -3,7 +3,7 @@
 use super::firmware::{Origin, emit};
 use super::sample::{bends, plan, record};
 use super::*;
-use crate::emit::files;
+use crate::firmware::files;
 use crate::emit::views::Language;
 use crate::verify::bundle::verify;
 use crate::verify::target::Target;

@@ -3,11 +3,13 @@
 use super::run::{Correction, Reading};
 use super::sentences;
 use crate::emit::bundle::Bundle;
-use crate::emit::files::{self, EmittedFile};
-use crate::emit::stepped::{self, Stepped};
+use crate::firmware::files;
+use crate::firmware::files::EmittedFile;
+use crate::firmware::stepped;
+use crate::firmware::stepped::Stepped;
 use crate::emit::views::{self, Language};
 use crate::error::Result;
-use crate::job::firmware::{Built, both};
+use crate::verify::firmware::{Built, both};
 use crate::verify::compare::{self, Compared};
 use std::path::Path;
 

@@ -1,7 +1,7 @@
 //! Random plans and records for the tests, and the plan evaluated in real numbers.
 
 use super::*;
-use crate::verify::stimulus::Lcg;
+use crate::vectors::stimulus::Lcg;
 
 /// Uniform in -1 .. 1.
 pub fn unit(lcg: &mut Lcg) -> f64 {

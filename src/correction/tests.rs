@@ -2,7 +2,7 @@
 
 use super::sample::{bends, evaluate, normal, plan, record};
 use super::*;
-use crate::verify::stimulus::Lcg;
+use crate::vectors::stimulus::Lcg;
 
 fn rms(values: impl Iterator<Item = f64>) -> f64 {
     let (mut sum, mut count) = (0.0, 0);

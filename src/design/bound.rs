@@ -3,7 +3,7 @@
 
 use super::schema::{Circuit, Compensation, Outside};
 use super::table::{Real, Table, Value};
-use crate::approx::cost::Target;
+use crate::tabulate::cost::Target;
 use crate::approx::form::polynomial::Monomials;
 use crate::approx::form::split::{Spacing, Symmetry};
 use crate::approx::form::stored::{LARGEST_ENTRY, Read, Stored, WIDEST_BITS};

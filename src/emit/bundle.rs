@@ -166,7 +166,7 @@ pub fn trace_compensation(design: &Design) -> Program {
     trace.finish()
 }
 
-pub(super) fn states(program: &Program) -> Vec<StateType> {
+pub fn states(program: &Program) -> Vec<StateType> {
     let mut states: Vec<StateType> = Vec::new();
     for function in &program.functions {
         if function.state.is_empty() {

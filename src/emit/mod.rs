@@ -4,13 +4,8 @@
 
 pub mod bundle;
 pub mod c;
-pub mod calibrated;
-pub mod files;
-pub mod function;
 pub mod lower;
 mod lower_cast;
 pub mod machine;
-pub mod manifest;
 pub mod rust;
-pub mod stepped;
 pub mod views;

@@ -9,7 +9,7 @@ use super::{against, shrink};
 use crate::design::Design;
 use crate::emit::bundle::Bundle;
 use crate::error::Result;
-use crate::job::firmware::{Built, Firmware};
+use crate::verify::firmware::{Built, Firmware};
 use crate::simulation::hunting::{Hunting, hunting};
 use crate::spectrum::{NcoSpurs, nco_spurs};
 use crate::verify::compare;

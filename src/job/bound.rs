@@ -6,12 +6,13 @@
 
 use super::coefficients::nearest;
 use super::{budget, compensation};
-use crate::approx::bias::alternatives::{self, Way};
-use crate::approx::bias::certainty::{Bounds, Certainty, bounds};
-use crate::approx::bias::{Evaluation, coefficients, one_rounding};
-use crate::approx::choice;
-use crate::approx::cost::{Cost, Target};
-use crate::closure::BaselineFit;
+use crate::compensation::alternatives;
+use crate::compensation::alternatives::Way;
+use crate::compensation::certainty::{Bounds, Certainty, bounds};
+use crate::compensation::{Evaluation, coefficients, one_rounding};
+use crate::tabulate::choice;
+use crate::tabulate::cost::{Cost, Target};
+use crate::thermal::BaselineFit;
 use crate::design::bound::hindrance;
 use crate::design::{BiasBound, Compensation, CompensationInput, Design, limits};
 use crate::error::{InputError, Result};
@@ -141,7 +142,7 @@ pub fn refuse_saturation(certainty: &Certainty) -> Result<()> {
 
 fn lines(ways: &[Way], chosen: usize, output: Format) -> Vec<Line> {
     let listed = ways.iter().map(|w| w.listed.clone()).collect();
-    let line = |a: crate::approx::outcome::Alternative| Line {
+    let line = |a: crate::tabulate::outcome::Alternative| Line {
         form: a.form,
         detail: a.detail,
         cost: a.cost,

@@ -1,11 +1,11 @@
 //! Random fitted polynomials under random bounds: what is certified, what is run, what is written and read again.
 
 use super::*;
-use crate::approx::bias::certainty::certainty;
+use crate::compensation::certainty::certainty;
 use crate::approx::draws::Draws;
 use crate::approx::form::stored::{Read, Stored};
 use crate::circuit::compensation::codes;
-use crate::closure::BaselineFit;
+use crate::thermal::BaselineFit;
 use crate::design::{ChannelInput, Fitted, Outside, reader};
 use crate::job::fitted_design;
 use crate::numeric::format::Rounding;
@@ -63,7 +63,7 @@ fn flat() -> BaselineFit {
     );
     let (record, _) = record.expect("a record");
     let options = reader::read(None).expect("the default").fit;
-    crate::closure::fit(&record, &Default::default(), &options).expect("a fit")
+    crate::thermal::fit(&record, &Default::default(), &options).expect("a fit")
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! One budget for the compensation: what each step may add to the bias, in deg/s and in output LSB.
 
 use super::coefficients::variable;
-use crate::approx::bias::certainty::Certainty;
-use crate::closure::BaselineFit;
+use crate::compensation::certainty::Certainty;
+use crate::thermal::BaselineFit;
 use crate::design::{Compensation, CompensationInput, Design};
 use crate::numeric::format::pow2;
 use serde::Serialize;

@@ -3,7 +3,8 @@
 use super::bound::{self, Kept};
 use super::coefficients::{self, Rounded};
 use super::{formats, warning};
-use crate::closure::{self, BaselineFit};
+use crate::thermal;
+use crate::thermal::BaselineFit;
 use crate::design::{Compensation, CompensationInput, Design, FitOptions, FitOrder};
 use crate::error::{InputError, Result};
 use crate::record::{ThermalRecord, Warning};
@@ -56,7 +57,7 @@ pub fn calibrate(
         },
         ..design.fit.clone()
     };
-    let fit = closure::fit(record, &mapping, &options)?;
+    let fit = thermal::fit(record, &mapping, &options)?;
     warnings.extend(fit.warnings.iter().cloned());
     let mut chosen = formats::fill(design, &fit, record)?;
     let rounded = coefficients::round(design, &fit)?;

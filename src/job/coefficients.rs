@@ -1,8 +1,8 @@
 //! The fitted polynomial in the firmware's variable and formats, and what the rounding costs.
 
 use super::{compensation, thermometer_raw};
-use crate::approx::bias::coefficients as best_coefficients;
-use crate::closure::BaselineFit;
+use crate::compensation::coefficients as best_coefficients;
+use crate::thermal::BaselineFit;
 use crate::design::{Circuit, Compensation, CompensationInput, Design, Fitted, Outside};
 use crate::error::{InputError, Result};
 use crate::numeric::format::{Format, pow2};

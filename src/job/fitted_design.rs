@@ -1,6 +1,6 @@
 //! The design with the fitted compensation as a design file of its own: what reproduces the firmware.
 
-use crate::approx::cost::Target;
+use crate::tabulate::cost::Target;
 use crate::correction::Planned;
 use crate::design::bound::evaluation_text;
 use crate::design::{BiasBound, Compensation, CompensationInput, Design, Outside};

@@ -1,6 +1,6 @@
 //! The thermometer of the firmware, and formats where the design leaves them open.
 
-use crate::closure::BaselineFit;
+use crate::thermal::BaselineFit;
 use crate::cosim::scale::{nominal_full_scale_dps, power_of_two_near};
 use crate::design::{
     BiasBound, ChannelInput, Circuit, Compensation, CompensationInput, Design, Outside,

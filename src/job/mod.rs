@@ -12,15 +12,14 @@ pub mod bound;
 pub mod budget;
 pub mod calibration;
 pub mod coefficients;
-pub mod firmware;
 pub mod fitted_design;
 pub mod formats;
 pub mod from_record;
 pub mod outcome;
 pub mod own_run;
 
-use crate::approx::bias::certainty;
-use crate::closure::BaselineFit;
+use crate::compensation::certainty;
+use crate::thermal::BaselineFit;
 use crate::design::{Compensation, CompensationInput, Design};
 use crate::error::Result;
 use crate::record::{self, Warning};
@@ -78,7 +77,7 @@ pub fn run(
     let budget = budget::budget(&design, &fit, &certainty);
 
     say("emitting, building and comparing C and Rust");
-    let firmware = firmware::Firmware::make(&design, command)?;
+    let firmware = crate::verify::firmware::Firmware::make(&design, command)?;
     let compared = firmware.compare(&design)?;
 
     say("running the record through float, fixed, C and Rust");

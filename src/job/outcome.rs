@@ -3,12 +3,13 @@
 use super::bound::Kept;
 use super::budget::Budget;
 use super::coefficients::Rounded;
-use super::firmware::Firmware;
+use crate::verify::firmware::Firmware;
 use super::{drift_pp, rms};
-use crate::approx::bias::certainty::{self, Certainty};
-use crate::closure::BaselineFit;
+use crate::compensation::certainty;
+use crate::compensation::certainty::Certainty;
+use crate::thermal::BaselineFit;
 use crate::design::Design;
-use crate::emit::manifest::sha256;
+use crate::firmware::manifest::sha256;
 use crate::record::Warning;
 use crate::verify::compare::Compared;
 use serde::Serialize;

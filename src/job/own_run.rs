@@ -1,11 +1,11 @@
 //! The design's own thermal run: plant and circuit in closed loop, in one stream without a break.
 
-use super::firmware::Firmware;
+use crate::verify::firmware::Firmware;
 use super::formats;
 use super::outcome::Point;
 use super::{clamped_bias, compensation, warning};
 use crate::circuit::engine::{self, ArithmeticKind, Rows};
-use crate::closure::BaselineFit;
+use crate::thermal::BaselineFit;
 use crate::cosim::scale::{full_scale_dps, nominal_full_scale_dps};
 use crate::cosim::surroundings::Moment;
 use crate::cosim::{readings, stream};

@@ -14,5 +14,6 @@ pub mod format;
 pub mod lane;
 pub mod paired;
 mod paired_word;
+pub mod polynomial;
 pub mod trace;
 pub mod turn;

@@ -4,7 +4,8 @@
 use super::log_bytes::Damage;
 use super::thermal::{LEAST_ROWS, ThermalRecord};
 use super::warning::Warning;
-use super::{frozen, plausibility, stats};
+use super::{frozen, plausibility};
+use crate::statistics::stats;
 use crate::design::RecordMapping;
 use crate::error::{InputError, Result};
 use std::collections::BTreeMap;

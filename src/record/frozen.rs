@@ -5,7 +5,7 @@
 //! while another thermometer, or the bias itself, runs on.
 
 use super::columns::{THERMOMETERS, unit_of};
-use super::stats;
+use crate::statistics::stats;
 use super::thermal::ThermalRecord;
 use super::warning::Warning;
 

@@ -29,7 +29,6 @@ mod plausibility;
 pub mod rows;
 mod scale;
 mod shorten;
-pub mod stats;
 pub mod thermal;
 mod timing;
 mod ulog;

@@ -5,7 +5,7 @@
 //! `scale`, the clock in `timing`.
 
 use super::columns;
-use super::stats;
+use crate::statistics::stats;
 use super::thermal::ThermalRecord;
 use super::warning::Warning;
 use super::{scale, timing};

@@ -1,7 +1,7 @@
 //! Does the output follow the applied rate as `rate_out_dps` at nominal scale has to?
 
 use super::columns::THERMOMETERS;
-use super::stats;
+use crate::statistics::stats;
 use super::thermal::ThermalRecord;
 use super::warning::Warning;
 

@@ -1,6 +1,6 @@
 //! Is the clock of a record in seconds since its start?
 
-use super::stats;
+use crate::statistics::stats;
 use super::thermal::ThermalRecord;
 use super::warning::Warning;
 

@@ -17,7 +17,7 @@ pub mod svg;
 pub mod tables;
 pub mod text;
 
-use crate::closure::BaselineFit;
+use crate::thermal::BaselineFit;
 use crate::design::Design;
 use crate::error::{InputError, Result};
 use crate::job::coefficients::Rounded;

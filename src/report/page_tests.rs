@@ -1,8 +1,9 @@
 //! Tests of the page, on a record that is made up.
 
 use super::super::{Shown, render};
-use crate::approx::bias::certainty;
-use crate::closure::{self, BaselineFit};
+use crate::compensation::certainty;
+use crate::thermal;
+use crate::thermal::BaselineFit;
 use crate::design::Design;
 use crate::job::coefficients::{self, Rounded};
 use crate::job::outcome::{After, Drift, Emitted, Equivalence, FitSummary, Point, Summary};

@@ -13,10 +13,11 @@ use super::scene::Scene;
 use super::score::{counted, scores};
 use super::trial::{Answer, Mark};
 use super::{Case, Progress, Request, marked, of_record, trials};
-use crate::closure::close::{self, Closed, Named, channels_of, own_candidates};
-use crate::closure::intake::refused;
-use crate::closure::search::{Effort, Search};
-use crate::closure::verdict::Fate;
+use crate::thermal::close;
+use crate::thermal::close::{Closed, Named, channels_of, own_candidates};
+use crate::thermal::intake::refused;
+use crate::thermal::search::{Effort, Search};
+use crate::verdict::Fate;
 use crate::design::Design;
 use crate::error::Result;
 use crate::record::{ThermalRecord, condensed};
@@ -173,14 +174,14 @@ pub fn run(
 pub fn look(record: &ThermalRecord, design: &Design, effort: Effort) -> Result<Seen> {
     let mut warnings = Vec::new();
     let channels = channels_of(record, design, &mut warnings)?;
-    let unusable = |e: crate::closure::likelihood::Unusable| refused(record, e.to_string());
+    let unusable = |e: crate::statistics::Unusable| refused(record, e.to_string());
     let split = channels.split().map_err(unusable)?;
     let own = own_candidates(design, &channels, &mut warnings);
     let search = Search::new(&channels, &split, effort, own);
     let found = search.run().map_err(unusable)?;
     let model = search.model(&found.terms).map_err(unusable)?;
     let last = search.judge(&model, effort.surrogates);
-    let probabilities = |judged: &[crate::closure::search::judge::Judged]| {
+    let probabilities = |judged: &[crate::thermal::search::judge::Judged]| {
         let each = judged.iter().filter(|j| j.candidate.named());
         each.map(|j| (j.candidate.id(), j.p_value)).collect()
     };

@@ -3,9 +3,9 @@
 //! Surrogates by Fourier transform (Theiler et al. 1992, "Testing for nonlinearity in time series"), over the
 //! rows as if they were evenly spaced: as slow, as periodic and as large as what they copy, and about nothing.
 
-use crate::closure::channels::range;
-use crate::closure::close::Closed;
-use crate::closure::likelihood::random::Stream;
+use crate::thermal::channels::range;
+use crate::thermal::close::Closed;
+use crate::statistics::random::Stream;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 use std::f64::consts::TAU;
@@ -51,7 +51,7 @@ pub fn of(closed: &Closed) -> Vec<Fake> {
 /// What moves in a record, with what it is called.
 fn sources(closed: &Closed) -> Vec<(String, Vec<f64>)> {
     let c = &closed.channels;
-    let residual = |model: &crate::closure::search::Model| whole(&model.residual(c));
+    let residual = |model: &crate::thermal::search::Model| whole(&model.residual(c));
     let mut out = vec![(
         "what the declared model leaves".to_owned(),
         residual(&closed.before),

@@ -6,7 +6,7 @@
 //! thermometer that is no phase stands for the phase in the cubic bias, scaled to -1..1.
 
 use super::scene::Scene;
-use crate::closure::close::Closed;
+use crate::thermal::close::Closed;
 use crate::plant::effects::Instant;
 use crate::plant::profile::NOMINAL_SUPPLY_V;
 

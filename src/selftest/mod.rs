@@ -17,8 +17,8 @@ mod score;
 pub mod statistics;
 pub mod trial;
 
-use crate::closure::close;
-use crate::closure::search::Effort;
+use crate::thermal::close;
+use crate::thermal::search::Effort;
 use crate::design::{Design, RecordMapping, UserEffect};
 use crate::error::{InputError, Result};
 use crate::record::{ThermalRecord, Warning};
@@ -156,7 +156,7 @@ pub fn run_with(
     Ok(Outcome {
         schema: SCHEMA,
         version: env!("CARGO_PKG_VERSION"),
-        design_sha256: crate::emit::manifest::sha256(design.source.text.as_bytes()),
+        design_sha256: crate::firmware::manifest::sha256(design.source.text.as_bytes()),
         command: request.command.clone(),
         record: record.map(|r| r.0.source.display().to_string()),
         own_steps,
@@ -207,7 +207,7 @@ fn of_user(effect: &UserEffect, scenes: &[Scene]) -> Case {
     let moves = |s: &Scene| {
         let moving = |name: &str| {
             let column = s.columns.get(name).map_or(&s.time_s, |c| c);
-            let (low, high) = crate::closure::channels::range(column);
+            let (low, high) = crate::thermal::channels::range(column);
             high > low
         };
         effect.columns().filter(|n| moving(n)).count()

@@ -8,8 +8,8 @@
 use super::programs::Program;
 use super::scene::{Plant, Scene, Taken};
 use crate::approx::real::formula::Operand;
-use crate::closure::channels::scaled;
-use crate::closure::likelihood::linear::{Basis, dot};
+use crate::thermal::channels::scaled;
+use crate::statistics::linear::{Basis, dot};
 use crate::design::UserEffect;
 use crate::plant::noise::Noise;
 

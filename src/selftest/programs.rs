@@ -2,7 +2,7 @@
 //! needs to be seen. The gyro is the design's ([`crate::plant`]), without any of its effects.
 
 use super::scene::Scene;
-use crate::closure::likelihood::noise::NoiseModel;
+use crate::statistics::noise::NoiseModel;
 use crate::design::{Design, Effects};
 use crate::plant::effects::Instant;
 use crate::plant::profile::NOMINAL_SUPPLY_V;

@@ -1,6 +1,6 @@
 //! What a gyro goes through in an experiment, row by row, and what a laboratory writes down of it.
 
-use crate::closure::likelihood::noise::NoiseModel;
+use crate::statistics::noise::NoiseModel;
 use crate::design::Effects;
 use crate::plant::effects::{self, Instant, StressJump};
 use crate::plant::resonator::{Resonator, Response};

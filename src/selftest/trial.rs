@@ -2,8 +2,8 @@
 
 use super::planted::{Draw, Kind};
 use super::scene::{Plant, Scene};
-use crate::closure::close::Named;
-use crate::closure::likelihood::noise::NoiseModel;
+use crate::thermal::close::Named;
+use crate::statistics::noise::NoiseModel;
 use crate::error::Result;
 use crate::plant::noise::Noise;
 use crate::plant::slow_noise::SlowNoise;

@@ -3,7 +3,8 @@
 use super::compare::{self, Compared};
 use super::target::{self, Target};
 use super::toolchain;
-use crate::emit::manifest::{self, Manifest};
+use crate::firmware::manifest;
+use crate::firmware::manifest::Manifest;
 use crate::emit::views::Language;
 use crate::error::{InputError, Result, io_error};
 use serde::Serialize;

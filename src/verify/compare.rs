@@ -1,12 +1,13 @@
 //! Runs emitted code beside the model and finds the first difference.
 
-use super::model::{self, Model};
-use super::stimulus;
+use crate::vectors::model;
+use crate::vectors::model::Model;
+use crate::vectors::stimulus;
 use super::toolchain::Harness;
 use crate::circuit::engine::{self, ArithmeticKind};
 use crate::design::Design;
 use crate::emit::bundle::Bundle;
-use crate::emit::files::{SEED, saturating_rows};
+use crate::firmware::files::{SEED, saturating_rows};
 use crate::emit::views::{self, Language};
 use crate::error::Result;
 use serde::Serialize;

@@ -4,7 +4,6 @@
 
 pub mod bundle;
 pub mod compare;
-pub mod model;
-pub mod stimulus;
+pub mod firmware;
 pub mod target;
 pub mod toolchain;

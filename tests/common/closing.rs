@@ -1,8 +1,9 @@
 //! Closing by the library.
 
 use super::design::design;
-use gyrogen::closure::close::{self, Closed};
-use gyrogen::closure::search::Effort;
+use gyrogen::thermal::close;
+use gyrogen::thermal::close::Closed;
+use gyrogen::thermal::search::Effort;
 use std::path::Path;
 
 /// A record in CSV, closed with a design's text.

@@ -2,7 +2,7 @@
 
 use super::spectrum::spectrum;
 use super::view::{CELLS, Cell, Left, SLOPES, View};
-use crate::closure::capture::candidates::Effect;
+use crate::capture::candidates::Effect;
 use crate::report::axis::{Axis, Interval};
 use crate::report::closure::view::scatter;
 use crate::report::figures::Figure;

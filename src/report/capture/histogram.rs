@@ -1,7 +1,7 @@
 //! Codes counted, and what a model expects: its signal's own distribution, spread by the noise.
 
-use crate::closure::capture::columns::Model;
-use crate::closure::capture::normal;
+use crate::capture::columns::Model;
+use crate::statistics::normal;
 
 /// Bars at most.
 const BARS: i64 = 240;

@@ -13,7 +13,7 @@ pub mod words;
 mod page_tests;
 
 use super::closure::{Own, page};
-use crate::closure::capture::Closed;
+use crate::capture::Closed;
 use crate::error::Result;
 use view::View;
 

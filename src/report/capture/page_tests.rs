@@ -1,9 +1,9 @@
 //! The page of captures that are made up.
 
 use super::*;
-use crate::closure::capture::closed;
-use crate::closure::capture::input::Capture;
-use crate::closure::synthetic::Random;
+use crate::capture::closed;
+use crate::capture::input::Capture;
+use crate::thermal::synthetic::Random;
 use crate::design::reader;
 use crate::record::capture_meta::CaptureMeta;
 use std::f64::consts::TAU;

@@ -2,10 +2,10 @@
 
 use super::figures::{NAMES, WIDTH, axis, figure, legend, series, stacked};
 use super::view::{Left, View};
-use crate::closure::capture::candidates::Effect;
-use crate::closure::capture::columns::HARMONICS;
-use crate::closure::capture::tone::fold;
-use crate::closure::capture::{mains, spur};
+use crate::capture::candidates::Effect;
+use crate::capture::columns::HARMONICS;
+use crate::capture::tone::fold;
+use crate::capture::{mains, spur};
 use crate::report::axis::{Axis, Interval};
 use crate::report::figures::Figure;
 use crate::report::svg::{Shape, Svg, Swatch};

@@ -1,9 +1,9 @@
 //! What the figures show of a capture: one pass over the rows for each model.
 
 use super::histogram::Histogram;
-use crate::closure::capture::Closed;
-use crate::closure::capture::columns::{Model, Rows, chunks};
-use crate::closure::capture::input::{Capture, Part};
+use crate::capture::Closed;
+use crate::capture::columns::{Model, Rows, chunks};
+use crate::capture::input::{Capture, Part};
 use crate::report::closure::view::thin;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;

@@ -1,8 +1,8 @@
 //! What the page of a capture says.
 
-use crate::closure::capture::Closed;
-use crate::closure::capture::input::Part;
-use crate::closure::verdict::Closure;
+use crate::capture::Closed;
+use crate::capture::input::Part;
+use crate::verdict::Closure;
 use crate::report::closure::tables::{TakenStep, next, probability, value, with_deviation};
 use crate::report::text::{fixed, grouped, significant};
 
@@ -150,7 +150,7 @@ pub fn provenance(closed: &Closed) -> Vec<[String; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::closure::capture::candidates::Effect;
+    use crate::capture::candidates::Effect;
 
     #[test]
     fn every_effect_has_its_words() {

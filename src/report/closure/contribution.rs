@@ -1,9 +1,9 @@
 //! What each step of a closure adds to the output, row by row, and how sure that is.
 
-use crate::closure::channels::Channels;
-use crate::closure::likelihood::linear::add_scaled;
-use crate::closure::search::Model;
-use crate::closure::search::estimate::{Covariance, Tangent, tangents};
+use crate::thermal::channels::Channels;
+use crate::statistics::linear::add_scaled;
+use crate::thermal::search::Model;
+use crate::thermal::search::estimate::{Covariance, Tangent, tangents};
 
 /// A step's part of the output, one value a row.
 #[derive(Debug, Clone, PartialEq)]

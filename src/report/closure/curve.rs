@@ -2,7 +2,7 @@
 
 use super::contribution::Contribution;
 use super::view::View;
-use crate::closure::verdict::Step;
+use crate::verdict::Step;
 use crate::report::axis::{Axis, Interval};
 
 /// The abscissa of a step's figure.

@@ -4,7 +4,7 @@
 use super::contribution::Contribution;
 use super::view::{DRAWN, View, scatter, thin};
 use super::{allan, curve};
-use crate::closure::channels::range;
+use crate::thermal::channels::range;
 use crate::report::axis::{Axis, Interval};
 use crate::report::figures::Figure;
 use crate::report::svg::{Frame, Shape, Svg, Swatch};

@@ -1,9 +1,9 @@
 //! The page of records that are made up.
 
 use super::*;
-use crate::closure::close::close;
-use crate::closure::search::Effort;
-use crate::closure::synthetic::{Random, record, triangle};
+use crate::thermal::close::close;
+use crate::thermal::search::Effort;
+use crate::thermal::synthetic::{Random, record, triangle};
 use crate::design::reader;
 
 const EFFORT: Effort = Effort {

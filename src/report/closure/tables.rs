@@ -1,10 +1,10 @@
 //! A closure in words and tables.
 
 use super::view::View;
-use crate::closure::close::Closed;
-use crate::closure::effects::Sheet;
-use crate::closure::verdict::{Closure, Errors, Fate, Step, Verdict};
-use crate::record::stats;
+use crate::thermal::close::Closed;
+use crate::thermal::effects::Sheet;
+use crate::verdict::{Closure, Errors, Fate, Step, Verdict};
+use crate::statistics::stats;
 use crate::report::text::{fixed, grouped, minus, significant, trimmed};
 
 /// A step as the page shows it.

@@ -1,10 +1,10 @@
 //! What the figures of a closure have in common: residuals, the readings that are drawn, axes.
 
 use super::contribution::{self, Contribution};
-use crate::closure::channels::range;
-use crate::closure::close::Closed;
+use crate::thermal::channels::range;
+use crate::thermal::close::Closed;
 use crate::record::columns::unit_of;
-use crate::record::stats;
+use crate::statistics::stats;
 use crate::report::axis::{Axis, Interval};
 use crate::report::svg::{Frame, Shape};
 use crate::report::text::grouped;

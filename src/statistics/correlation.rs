@@ -1,0 +1,217 @@
+//! The noise of a fit's residuals, its memory, and what it does to the coefficients.
+//!
+//! Bias residuals are coloured: covariances that assume white noise are too small, often by an
+//! order of magnitude. The model here is white noise plus an AR(1) part,
+//! cov(r_i, r_j) = w [i = j] + b rho^|i - j|, taken from the residuals' own autocovariance; rows
+//! count as evenly spaced. An effect that the polynomial lacks looks like noise with memory and
+//! widens the intervals too, as it should.
+
+use nalgebra::{DMatrix, DVector};
+
+/// White noise plus AR(1), by rows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NoiseModel {
+    /// Variance of the white part, (deg/s)^2.
+    pub white: f64,
+    /// Variance of the part with memory, (deg/s)^2.
+    pub correlated: f64,
+    /// Its correlation from one row to the next, 0..1.
+    pub rho: f64,
+    /// How many independent rows the record is worth.
+    pub effective_rows: f64,
+}
+
+impl NoiseModel {
+    /// From the residuals of a fit with `parameters` coefficients; rows whose weight is below 0.5
+    /// (spikes) are skipped.
+    ///
+    /// b and rho minimise the squared misfit to the autocovariances of lags 1 to n/8 (at most
+    /// 200). The part with memory is dropped if it explains no more of them than white
+    /// noise would by chance (a chi-square of 9). Both variances are raised for what the fit took
+    /// away: by n / (n - parameters), with the effective number of rows for the part with memory.
+    pub fn of_residuals(residuals: &[f64], weights: &[f64], parameters: usize) -> Self {
+        let mask: Vec<f64> = (0..residuals.len())
+            .map(|i| f64::from(u8::from(weights.get(i).is_none_or(|w| *w >= 0.5))))
+            .collect();
+        let clean: Vec<f64> = residuals.iter().zip(&mask).map(|(r, m)| r * m).collect();
+        let all = mask.iter().all(|m| *m == 1.0);
+        let lagged = |v: &[f64], lag: usize| -> f64 {
+            let later = v.get(lag..).unwrap_or(&[]);
+            v.iter().zip(later).map(|(a, b)| a * b).sum()
+        };
+        let autocovariance = |lag: usize| {
+            let count = if all {
+                clean.len().saturating_sub(lag) as f64
+            } else {
+                lagged(&mask, lag)
+            };
+            (lagged(&clean, lag) / count.max(1.0), count)
+        };
+        let (total, n) = autocovariance(0);
+        let mut model = NoiseModel {
+            white: total * n / (n - parameters as f64).max(1.0),
+            correlated: 0.0,
+            rho: 0.0,
+            effective_rows: n,
+        };
+        let lags = (residuals.len() / 8).clamp(1, 200);
+        let c: Vec<f64> = (1..=lags).map(|k| autocovariance(k).0).collect();
+        let mut best = (0.0, 0.0, 0.0);
+        for step in 1..200 {
+            // Memory from less than a row to 200 rows, evenly in 1 / (1 - rho).
+            let rho = 1.0 - (200f64).powf(-f64::from(step) / 200.0);
+            let (mut cross, mut norm, mut power) = (0.0, 0.0, 1.0);
+            for c in &c {
+                power *= rho;
+                cross += c * power;
+                norm += power * power;
+            }
+            let b = (cross / norm).clamp(0.0, total);
+            // The misfit that b takes away; b may have been clipped.
+            let gain = b * (2.0 * cross - b * norm);
+            if gain > best.0 {
+                best = (gain, b, rho);
+            }
+        }
+        let (gain, b, rho) = best;
+        if total > 0.0 && gain * n / (total * total) > 9.0 {
+            let inflation = 1.0 + 2.0 * (b / total) * rho / (1.0 - rho);
+            model.effective_rows = (n / inflation).max(1.0);
+            let lost = model.effective_rows / (model.effective_rows - parameters as f64).max(1.0);
+            // Half of the effective rows gone to parameters: all that is known is that it is bad.
+            model.correlated = b * lost.clamp(1.0, 3.0);
+            model.white = (total - b) * n / (n - parameters as f64).max(1.0);
+            model.rho = rho;
+        }
+        model
+    }
+
+    /// cov * v, in time proportional to its length.
+    fn times(&self, v: &[f64]) -> Vec<f64> {
+        let mut out: Vec<f64> = v
+            .iter()
+            .map(|v| (self.white - self.correlated) * v)
+            .collect();
+        let mut run = 0.0;
+        for (o, v) in out.iter_mut().zip(v) {
+            run = self.rho * run + v;
+            *o += self.correlated * run;
+        }
+        run = 0.0;
+        for (o, v) in out.iter_mut().zip(v).rev() {
+            run = self.rho * run + v;
+            *o += self.correlated * run;
+        }
+        out
+    }
+
+    /// The variance of the mean of `n` rows in a row, (deg/s)^2.
+    pub fn variance_of_mean(&self, n: usize) -> f64 {
+        let m = n.max(1) as f64;
+        let r = self.rho;
+        // sum over i, j of rho^|i-j| in closed form.
+        let pairs = if r > 0.0 {
+            m * (1.0 + r) / (1.0 - r) - 2.0 * r * (1.0 - r.powf(m)) / (1.0 - r).powi(2)
+        } else {
+            m
+        };
+        (self.white * m + self.correlated * pairs) / (m * m)
+    }
+}
+
+/// The covariance of weighted least-squares coefficients under `noise`:
+/// H (A' W C W A) H with H = (A' W A)^-1, for the design matrix A (a row a reading) and the
+/// weights W. One row and column a column of A; zero where the weights do not determine the
+/// coefficients.
+pub fn covariance(design: &DMatrix<f64>, weights: &[f64], noise: &NoiseModel) -> DMatrix<f64> {
+    let size = design.ncols();
+    let scores = weighted(design, weights);
+    let Some(normal) = scores.tr_mul(design).cholesky() else {
+        return DMatrix::zeros(size, size);
+    };
+    let inverse = normal.inverse();
+    let mut spread = scores.clone();
+    for k in 0..size {
+        let column: Vec<f64> = scores.column(k).iter().copied().collect();
+        for (i, value) in noise.times(&column).into_iter().enumerate() {
+            spread[(i, k)] = value;
+        }
+    }
+    let middle = scores.tr_mul(&spread);
+    let full = &inverse * middle * &inverse;
+    // Rounding leaves it a little asymmetric.
+    (&full + full.transpose()) * 0.5
+}
+
+/// Weighted least squares by the normal equations, for a few well-scaled columns; `None` if the
+/// weights do not determine the coefficients.
+pub fn solve(design: &DMatrix<f64>, y: &[f64], weights: &[f64]) -> Option<DVector<f64>> {
+    let scores = weighted(design, weights);
+    let normal = scores.tr_mul(design);
+    let scale = normal.diagonal().max();
+    let factor = normal.cholesky()?;
+    // Columns that are nearly combinations of others: no answer rather than a wild one.
+    let least = factor.l_dirty().diagonal().min();
+    if least * least < 1e-10 * scale {
+        return None;
+    }
+    Some(factor.solve(&scores.tr_mul(&DVector::from_column_slice(y))))
+}
+
+/// W A.
+fn weighted(design: &DMatrix<f64>, weights: &[f64]) -> DMatrix<f64> {
+    let mut scores = design.clone();
+    for (mut row, w) in scores.row_iter_mut().zip(weights) {
+        row *= *w;
+    }
+    scores
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::thermal::synthetic::Random;
+
+    #[test]
+    fn the_product_is_that_of_the_matrix() {
+        let noise = NoiseModel {
+            white: 2.0,
+            correlated: 3.0,
+            rho: 0.7,
+            effective_rows: 5.0,
+        };
+        let v = [1.0, -2.0, 0.5, 4.0, 0.0];
+        for (i, value) in noise.times(&v).into_iter().enumerate() {
+            let expected: f64 = (0..5)
+                .map(|j: usize| {
+                    let white = if i == j { 2.0 } else { 0.0 };
+                    (white + 3.0 * 0.7f64.powi(i.abs_diff(j) as i32)) * v[j]
+                })
+                .sum();
+            assert!((value - expected).abs() < 1e-12);
+        }
+        let mean: f64 = noise.times(&[0.2; 5]).iter().map(|v| v * 0.2).sum();
+        assert!((noise.variance_of_mean(5) - mean).abs() < 1e-12);
+    }
+
+    #[test]
+    fn white_noise_and_noise_with_memory_are_told_apart() {
+        let mut random = Random::new(1);
+        let (mut named, mut rho, mut share) = (0, 0.0, 0.0);
+        for _ in 0..100 {
+            let white: Vec<f64> = (0..400).map(|_| random.normal()).collect();
+            let model = NoiseModel::of_residuals(&white, &[], 3);
+            named += usize::from(model.correlated > 0.0);
+            let coloured = random.coloured(400, 0.8);
+            let model = NoiseModel::of_residuals(&coloured, &[], 3);
+            rho += model.rho / 100.0;
+            share += model.correlated / 100.0;
+        }
+        assert!(
+            named <= 10,
+            "{named} of 100 white series were given a memory"
+        );
+        assert!((0.7..0.87).contains(&rho), "{rho}");
+        assert!((0.8..1.3).contains(&share), "{share}");
+    }
+}

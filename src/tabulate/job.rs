@@ -1,0 +1,342 @@
+//! The job of `gyrogen approx`: from a request to a form, its proved error and its bundles.
+
+use super::check;
+use super::choice::{self, Candidate, Wanted};
+use super::coefficients::{self, Chosen};
+use super::cost::{Cost, Target};
+use super::describe;
+use crate::approx::form::coefficient_formats::CoefficientFormats;
+use crate::approx::form::measure::{Effort, Measured, SAMPLE, measure};
+use crate::approx::form::polynomial;
+use crate::approx::form::polynomial::{Monomials, Polynomial, Scheme};
+use crate::approx::form::{Codes, Form, Settled, overflow};
+use super::ideal;
+use super::outcome::{ErrorBounds, Outcome};
+use crate::approx::reference::Function;
+use crate::firmware::manifest::sha256;
+use crate::error::{Error, InputError, Result};
+use crate::numeric::cast::Target as Quantised;
+use crate::numeric::format::Format;
+use std::collections::BTreeMap;
+
+/// Codes that are all run if nobody says `--exhaustive`.
+pub const EXHAUSTIVE_CODES: u128 = 1 << 24;
+/// Codes that are all run if somebody does.
+pub const MOST_CODES: u128 = 1 << 32;
+
+/// Which form is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+pub enum Asked {
+    /// One polynomial.
+    #[default]
+    Polynomial,
+    /// A table.
+    Table,
+    /// A polynomial for each segment.
+    Piecewise,
+    /// The cheapest that meets the bound.
+    Auto,
+}
+
+/// What the error is weighed with when coefficients are chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+pub enum Weight {
+    /// The function's own unit.
+    #[default]
+    Absolute,
+    /// Parts of the function's magnitude.
+    Relative,
+}
+
+/// A request.
+#[derive(Debug, Clone)]
+pub struct Request {
+    /// The expression.
+    pub function: String,
+    /// Named values in it.
+    pub parameters: BTreeMap<String, f64>,
+    /// Both ends, constant expressions.
+    pub domain: [String; 2],
+    /// Highest order.
+    pub degree: Option<usize>,
+    /// Which monomials; all, or with a bound whatever is cheapest, if not given.
+    pub monomials: Option<Monomials>,
+    /// Of the input.
+    pub input: Format,
+    /// Of the output.
+    pub output: Format,
+    /// Of coefficients or entries; of a polynomial one for all or one a monomial, lowest order first; none = chosen.
+    pub coefficients: Vec<Format>,
+    /// Of the cast after each step.
+    pub intermediate: Option<Format>,
+    /// The order of a polynomial's steps.
+    pub evaluation: Scheme,
+    /// Which form.
+    pub form: Asked,
+    /// The most that the certified error may be.
+    pub bound: Option<f64>,
+    /// For the choice of coefficients.
+    pub weight: Weight,
+    /// Run up to 2^32 codes.
+    pub exhaustive: bool,
+    /// For the estimate of cycles.
+    pub target: Target,
+    /// Prefix of the emitted names.
+    pub name: String,
+}
+
+impl Request {
+    /// One line for each thing asked, in a fixed order: what the result depends on.
+    pub fn canonical(&self) -> String {
+        let mut text = format!("function = {}\n", self.function);
+        for (name, value) in &self.parameters {
+            text += &format!("parameter {name} = {value:e}\n");
+        }
+        let some = |f: Option<Format>| f.map_or("chosen".to_owned(), |f| f.to_string());
+        text += &format!(
+            "domain = {}, {}\ndegree = {:?}\nmonomials = {:?}\ninput = {}\noutput = {}\n",
+            self.domain[0], self.domain[1], self.degree, self.monomials, self.input, self.output
+        );
+        let formats: Vec<String> = self.coefficients.iter().map(Format::to_string).collect();
+        let list = match formats.as_slice() {
+            [] => "chosen".to_owned(),
+            some => some.join(","),
+        };
+        if self.evaluation != Scheme::default() {
+            text += &format!("evaluation = {:?}\n", self.evaluation);
+        }
+        text += &format!(
+            "coefficients = {}\nintermediate = {}\nform = {:?}\nbound = {:?}\nweight = {:?}\ntarget = {:?}\nname = {}\n",
+            list,
+            some(self.intermediate),
+            self.form,
+            self.bound,
+            self.weight,
+            self.target,
+            self.name
+        );
+        text
+    }
+}
+
+/// The result: what is reported, and what is emitted.
+#[derive(Debug, Clone)]
+pub struct Approximation {
+    /// For `approx.json`.
+    pub outcome: Outcome,
+    /// The form with its program.
+    pub settled: Settled,
+}
+
+/// Does what the request asks. `progress` is told the number of codes to run, then of codes that were run.
+///
+/// # Errors
+/// Anything in the request that cannot be used.
+pub fn approximate(
+    request: &Request,
+    command: &str,
+    threads: usize,
+    progress: &(dyn Fn(u128, u64) + Sync),
+) -> Result<Approximation> {
+    check::request(request)?;
+    let function = check::function(request)?;
+    let codes = check::codes(request, &function)?;
+    check::output(request, &function)?;
+    check::polynomial(request, &function, codes)?;
+    let (form, mut search, candidates) = choose(request, &function, codes)?;
+    let most_codes = if request.exhaustive {
+        MOST_CODES
+    } else {
+        EXHAUSTIVE_CODES
+    };
+    let mut settled = form.settle()?;
+    overflow::refuse(&settled, most_codes)?;
+    let total = codes.count();
+    let effort = Effort {
+        most_codes,
+        sample: SAMPLE,
+        threads,
+        progress: &|count| progress(total, count),
+    };
+    let mut measured = measure(&settled, &function, &effort)?;
+    if let (Some(bound), Some((all, chosen))) = (request.bound, &candidates)
+        && measured.certified > bound
+    {
+        // The search has the least error that runs; what is proved of it may still be more than what is
+        // proved of the coefficients that were listed.
+        settled = all[*chosen].settled.clone();
+        search = None;
+        measured = measure(&settled, &function, &effort)?;
+    }
+    let alternatives = candidates.map(|(all, chosen)| choice::alternatives(&all, chosen));
+    let (coefficients, table) = describe::data(&settled.form);
+    let ideal = match (&settled.form, &search) {
+        (Form::Polynomial(p), Some(search)) => {
+            ideal::ideal(search, p, measured.data_only, &function)
+        }
+        _ => None,
+    };
+    let outcome = Outcome {
+        schema: "gyrogen.approx/1",
+        version: env!("CARGO_PKG_VERSION"),
+        design_sha256: sha256(request.canonical().as_bytes()),
+        command: command.to_owned(),
+        function: request.function.clone(),
+        domain: request.domain.join(","),
+        input_codes: [codes.low, codes.high],
+        form: settled.form.name(),
+        detail: describe::detail(&settled.form),
+        monomials: match &settled.form {
+            Form::Polynomial(p) => Some(p.monomials),
+            _ => None,
+        },
+        evaluation: match &settled.form {
+            Form::Polynomial(p) => Some(p.formats.scheme),
+            _ => None,
+        },
+        formats: describe::formats(&settled.form, request),
+        coefficients,
+        table,
+        error: bounds(&measured),
+        inputs_checked: measured.inputs_checked,
+        exhaustive: measured.exhaustive,
+        cost: Cost::of(&settled, request.target),
+        target: request.target,
+        search,
+        ideal,
+        alternatives,
+        bound: request.bound,
+        holds: request
+            .bound
+            .is_none_or(|bound| measured.certified <= bound),
+    };
+    Ok(Approximation { outcome, settled })
+}
+
+fn bounds(m: &Measured) -> ErrorBounds {
+    ErrorBounds {
+        certified_max_abs: m.certified,
+        exhaustive_max_abs: m.exhaustive.then_some(m.observed),
+        sampled_max_abs: (!m.exhaustive).then_some(m.observed),
+        coefficients_only_max_abs: m.data_only,
+        rounding_max_abs: m.rounding,
+        at_input_raw: m.at_input_raw,
+    }
+}
+
+type Choice = (
+    Form,
+    Option<super::outcome::Search>,
+    Option<(Vec<Candidate>, usize)>,
+);
+
+fn choose(request: &Request, function: &Function, codes: Codes) -> Result<Choice> {
+    if let (Some(degree), Asked::Polynomial | Asked::Auto, None) =
+        (request.degree, request.form, request.bound)
+    {
+        let kind = request.monomials.unwrap_or_default();
+        let (form, search) = polynomial_as_asked(function, codes, request, kind, degree)?;
+        return Ok((form, Some(search), None));
+    }
+    let wanted = Wanted {
+        polynomial: matches!(request.form, Asked::Polynomial | Asked::Auto),
+        table: matches!(request.form, Asked::Table | Asked::Auto),
+        piecewise: matches!(request.form, Asked::Piecewise | Asked::Auto),
+    };
+    // A degree alone for segments: as many as keep the error within one LSB.
+    let bound = request.bound.unwrap_or(request.output.lsb());
+    let candidates = choice::candidates(function, codes, request, bound, wanted)?;
+    let Some(chosen) = choice::cheapest(&candidates) else {
+        return Err(unmet(request, bound));
+    };
+    let mut form = candidates[chosen].settled.form.clone();
+    let mut search = None;
+    if let Form::Polynomial(p) = &form {
+        let degree = p.coefficients.len() - 1;
+        let asked = Request {
+            coefficients: p.formats.coefficients.each(p.monomials, degree),
+            ..request.clone()
+        };
+        let (better, found) = polynomial_as_asked(function, codes, &asked, p.monomials, degree)?;
+        // The search is for the least error: the same degree, the same formats.
+        (form, search) = (better, Some(found));
+    }
+    let listed = request.bound.map(|_| (candidates, chosen));
+    Ok((form, search, listed))
+}
+
+fn unmet(request: &Request, bound: f64) -> Error {
+    let half = request.output.lsb() / 2.0;
+    let help = if bound <= half {
+        format!(
+            "rounding to {} alone costs half an LSB, {half:e}: give the output more fraction bits",
+            request.output
+        )
+    } else {
+        "give a wider bound, or output, coefficients or degree more room".into()
+    };
+    InputError::new(format!(
+        "no form of the kind that was asked for has a certified error of at most {bound:e}"
+    ))
+    .help(help)
+    .into()
+}
+
+/// The polynomial of the request, with the best coefficients that the search finds.
+fn polynomial_as_asked(
+    function: &Function,
+    codes: Codes,
+    request: &Request,
+    kind: Monomials,
+    degree: usize,
+) -> Result<(Form, super::outcome::Search)> {
+    let formats = match request.coefficients.as_slice() {
+        [] => Format::q(2, request.output.fraction_bits).into(),
+        some => CoefficientFormats::new(some, kind, degree)?,
+    };
+    let chosen = coefficients::choose(function, codes, request, kind, degree, formats)?;
+    let Chosen { form, search } = chosen;
+    Ok((Form::Polynomial(Box::new(form)), search))
+}
+
+/// A polynomial for a bound: the best coefficients under ideal evaluation, in the format that is given or
+/// in the shortest that meets the bound.
+pub(super) fn polynomial_within(
+    function: &Function,
+    codes: Codes,
+    request: &Request,
+    kind: Monomials,
+    degree: usize,
+    bound: f64,
+) -> Option<Form> {
+    let room = bound - 0.5 * request.output.lsb();
+    let (format, raw) = coefficients::within(function, request, kind, degree, room)?;
+    Some(Form::Polynomial(Box::new(
+        compiled(codes, request, kind, format.into(), raw).ok()?,
+    )))
+}
+
+/// The evaluation in the request's formats.
+pub(super) fn compiled(
+    codes: Codes,
+    request: &Request,
+    kind: Monomials,
+    coefficients: CoefficientFormats,
+    raw: Vec<i128>,
+) -> Result<Polynomial> {
+    let intermediate = match request.intermediate {
+        Some(format) => format,
+        None => {
+            let to = (request.output, request.evaluation);
+            polynomial::choose_intermediate(codes, coefficients, to, kind, &raw)?
+        }
+    };
+    let formats = polynomial::Formats {
+        codes,
+        coefficients,
+        intermediate: Quantised::from(intermediate),
+        output: request.output,
+        scheme: request.evaluation,
+    };
+    Polynomial::new(formats, kind, raw)
+}

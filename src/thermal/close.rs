@@ -1,0 +1,265 @@
+//! A thermal record closed: from its rows to `closure.json` (`docs/manual.md`, "Closing the loop").
+
+mod carried;
+mod evidence;
+mod remarks;
+
+use super::channels::Channels;
+use super::effects::{Candidate, user};
+pub use super::intake::channels_of;
+use super::intake::{refused, without_glitches};
+use crate::statistics::blocks::Split;
+use super::search::{Effort, Found, Model, Search};
+use crate::verdict::{Closure, Errors, FirmwareErrors, SCHEMA, Step, Structure, Verdict};
+use crate::correction::Correction;
+use crate::design::Design;
+use crate::error::Result;
+use crate::record::{ThermalRecord, Warning, condensed};
+use crate::statistics::stats;
+use std::sync::Arc;
+
+/// A closed record, with what a report shows.
+pub struct Closed {
+    /// `closure.json`.
+    pub closure: Closure,
+    /// The record as candidates see it.
+    pub channels: Channels,
+    /// Which rows were fitted and which judged.
+    pub split: Split,
+    /// Rows that stand out of both models, few and each by itself: no part of any figure.
+    pub accidents: Vec<bool>,
+    /// The declared model.
+    pub before: Model,
+    /// With the named terms.
+    pub after: Model,
+    /// What firmware runs, if it can.
+    pub correction: Option<Correction>,
+    /// What that leaves of each row, bit for bit, deg/s; NaN without a reading.
+    pub firmware_dps: Option<Vec<f64>>,
+}
+
+/// The effects that the design's user suspects, for a record.
+pub(crate) fn own_candidates(
+    design: &Design,
+    channels: &Channels,
+    warnings: &mut Vec<Warning>,
+) -> Vec<Arc<dyn Candidate>> {
+    let mut out: Vec<Arc<dyn Candidate>> = Vec::new();
+    for own in user::all(&design.effects, channels) {
+        let remark = own.remarks();
+        warnings.extend(remark.map(|(code, said)| Warning::general(code, said)));
+        out.push(Arc::new(own));
+    }
+    out
+}
+
+/// A step's name, and what does as well.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Named {
+    /// Its id.
+    pub effect: String,
+    /// Ids.
+    pub rivals: Vec<String>,
+}
+
+/// The names alone that [`close`] gives a record, in the order of the steps.
+///
+/// # Errors
+/// As there.
+pub fn names(record: &ThermalRecord, design: &Design, effort: Effort) -> Result<Vec<Named>> {
+    let mut warnings = Vec::new();
+    let condensed = condensed(record);
+    let record = condensed.as_ref().map_or(record, |(short, _)| short);
+    let cleaned = without_glitches(record);
+    let record = cleaned.as_ref().map_or(record, |(cleaned, _)| cleaned);
+    let channels = channels_of(record, design, &mut warnings)?;
+    let unusable = |e: crate::statistics::Unusable| refused(record, e.to_string());
+    let split = channels.split().map_err(unusable)?;
+    let own = own_candidates(design, &channels, &mut warnings);
+    let found = Search::new(&channels, &split, effort, own)
+        .run()
+        .map_err(unusable)?;
+    let named = |term: super::search::Term| Named {
+        effect: term.id(),
+        rivals: term.rivals,
+    };
+    Ok(found.terms.into_iter().map(named).collect())
+}
+
+/// Closes a record.
+///
+/// # Errors
+/// A record that cannot be fitted: too few rows, no thermometer of the name that the design gives.
+pub fn close(
+    record: &ThermalRecord,
+    mut warnings: Vec<Warning>,
+    design: &Design,
+    command: &str,
+    effort: Effort,
+) -> Result<Closed> {
+    let start = std::time::Instant::now();
+    let condensed = condensed(record);
+    let record = condensed.as_ref().map_or(record, |(short, warning)| {
+        warnings.push(warning.clone());
+        short
+    });
+    let cleaned = without_glitches(record);
+    let record = cleaned.as_ref().map_or(record, |(cleaned, said)| {
+        warnings.extend(said.iter().cloned());
+        cleaned
+    });
+    let channels = channels_of(record, design, &mut warnings)?;
+    let refuse = |why: String| refused(record, why);
+    let split = channels.split().map_err(|e| refuse(e.to_string()))?;
+    let (closure, before, after, accidents, firmware) = {
+        let own = own_candidates(design, &channels, &mut warnings);
+        let search = Search::new(&channels, &split, effort, own);
+        if !search.heldout.contains(&true) {
+            let rows = record.len();
+            return Err(refuse(format!(
+                "no stretch of its {rows} rows can be held out, so that no error could be told"
+            )));
+        }
+        let unusable = |e: crate::statistics::Unusable| refuse(e.to_string());
+        let found = search.run().map_err(unusable)?;
+        let before = search.model(&[]).map_err(unusable)?;
+        let after = search.model(&found.terms).map_err(unusable)?;
+        let accidents = search.accidents([&before, &after]);
+        let told = Told {
+            search: &search,
+            found: &found,
+            before: &before,
+            after: &after,
+            judged: JudgedRows::of(&search, &accidents),
+        };
+        let mut closure = told.closure().map_err(unusable)?;
+        told.warn(&mut warnings);
+        let firmware = told.firmware(record, design, &mut warnings);
+        closure.firmware = firmware
+            .as_ref()
+            .map_or_else(FirmwareErrors::default, |f| f.errors);
+        closure.warnings = warnings;
+        closure.command = command.to_owned();
+        closure.design_sha256 = crate::firmware::manifest::sha256(design.source.text.as_bytes());
+        (closure, before, after, accidents, firmware)
+    };
+    let (correction, firmware_dps) = firmware.map(|f| (f.correction, f.residual_dps)).unzip();
+    let mut closed = Closed {
+        closure,
+        channels,
+        split,
+        accidents,
+        before,
+        after,
+        correction,
+        firmware_dps,
+    };
+    closed.closure.seconds = start.elapsed().as_secs_f64();
+    Ok(closed)
+}
+
+/// The rows that errors are of, and those that stand out, alone or a few in a row.
+struct JudgedRows {
+    train: Vec<bool>,
+    heldout: Vec<bool>,
+    accidents: Vec<bool>,
+}
+
+impl JudgedRows {
+    /// Those of a search that are no accidents.
+    fn of(search: &Search, accidents: &[bool]) -> Self {
+        let usual = |rows: &[bool]| -> Vec<bool> {
+            let pairs = rows.iter().zip(accidents);
+            pairs.map(|(row, accident)| *row && !accident).collect()
+        };
+        JudgedRows {
+            train: usual(&search.train),
+            heldout: usual(&search.heldout),
+            accidents: accidents.to_vec(),
+        }
+    }
+}
+
+/// A search put into words.
+struct Told<'a> {
+    search: &'a Search<'a>,
+    found: &'a Found,
+    before: &'a Model,
+    after: &'a Model,
+    judged: JudgedRows,
+}
+
+impl Told<'_> {
+    fn errors(&self, model: &Model) -> Errors {
+        let residual = model.residual(self.search.channels);
+        let over = |rows: &[bool]| -> Vec<f64> {
+            let pairs = residual.iter().zip(rows).filter(|(_, m)| **m);
+            pairs.map(|(r, _)| *r).collect()
+        };
+        let held = over(&self.judged.heldout);
+        Errors {
+            train_rms: stats::rms(&over(&self.judged.train)),
+            heldout_rms: stats::rms(&held),
+            heldout_max_abs: held.iter().fold(0.0, |m, r| m.max(r.abs())),
+        }
+    }
+
+    fn closure(&self) -> std::result::Result<Closure, crate::statistics::Unusable> {
+        let left = self.found.left.is_some();
+        let residual = self.after.residual(self.search.channels);
+        let rows = residual.iter().zip(&self.judged.accidents);
+        let usual = rows.filter(|(r, accident)| r.is_finite() && !**accident);
+        let usual: Vec<f64> = usual.map(|(r, _)| *r).collect();
+        let steps = self.steps()?;
+        Ok(Closure {
+            schema: SCHEMA,
+            version: env!("CARGO_PKG_VERSION"),
+            design_sha256: String::new(),
+            command: String::new(),
+            verdict: Verdict::of(steps.len(), left),
+            unit: "deg/s",
+            noise_floor_rms: stats::difference_noise(&usual),
+            before: self.errors(self.before),
+            after: self.errors(self.after),
+            firmware: FirmwareErrors::default(),
+            residual_structure: Structure {
+                left,
+                strongest_channel: self.found.left.clone(),
+            },
+            evidence: self.evidence(&steps),
+            steps,
+            warnings: Vec::new(),
+            seconds: 0.0,
+        })
+    }
+
+    /// The steps in their order, each with the held-out error of itself and those before it.
+    fn steps(&self) -> std::result::Result<Vec<Step>, crate::statistics::Unusable> {
+        let terms = &self.found.terms;
+        let estimates = self.search.estimates(self.after);
+        let mut out = Vec::new();
+        for (k, (term, estimate)) in terms.iter().zip(&estimates).enumerate() {
+            let model = if k + 1 == terms.len() {
+                self.errors(self.after)
+            } else {
+                self.errors(&self.search.model(&terms[..=k])?)
+            };
+            let reported = term.candidate.report(self.search.channels, estimate);
+            out.push(Step {
+                effect: term.id(),
+                channels: term
+                    .candidate
+                    .channels_at(self.search.channels, &term.point),
+                parameters: reported.iter().map(|(n, v)| (n.clone(), v.0)).collect(),
+                parameter_std: reported.iter().map(|(n, v)| (n.clone(), v.1)).collect(),
+                heldout_rms: model.heldout_rms,
+                p_value: term.p_value.clamp(1e-300, 1.0),
+                selection_frequency: self.search.selected_beside(self.after, k, &[])?,
+                indistinguishable_from: term.rivals.clone(),
+                separating_experiment: (!term.rivals.is_empty())
+                    .then(|| term.candidate.sheet().experiment.to_owned()),
+            });
+        }
+        Ok(out)
+    }
+}

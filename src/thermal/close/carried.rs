@@ -1,0 +1,184 @@
+//! What firmware carries of a closed record's model.
+
+use super::Told;
+use crate::thermal::firmware;
+use crate::correction::{Formats, Plan, Term};
+use crate::design::Design;
+use crate::record::{ThermalRecord, Warning};
+use crate::statistics::stats;
+
+/// A held-out error that is so many times another one is more: that of firmware beside the model's, or the declared one's.
+const MORE: f64 = 1.02;
+
+/// Codes of what `intake` takes out of a record's readings, and firmware does not.
+const TAKEN_OUT: [&str; 3] = [
+    "thermometer_quantised",
+    "thermometer_repeats",
+    "adc_not_dithered",
+];
+
+/// The full scale of the rate, deg/s, that a record's own rates ask for, as they come in and as they go out; and the gyro's, which
+/// a record at rest says nothing of.
+fn full_scales_dps(record: &ThermalRecord, design: &Design) -> (f64, Option<f64>) {
+    let most = |name: &str| {
+        let (low, high) = stats::extremes(record.column(name).unwrap_or(&[])).unwrap_or_default();
+        low.abs().max(high.abs())
+    };
+    let (out, applied) = (most("rate_out_dps"), most("rate_dps"));
+    let own = 1.25 * out.max(applied).max(1e-3);
+    let gyros = design.thermal_run.sense_full_scale_dps;
+    (own, (applied == 0.0).then(|| own.max(gyros)))
+}
+
+impl Told<'_> {
+    /// The correction and its errors; none where firmware cannot carry it.
+    pub(super) fn firmware(
+        &self,
+        record: &ThermalRecord,
+        design: &Design,
+        warnings: &mut Vec<Warning>,
+    ) -> Option<firmware::Judged> {
+        let c = self.search.channels;
+        let estimates = self.search.estimates(self.after);
+        let noise = self.after.fit.noise.white_rms_dps;
+        let (own, gyros) = full_scales_dps(record, design);
+        let planned = |full_scale_dps| firmware::plan(c, self.after, &estimates, full_scale_dps);
+        let fits = |plan: &Plan| Formats::choose(plan, noise).is_ok();
+        let wide = gyros.and_then(planned).filter(fits);
+        let Some(plan) = wide.or_else(|| planned(own)) else {
+            let obstacles = firmware::obstacles(c, self.after, &estimates);
+            warnings.extend(
+                obstacles
+                    .into_iter()
+                    .map(|why| Warning::general("not_compensable", why)),
+            );
+            return None;
+        };
+        let judged = |plan: &Plan| firmware::judged(plan, record, c, &self.judged.heldout, noise);
+        if plan.keeps() {
+            let said = "a lag goes on while the power is off: firmware keeps its state and makes up for the periods \
+                        without power (the manual's \"The correction of averaged readings\"), as it did for the figures \
+                        here";
+            warnings.push(Warning::general("firmware_needs_clock", said));
+        }
+        let carried = match judged(&plan) {
+            Ok(carried) => carried,
+            Err(e) => {
+                warnings.push(Warning::general("no_firmware", e.to_string()));
+                return None;
+            }
+        };
+        // Coefficients that cancel may be a model's; in words they are worse than no step at all.
+        let declared = firmware::plan(c, self.before, &[], plan.full_scale_dps);
+        let declared = declared.and_then(|plan| judged(&plan).ok()?.errors.heldout_rms);
+        if let (Some(with), Some(without)) = (carried.errors.heldout_rms, declared)
+            && !self.after.terms.is_empty()
+            && with > MORE * without
+        {
+            let said = format!(
+                "the steps' coefficients cancel each other: in firmware's words they leave {with:.3e} deg/s of \
+                 held-out rows, the declared model alone {without:.3e}; do the separating experiment"
+            );
+            warnings.push(Warning::general("no_firmware", said));
+            return None;
+        }
+        let behind = self.behind(&carried, warnings);
+        warnings.extend(behind);
+        Some(carried)
+    }
+
+    /// What is said where firmware leaves more than the model does.
+    fn behind(&self, carried: &firmware::Judged, said: &[Warning]) -> Option<Warning> {
+        let model = self.errors(self.after).heldout_rms;
+        let firmware = carried.errors.heldout_rms?;
+        let terms = &carried.correction.plan.terms;
+        let mut reasons = Vec::new();
+        if terms.iter().any(Term::remembers) {
+            reasons.push("it has no readings to come, so that a change of the temperature's slope shows late");
+        }
+        if terms.iter().any(Term::is_on_rate) {
+            reasons.push(
+                "it finds the rate from its own noisy output, where the model has the applied one",
+            );
+        }
+        if said.iter().any(|w| TAKEN_OUT.contains(&w.code)) {
+            reasons.push("it has the readings as they are, and what was taken out of them for the model is in its error");
+        }
+        let without_rounding = carried.unrounded_rms_dps / model;
+        if without_rounding < MORE {
+            reasons.push("its words are too short for this correction");
+        } else if reasons.is_empty() {
+            reasons.push("it has each reading with its noise or its rounding, where the model has the course without them");
+        }
+        (firmware > MORE * model).then(|| {
+            let said = format!(
+                "firmware leaves {:.3} times what the model leaves of held-out rows, {without_rounding:.3} times without \
+                 rounding: {}",
+                firmware / model,
+                reasons.join("; ")
+            );
+            Warning::general("firmware_behind", said)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::MORE;
+    use crate::thermal::close::close;
+    use crate::thermal::search::Effort;
+    use crate::thermal::synthetic::{Random, record, triangle};
+    use crate::design::reader;
+
+    /// The full scale of the correction of a record with rates up to `most_dps` in noise of `noise_dps`, and how many times the
+    /// model's held-out error its firmware leaves. The scale factor bends by `bend_ppm` a kelvin squared.
+    fn carried(most_dps: f64, noise_dps: f64, bend_ppm: f64) -> (f64, f64) {
+        let mut random = Random::new(5);
+        let degc = triangle(240);
+        let rate: Vec<f64> = (0..240)
+            .map(|k| most_dps * f64::from(k % 5 - 2) / 2.0)
+            .collect();
+        let pairs = degc.iter().zip(&rate);
+        let output: Vec<f64> = pairs
+            .map(|(t, rate)| {
+                let scale = 1.0 + 1e-6 * bend_ppm * (t - 30.0).powi(2);
+                0.5 - 0.02 * t + rate * scale + noise_dps * random.normal()
+            })
+            .collect();
+        let mut record = record("die_degc", &degc, &output);
+        record.columns.insert("rate_dps".to_owned(), rate);
+        let design = reader::parse("", None).unwrap();
+        let closed = close(&record, Vec::new(), &design, "test", Effort::default()).unwrap();
+        let full_scale_dps = closed.correction.unwrap().plan.full_scale_dps;
+        let errors = closed.closure;
+        assert_eq!(errors.steps.len(), usize::from(bend_ppm != 0.0));
+        let times = errors.firmware.heldout_rms.unwrap() / errors.after.heldout_rms;
+        (full_scale_dps, times)
+    }
+
+    #[test]
+    fn firmware_of_a_record_at_rest_holds_the_gyros_rates() {
+        let (full_scale_dps, times) = carried(0.0, 0.01, 0.0);
+        assert!(
+            full_scale_dps >= 1024.0 && times < MORE,
+            "{full_scale_dps} {times}"
+        );
+        // Rates that were applied are those that the correction is for.
+        let (full_scale_dps, times) = carried(40.0, 0.01, 0.0);
+        assert!((50.0..55.0).contains(&full_scale_dps) && times < MORE);
+        // So little noise that the gyro's range does not fit into a word beside it.
+        let (full_scale_dps, times) = carried(0.0, 1e-6, 0.0);
+        assert!(
+            full_scale_dps < 2.0 && times < MORE,
+            "{full_scale_dps} {times}"
+        );
+    }
+
+    #[test]
+    fn firmware_carries_a_scale_factor_that_bends() {
+        for bend_ppm in [4.0, -2.0] {
+            let (_, times) = carried(200.0, 0.01, bend_ppm);
+            assert!(times < MORE, "{bend_ppm}: {times}");
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! What is said beside a closed record's figures.
+
+use super::Told;
+use crate::thermal::search::LEVEL;
+use crate::record::Warning;
+
+impl Told<'_> {
+    /// All of it but what firmware has to say.
+    pub(super) fn warn(&self, warnings: &mut Vec<Warning>) {
+        warnings.extend(self.accidents().or_else(|| self.riddled()));
+        if !self.found.within_rounding.is_empty() {
+            let each = self.found.within_rounding.iter();
+            let names: Vec<String> = each.map(|(id, rms)| format!("{id} ({rms:.2e})")).collect();
+            warnings.push(Warning::general(
+                "within_adc_rounding",
+                format!(
+                    "not named, as the whole contribution (deg/s rms) is below twice the {:.2e} deg/s that the ADC's \
+                     rounding makes: {}",
+                    self.search.channels.rounding_dps,
+                    names.join(", ")
+                ),
+            ));
+        }
+        for id in &self.found.once {
+            warnings.push(Warning::general(
+                "happens_once",
+                format!(
+                    "{id}: the record shows its step once, so that it may as well be a change at that moment (no effect \
+                     of the catalogue); a second passage of that temperature separates the two"
+                ),
+            ));
+        }
+        if let Some((ppm, std_ppm)) = self.found.scale_ppm {
+            warnings.push(Warning::on(
+                "scale_factor_off",
+                "rate_dps",
+                format!(
+                    "the scale factor is {:.6} times the nominal one ({ppm:.0} +- {std_ppm:.0} ppm), and as far as the record \
+                     says everywhere the same: no effect of the catalogue. Give rate_out_dps at its own scale, divided by that",
+                    1.0 + 1e-6 * ppm
+                ),
+            ));
+        }
+        if !self.found.undecided.is_empty() {
+            warnings.push(Warning::general(
+                "undecided",
+                format!(
+                    "the record decides nothing between {}: each explains it as well",
+                    self.found.undecided.join(", ")
+                ),
+            ));
+        }
+        let hidden: Vec<String> = self.goes_with_temperature();
+        if !hidden.is_empty() {
+            warnings.push(Warning::general(
+                "goes_with_temperature",
+                format!(
+                    "the declared bias in temperature may be that of {}: in this record these go with the thermometer; \
+                     `evidence` says which experiment separates them",
+                    hidden.join(", ")
+                ),
+            ));
+        }
+    }
+
+    /// What is said of rows that no figure has in it.
+    fn accidents(&self) -> Option<Warning> {
+        let search = self.search;
+        let residual = self.after.residual(search.channels);
+        let accidents = self.judged.accidents.iter().enumerate();
+        let rows: Vec<usize> = accidents.filter(|(_, a)| **a).map(|(row, _)| row).collect();
+        let held = rows.iter().filter(|row| search.heldout[**row]).count();
+        let farthest = rows
+            .iter()
+            .copied()
+            .max_by(|a, b| residual[*a].abs().total_cmp(&residual[*b].abs()))?;
+        Some(Warning::on(
+            "outliers",
+            "rate_out_dps",
+            format!(
+                "{} of {} rows ({} held out) stand out by more than six deviations, whatever the model, alone or a few in a \
+                 row: they are not in the errors; the farthest, at {} s, is off by {:.3e} deg/s",
+                rows.len(),
+                residual.len(),
+                held,
+                search.channels.time_s[farthest],
+                residual[farthest]
+            ),
+        ))
+    }
+
+    /// What is said of rows that are far off and too many for accidents.
+    fn riddled(&self) -> Option<Warning> {
+        let search = self.search;
+        let rows = search.riddled(self.after)?;
+        let held = rows.iter().filter(|row| search.heldout[**row]).count();
+        let first = rows.first().map(|row| search.channels.time_s[*row])?;
+        Some(Warning::on(
+            "many_outliers",
+            "rate_out_dps",
+            format!(
+                "{} of {} rows ({held} held out) are more than six deviations off the others, the first at {first} s: too many \
+                 for accidents, so they are in the errors, and no candidate makes them. Do the output and the applied \
+                 rate of a row belong to one time (a rate table that moves within rows, an output that comes late)?",
+                rows.len(),
+                search.channels.len()
+            ),
+        ))
+    }
+
+    /// Names of other channels' effects that the declared bias has in it.
+    fn goes_with_temperature(&self) -> Vec<String> {
+        let search = self.search;
+        let named = self.found.first.iter().filter(|j| j.candidate.named());
+        let others = named.filter(|j| {
+            let channels = j.candidate.channels_at(search.channels, &j.point);
+            let first = channels.first();
+            first.is_some_and(|c| *c != search.channels.thermometer && c != "time_s")
+        });
+        // As in `evidence`: what is beyond chance beside the declared model is not in it.
+        let hidden = others.filter(|j| j.p_value > LEVEL && search.is_declared(j));
+        let taken = |id: &String| self.found.terms.iter().any(|t| t.id() == *id);
+        let ids = hidden.map(|j| j.candidate.id());
+        ids.filter(|id| !taken(id)).collect()
+    }
+}

@@ -1,0 +1,330 @@
+//! From found effects to the correction that firmware runs; `clock`: its steps beside the record's rows; `trial`:
+//! terms tried before one is chosen; [`emitted`]: its C and Rust, built and compared.
+
+mod clock;
+pub mod emitted;
+mod trial;
+
+pub use trial::Trial;
+
+use super::channels::{Channels, scaled};
+use super::effects::{Bias, Estimate};
+use crate::statistics::linear::{Basis, dot};
+use super::search::Model;
+use crate::verdict::FirmwareErrors;
+use crate::correction::{Correction, Formats, Input, Plan, Reading, Term, readings};
+use crate::error::Result;
+use crate::record::ThermalRecord;
+use crate::statistics::stats;
+
+/// Columns that firmware sees by itself.
+const SEEN: [&str; 6] = [
+    "phase_rad",
+    "freq_hz",
+    "die_degc",
+    "agc",
+    "quad_dps",
+    "supply_v",
+];
+
+/// Whether firmware sees a column by itself.
+pub fn sees(name: &str) -> bool {
+    SEEN.contains(&name)
+}
+
+/// `count` equidistant numbers over -1 ..= 1.
+pub fn knots(count: usize) -> impl Iterator<Item = f64> {
+    let last = count.saturating_sub(1).max(1) as f64;
+    (0..count).map(move |k| -1.0 + 2.0 * k as f64 / last)
+}
+
+/// The inputs of a correction while its terms are collected.
+pub struct Words {
+    /// The declared bias in u that effects act on ([`Model::acting`]).
+    pub bias: Bias,
+    /// Of the firmware, s.
+    pub period_s: f64,
+    /// White noise of a reading, deg/s.
+    noise_dps: f64,
+    inputs: Vec<Input>,
+    thermometer: Option<usize>,
+    /// Columns that the design says firmware sees.
+    allowed: Vec<String>,
+}
+
+/// Largest rms error of a polynomial that stands for an effect of two channels, of the noise.
+const SURFACE: f64 = 0.1;
+
+impl Words {
+    fn new(c: &Channels, bias: &Bias, noise_dps: f64) -> Self {
+        let mut out = Words {
+            noise_dps,
+            period_s: clock::period_s(&c.on_s, c.period_s()),
+            bias: bias.clone(),
+            inputs: Vec::new(),
+            thermometer: None,
+            allowed: Vec::new(),
+        };
+        if SEEN.contains(&c.thermometer.as_str()) {
+            out.thermometer = Some(0);
+            out.inputs.push(Input {
+                column: c.thermometer.clone(),
+                offset: c.centre,
+                scale: c.half,
+            });
+        }
+        out
+    }
+
+    /// The input that is u, if firmware sees the thermometer.
+    pub fn thermometer(&self) -> Option<usize> {
+        self.thermometer
+    }
+
+    /// The design says that firmware sees this column.
+    pub fn allow(&mut self, name: &str) {
+        self.allowed.push(name.to_owned());
+    }
+
+    /// An input for a column that firmware sees, and the column as it reads it.
+    pub fn input(&mut self, c: &Channels, name: &str) -> Option<(usize, Vec<f64>)> {
+        if !sees(name) && !self.allowed.iter().any(|a| a == name) {
+            return None;
+        }
+        let (x, middle, half) = scaled(c.column(name)?);
+        let at = self.inputs.iter().position(|i| i.column == name);
+        let at = at.unwrap_or_else(|| {
+            self.inputs.push(Input {
+                column: name.to_owned(),
+                offset: middle,
+                scale: if half > 0.0 { half } else { 1.0 },
+            });
+            self.inputs.len() - 1
+        });
+        Some((at, x))
+    }
+
+    /// Terms for the sum of `columns` times `beta`, a smooth function of a column and of u: the
+    /// polynomial in both that fits it over the record's rows; `None` if none does well enough.
+    pub fn surface(
+        &mut self,
+        c: &Channels,
+        name: &str,
+        columns: &[Vec<f64>],
+        beta: &[f64],
+    ) -> Option<Vec<Term>> {
+        let (input, x) = self.input(c, name)?;
+        let mut target = vec![0.0; c.len()];
+        for (column, b) in columns.iter().zip(beta) {
+            crate::statistics::linear::add_scaled(&mut target, *b, column);
+        }
+        for (of_x, of_u) in [(1, 0), (1, 1), (2, 2), (2, 4), (3, 6)] {
+            let of_u = if self.thermometer.is_some() { of_u } else { 0 };
+            let powers: Vec<(u32, u32)> = (0..=of_x)
+                .flat_map(|a| (0..=of_u).map(move |b| (a, b)))
+                .collect();
+            let shapes: Vec<Vec<f64>> = powers
+                .iter()
+                .map(|(a, b)| {
+                    let pairs = x.iter().zip(&c.u);
+                    pairs
+                        .map(|(x, u)| x.powi(*a as i32) * u.powi(*b as i32))
+                        .collect()
+                })
+                .collect();
+            let basis = Basis::new(&shapes);
+            let mut rest = target.clone();
+            let z = basis.project_off(&mut rest);
+            if dot(&rest, &rest) > (SURFACE * self.noise_dps).powi(2) * c.len() as f64 {
+                continue;
+            }
+            let terms = powers
+                .iter()
+                .zip(basis.solve(&z))
+                .map(|((a, b), gain_dps)| {
+                    let mut factors = Vec::new();
+                    if *a > 0 {
+                        factors.push((input, *a));
+                    }
+                    if let (Some(u), true) = (self.thermometer, *b > 0) {
+                        factors.push((u, *b));
+                    }
+                    Term::Product { gain_dps, factors }
+                });
+            return Some(terms.collect());
+        }
+        None
+    }
+}
+
+/// The correction that a model calls for; `None` if firmware cannot carry it.
+pub fn plan(
+    c: &Channels,
+    model: &Model,
+    estimates: &[Estimate],
+    full_scale_dps: f64,
+) -> Option<Plan> {
+    let mut words = Words::new(c, &model.acting, model.fit.noise.white_rms_dps);
+    let order = model.bias.coefficients_dps.len();
+    let thermometer = words.thermometer();
+    if order > 1 && thermometer.is_none() {
+        return None;
+    }
+    let mut terms: Vec<Term> = model
+        .bias
+        .coefficients_dps
+        .iter()
+        .enumerate()
+        .map(|(k, gain_dps)| Term::Product {
+            gain_dps: *gain_dps,
+            factors: match (k, thermometer) {
+                (1.., Some(u)) => vec![(u, k as u32)],
+                _ => Vec::new(),
+            },
+        })
+        .collect();
+    for (term, estimate) in model.terms.iter().zip(estimates) {
+        terms.extend(term.candidate.correction(c, estimate, &mut words)?);
+    }
+    if order == 1 && words.thermometer == Some(0) && words.inputs.len() == 1 {
+        // A thermometer that did not move is no input.
+        words.inputs.clear();
+    }
+    let remembers = terms.iter().any(Term::remembers);
+    Some(Plan {
+        period_s: if remembers {
+            words.period_s
+        } else {
+            c.period_s()
+        },
+        inputs: words.inputs,
+        full_scale_dps,
+        terms,
+    })
+}
+
+/// Why firmware cannot carry a model: a reason for each term that it cannot, or for the thermometer.
+pub fn obstacles(c: &Channels, model: &Model, estimates: &[Estimate]) -> Vec<String> {
+    let mut words = Words::new(c, &model.acting, model.fit.noise.white_rms_dps);
+    let mut out = Vec::new();
+    if model.bias.coefficients_dps.len() > 1 && words.thermometer().is_none() {
+        let name = &c.thermometer;
+        out.push(format!(
+            "firmware does not see {name}, which the declared bias is a function of"
+        ));
+    }
+    for (term, estimate) in model.terms.iter().zip(estimates) {
+        if term.candidate.correction(c, estimate, &mut words).is_some() {
+            continue;
+        }
+        let own = term.candidate.obstacle(c, &term.point);
+        out.push(own.unwrap_or_else(|| {
+            let id = term.id();
+            match term.candidate.sheet().compensable {
+                false => format!("firmware cannot know what {id} adds to a reading"),
+                true => format!(
+                    "{id}, as this record has it, needs a column that firmware does not see, or no polynomial that its words \
+                     hold comes near to it"
+                ),
+            }
+        }));
+    }
+    out
+}
+
+/// The record with the gaps of the plan's inputs filled as the model sees them: what the logger missed, the
+/// firmware in the gyro has read.
+fn logged(record: &ThermalRecord, c: &Channels, plan: &Plan) -> ThermalRecord {
+    let mut out = record.clone();
+    for input in &plan.inputs {
+        let filled = if input.column == c.thermometer {
+            // Firmware sees the reading itself, not its course between coarse steps.
+            let read = record.column(&input.column).unwrap_or(&[]);
+            let course = c.u.iter().map(|u| c.centre + c.half * u).enumerate();
+            let reading = |(i, course): (usize, f64)| {
+                let own = read.get(i).copied().filter(|r| r.is_finite());
+                own.unwrap_or(course)
+            };
+            Some(course.map(reading).collect())
+        } else {
+            c.column(&input.column).map(<[f64]>::to_vec)
+        };
+        if let Some(filled) = filled {
+            out.columns.insert(input.column.clone(), filled);
+        }
+    }
+    if out.columns.contains_key("time_since_power_on_s") {
+        let on_s = c.on_s.clone();
+        out.columns.insert("time_since_power_on_s".to_owned(), on_s);
+    }
+    out
+}
+
+/// What a plan's firmware reads of a record, and where the record's rows are among it.
+///
+/// # Errors
+/// An input that the record lacks.
+fn stream(plan: &Plan, record: &ThermalRecord, c: &Channels) -> Result<(Vec<Reading>, Vec<usize>)> {
+    let readings = readings(plan, &logged(record, c, plan))?;
+    if plan.terms.iter().any(Term::remembers) {
+        return Ok(clock::with_between(plan.period_s, &readings, plan.keeps()));
+    }
+    let places = (0..readings.len()).collect();
+    Ok((readings, places))
+}
+
+/// A plan's firmware beside a record.
+pub struct Judged {
+    /// What runs.
+    pub correction: Correction,
+    /// Its errors over the rows that are judged.
+    pub errors: FirmwareErrors,
+    /// What it leaves of each row, bit for bit, deg/s; NaN without a reading.
+    pub residual_dps: Vec<f64>,
+    /// What the same block without quantisation leaves of the rows that are judged, deg/s.
+    pub unrounded_rms_dps: f64,
+}
+
+/// The correction of a plan, its words chosen for the record's noise, and its errors, bit for bit.
+///
+/// # Errors
+/// A plan that cannot become firmware, with the rule.
+pub fn judged(
+    plan: &Plan,
+    record: &ThermalRecord,
+    c: &Channels,
+    heldout: &[bool],
+    noise_dps: f64,
+) -> Result<Judged> {
+    plan.check()?;
+    let formats = Formats::choose(plan, noise_dps)?;
+    let correction = Correction::new(plan, &formats)?;
+    let (all, places) = stream(plan, record, c)?;
+    let rows = |corrected: Vec<f64>| -> Vec<f64> { places.iter().map(|p| corrected[*p]).collect() };
+    let applied = record.column("rate_dps");
+    let of_row = |(i, r): (usize, &f64)| {
+        let rate = applied.map_or(0.0, |a| if a[i].is_nan() { 0.0 } else { a[i] });
+        r - rate
+    };
+    let left = |corrected: Vec<f64>| -> Vec<f64> {
+        rows(corrected).iter().enumerate().map(of_row).collect()
+    };
+    let judged = |residual: &[f64]| -> Vec<f64> {
+        let rows = residual.iter().zip(heldout);
+        let rows = rows.filter(|(r, h)| **h && r.is_finite());
+        rows.map(|(r, _)| *r).collect()
+    };
+    let residual_dps = left(correction.run(&all));
+    let errors = judged(&residual_dps);
+    let unrounded_rms_dps = stats::rms(&judged(&left(correction.run_float(&all))));
+    Ok(Judged {
+        correction,
+        errors: FirmwareErrors {
+            compensable: true,
+            heldout_rms: Some(stats::rms(&errors)),
+            heldout_max_abs: Some(errors.iter().fold(0.0, |m: f64, e| m.max(e.abs()))),
+        },
+        residual_dps,
+        unrounded_rms_dps,
+    })
+}

@@ -1,0 +1,219 @@
+//! A record as candidates see it: which column is the thermometer, and what its readings are in degC.
+
+use super::adc_rows;
+use super::baseline;
+use super::channels::Channels;
+use super::holes;
+use super::quadrature;
+use super::quantised::{self, Course};
+use super::repeated;
+use crate::statistics::weights;
+use crate::design::{Design, Gyro, RecordMapping};
+use crate::error::{InputError, Result};
+use crate::record::columns::THERMOMETERS;
+use crate::record::{ThermalRecord, Warning};
+use crate::statistics::stats;
+use std::collections::BTreeMap;
+
+/// The bias model's thermometer in a record, if it has one: the first in the contract's order that has at least half as many
+/// readings as any other (a column that is nearly empty is none).
+///
+/// # Errors
+/// The design names one that is not there.
+fn thermometer(record: &ThermalRecord, mapping: &RecordMapping) -> Result<Option<String>> {
+    match &mapping.thermometer {
+        Some(name) if record.column(name).is_none() => Err(InputError::new(format!(
+            "the record has no column {name}, which the design names as thermometer"
+        ))
+        .in_file(&record.source)
+        .help(format!(
+            "the record has: {}",
+            record
+                .columns
+                .keys()
+                .cloned()
+                .collect::<Vec<_>>()
+                .join(", ")
+        ))
+        .into()),
+        Some(name) => Ok(Some(name.clone())),
+        None => {
+            let most = THERMOMETERS.map(|t| record.measured(t)).into_iter().max();
+            let enough = |t: &&str| {
+                let measured = record.measured(t);
+                measured > 0 && 2 * measured >= most.unwrap_or(0)
+            };
+            Ok(THERMOMETERS.into_iter().find(enough).map(str::to_owned))
+        }
+    }
+}
+
+/// Temperatures that a gyro may have, degC.
+const TEMPERATURES_DEGC: (f64, f64) = (-100.0, 250.0);
+
+/// Temperature of the declared gyro at a reading of its phase (rad) or frequency (Hz), degC: the
+/// resonance's law linearised at the reference temperature (eq. 1 to 8 of the seed paper), where it
+/// stands at `nominal` (-pi/2 rad, or the drive frequency).
+fn degc_of(gyro: &Gyro, thermometer: &str, nominal: f64, reading: f64) -> f64 {
+    let per_k = gyro.stiffness_tempco_per_k.abs();
+    let slope = if thermometer == "freq_hz" {
+        -0.5 * per_k * nominal
+    } else {
+        -gyro.drive_q * per_k + gyro.electronics.phase_slope_rad_per_k
+    };
+    gyro.reference_temperature_k - 273.15 + (reading - nominal) / slope
+}
+
+/// What the thermometer shows at the reference temperature: as the design says, or, if the record is of
+/// another gyro, the middle of its readings. The second: whether temperatures are known.
+fn nominal(gyro: &Gyro, thermometer: &str, readings: &[f64]) -> (f64, bool) {
+    let declared = match thermometer {
+        "freq_hz" => gyro.drive_frequency_hz,
+        _ => -std::f64::consts::FRAC_PI_2,
+    };
+    let (low, high) = stats::extremes(readings).unwrap_or((declared, declared));
+    let middle = 0.5 * (low + high);
+    let (coldest, hottest) = TEMPERATURES_DEGC;
+    if (coldest..=hottest).contains(&degc_of(gyro, thermometer, declared, middle)) {
+        return (declared, true);
+    }
+    (middle, false)
+}
+
+/// A record that cannot be fitted.
+pub fn refused(record: &ThermalRecord, why: String) -> crate::error::Error {
+    InputError::new(why)
+        .in_file(&record.source)
+        .help("record longer, or average less")
+        .into()
+}
+
+/// The record without readings of a thermometer that are glitches, with what is said of them; `None`: it has none. One such
+/// reading sets the range that the declared bias is scaled to, and looks like whatever is narrow in temperature.
+pub fn without_glitches(record: &ThermalRecord) -> Option<(ThermalRecord, Vec<Warning>)> {
+    let mut out: Option<(ThermalRecord, Vec<Warning>)> = None;
+    for name in THERMOMETERS {
+        let Some(column) = record.column(name) else {
+            continue;
+        };
+        let measured: Vec<usize> = (0..column.len())
+            .filter(|i| column[*i].is_finite())
+            .collect();
+        let readings: Vec<f64> = measured.iter().map(|i| column[*i]).collect();
+        let marks = weights::thermometer_glitches(&readings);
+        let marked = measured.iter().zip(marks).filter(|(_, glitch)| *glitch);
+        let rows: Vec<usize> = marked.map(|(row, _)| *row).collect();
+        if rows.is_empty() {
+            continue;
+        }
+        let (cleaned, said) = out.get_or_insert_with(|| (record.clone(), Vec::new()));
+        if let Some(column) = cleaned.columns.get_mut(name) {
+            rows.iter().for_each(|row| column[*row] = f64::NAN);
+        }
+        said.push(baseline::glitches(record, name, &rows));
+    }
+    out
+}
+
+/// A record as candidates see it.
+///
+/// # Errors
+/// No thermometer of the name that the design gives; a column that is needed and holds no value.
+pub fn channels_of(
+    record: &ThermalRecord,
+    design: &Design,
+    warnings: &mut Vec<Warning>,
+) -> Result<Channels> {
+    let name = thermometer(record, &design.record)?;
+    let mut columns = record.columns.clone();
+    let name = name.unwrap_or_else(|| {
+        warnings.push(Warning::general(
+            "no_thermometer",
+            "the record has no thermometer: the declared bias is a constant, and effects of temperature \
+             cannot be seen",
+        ));
+        columns.insert(NONE.to_owned(), vec![0.0; record.len()]);
+        NONE.to_owned()
+    });
+    warnings.extend(holes::take(&record.time_s, &mut columns, &name));
+    let readings = columns.get(&name).map_or(&[][..], Vec::as_slice);
+    let (nominal, known) = nominal(&design.gyro, &name, readings);
+    let told_in_degc = ["die_degc", "chamber_degc"].map(|t| columns.contains_key(t));
+    if !known && !told_in_degc.contains(&true) && ["phase_rad", "freq_hz"].contains(&name.as_str())
+    {
+        let degc = design.gyro.reference_temperature_k - 273.15;
+        warnings.push(Warning::general(
+            "temperature_unknown",
+            format!(
+                "{name} around {nominal} is not that of the design's gyro: temperatures are counted from there \
+                 as if it were {degc:.2} degC; name the gyro's drive frequency and law in the design"
+            ),
+        ));
+    }
+    let degc = |reading: f64| degc_of(&design.gyro, &name, nominal, reading);
+    let seen = |columns: &BTreeMap<String, Vec<f64>>| {
+        let made = Channels::new(&record.time_s, columns, &name, degc);
+        made.map_err(|missing| refused(record, format!("column {missing} holds no measured value")))
+    };
+    let mut channels = seen(&columns)?;
+    let step_u = quantised::step_u(&channels);
+    if let Some(course) = repeated::course(&channels) {
+        warnings.push(behind(&name, &course));
+        columns.insert(name.clone(), course.reading);
+        channels = seen(&columns)?;
+    } else if let Some(course) = quantised::course(&channels, design) {
+        warnings.push(rounding(design, &name, &course));
+        columns.insert(name.clone(), course.reading);
+        channels = seen(&columns)?;
+    }
+    let mut rounding_dps = 0.0;
+    if let Some(undithered) = adc_rows::found(&columns, &channels, design, seen)? {
+        warnings.push(undithered.warning(design));
+        rounding_dps = undithered.left_dps();
+        if let Some((cleaned, _)) = undithered.removed {
+            channels = seen(&cleaned)?;
+            columns = cleaned;
+        }
+    }
+    if let Some(said) = quadrature::contains_output(&channels) {
+        warnings.push(said);
+        columns.remove(quadrature::NAME);
+        channels = seen(&columns)?;
+    }
+    Ok(Channels {
+        rounding_dps,
+        step_u,
+        ..channels
+    })
+}
+
+/// What is said of a thermometer that is read less often than the output.
+fn behind(thermometer: &str, course: &repeated::Course) -> Warning {
+    let said = format!(
+        "{thermometer} has a new reading every {:.1} rows and repeats it in between: what the repeated ones are behind by \
+         makes {:.3e} deg/s rms of the declared bias. It is taken out before and after (causes are sought along straight lines \
+         between new readings); the firmware's error contains it: read the thermometer as often as the output",
+        course.rows, course.artefact_rms_dps
+    );
+    Warning::on("thermometer_repeats", thermometer, said)
+}
+
+/// What is said of a thermometer that is read in coarse steps.
+fn rounding(design: &Design, thermometer: &str, course: &Course) -> Warning {
+    let of_circuit = match quantised::predicted(design, thermometer) {
+        Some(step) if quantised::LIKE.contains(&(course.step / step)) => {
+            format!(", as the design's circuit predicts ({step:.3e})")
+        }
+        _ => String::new(),
+    };
+    let said = format!(
+        "{thermometer} is read in steps of {:.3e}{of_circuit}: their rounding makes {:.3e} deg/s rms of the declared \
+         bias. It is taken out before and after (causes are sought along the course between the steps); the \
+         firmware's error contains it: read the thermometer with more bits",
+        course.step, course.artefact_rms_dps
+    );
+    Warning::on("thermometer_quantised", thermometer, said)
+}
+
+/// Stands for the thermometer where there is none.
+const NONE: &str = "no_thermometer";

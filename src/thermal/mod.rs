@@ -1,0 +1,52 @@
+//! The closure: what a measured record says about the declared model.
+//!
+//! [`baseline`] fits the bias model, a polynomial in the thermometer's reading. It is made of
+//! [`polynomial`] (algebra and least squares), [`weights`] (spikes, dwells), [`noise`] (its
+//! correlation, and the coefficients' covariance), [`folds`] (held-out blocks), [`order`] (its
+//! choice), [`sweep`] (heating against cooling) and [`checks`] (what a user should know of before
+//! believing the fit). [`likelihood`] is what tells an effect from noise with a memory. [`capture`] does the
+//! same for ADC codes. [`close`] answers for a thermal record: [`intake`] ([`quantised`], [`staircase`]: coarse thermometers; [`repeated`]: slow ones; [`adc_rows`], [`adc_rounding`]: coarse ADCs; [`quadrature`]: one that contains the output), [`channels`],
+//! candidate [`effects`] and their [`search`], [`firmware`]; [`verdict`] is the form of the answer. Nothing here knows the plant
+//! (law 4).
+
+pub mod adc_rounding;
+pub mod adc_rows;
+pub mod baseline;
+pub mod channels;
+pub mod checks;
+pub mod close;
+pub mod effects;
+pub mod firmware;
+mod heats;
+mod holes;
+pub mod intake;
+pub mod order;
+pub mod quadrature;
+pub mod quantised;
+pub mod rails;
+pub mod repeated;
+pub mod residuals;
+pub mod search;
+pub mod staircase;
+pub mod sweep;
+
+#[cfg(test)]
+mod baseline_tests;
+#[cfg(test)]
+mod channels_tests;
+#[cfg(test)]
+mod check_tests;
+#[cfg(test)]
+mod clip_tests;
+#[cfg(test)]
+mod heats_tests;
+#[cfg(test)]
+mod intake_tests;
+#[cfg(test)]
+mod lag_tests;
+#[cfg(test)]
+mod lego_tests;
+#[cfg(test)]
+pub(crate) mod synthetic;
+
+pub use baseline::{BaselineFit, fit};

@@ -1,0 +1,291 @@
+//! The bit-accurate model of each emitted function without state, as something that can be called.
+
+use crate::circuit::chain::Chain;
+use crate::circuit::compensation::{Bias, Evaluation, Rate};
+use crate::design::{Compensation, Design};
+use crate::emit::bundle::Compensate;
+use crate::numeric::arithmetic::Block;
+use crate::numeric::cast::Cast;
+use crate::numeric::fixed::Fixed;
+use crate::numeric::trace::ir::{Function, Interval, Program};
+
+/// A function of the model.
+pub struct Model {
+    /// The emitted function's name.
+    pub name: String,
+    /// Range of each input.
+    pub inputs: Vec<Interval>,
+    /// Number of outputs.
+    pub outputs: usize,
+    call: Box<Evaluate>,
+    /// The function with one rounding constant off by one.
+    damaged: Vec<Box<Evaluate>>,
+}
+
+/// Inputs, outputs; gives the number of the fault, 0 = none.
+type Evaluate = dyn Fn(&[i128], &mut [i128]) -> u32;
+
+impl Model {
+    /// Evaluates; `inputs` and `outputs` have the model's lengths. Gives the number of the first
+    /// overflow where the design says `error`, 0 = none.
+    pub fn call(&self, inputs: &[i128], outputs: &mut [i128]) -> u32 {
+        (self.call)(inputs, outputs)
+    }
+
+    /// Inputs at which the outputs change if a rounding constant moves by one, a few for each.
+    pub fn near_ties(&self, candidates: &[Vec<i128>]) -> Vec<Vec<i128>> {
+        const EACH: usize = 4;
+        let outcome = |call: &Evaluate, input: &[i128]| {
+            let mut outputs = vec![0; self.outputs];
+            let fault = call(input, &mut outputs);
+            (outputs, fault)
+        };
+        let mut inputs = Vec::new();
+        for damaged in &self.damaged {
+            let differs = |x: &&Vec<i128>| outcome(damaged, x) != outcome(&self.call, x);
+            inputs.extend(candidates.iter().filter(differs).take(EACH).cloned());
+        }
+        inputs
+    }
+
+    /// Neighbouring inputs on both sides of a limit whose overflow is an error, found between
+    /// candidates with and without a fault.
+    pub fn fault_edges(&self, candidates: &[Vec<i128>]) -> Vec<Vec<i128>> {
+        const PAIRS: usize = 24;
+        let mut outputs = vec![0; self.outputs];
+        let mut fault = |input: &[i128]| self.call(input, &mut outputs);
+        let (within, outside): (Vec<_>, Vec<_>) =
+            candidates.iter().partition(|input| fault(input) == 0);
+        let pairs = within.iter().zip(&outside).take(PAIRS);
+        let edges = pairs.flat_map(|(a, b)| edge(&mut fault, a, b));
+        edges.collect()
+    }
+
+    /// The model of a function without state. `narrow`: 64-bit lanes hold every word.
+    pub fn new<const I: usize, const O: usize, B>(
+        function: &Function,
+        block: B,
+        narrow: bool,
+    ) -> Self
+    where
+        B: Block<Fixed<i64, i64>, I, O, State = ()> + Block<Fixed<i128, i128>, I, O, State = ()>,
+        B: 'static,
+    {
+        Model {
+            name: function.name.clone(),
+            inputs: function.inputs.iter().map(|(_, range)| *range).collect(),
+            outputs: O,
+            call: evaluate(block, narrow),
+            damaged: Vec::new(),
+        }
+    }
+
+    /// The model with damaged copies of its block, each of which vectors have to tell from it.
+    pub fn with_damage<const I: usize, const O: usize, B>(
+        mut self,
+        blocks: impl IntoIterator<Item = B>,
+        narrow: bool,
+    ) -> Self
+    where
+        B: Block<Fixed<i64, i64>, I, O, State = ()> + Block<Fixed<i128, i128>, I, O, State = ()>,
+        B: 'static,
+    {
+        let blocks = blocks.into_iter().map(|block| evaluate(block, narrow));
+        self.damaged = blocks.collect();
+        self
+    }
+}
+
+/// On the way from `a` to `b`, one input after the other: the neighbours between which the fault
+/// changes first.
+fn edge(fault: &mut impl FnMut(&[i128]) -> u32, a: &[i128], b: &[i128]) -> Vec<Vec<i128>> {
+    let first = fault(a);
+    let mut at = a.to_vec();
+    for k in 0..a.len() {
+        let (mut near, mut far) = (at[k], b[k]);
+        at[k] = far;
+        if fault(&at) == first {
+            continue;
+        }
+        while near.abs_diff(far) > 1 {
+            at[k] = near + (far - near) / 2;
+            let side = if fault(&at) == first {
+                &mut near
+            } else {
+                &mut far
+            };
+            *side = at[k];
+        }
+        return [near, far]
+            .into_iter()
+            .map(|word| {
+                at[k] = word;
+                at.clone()
+            })
+            .collect();
+    }
+    Vec::new()
+}
+
+fn evaluate<const I: usize, const O: usize, B>(block: B, narrow: bool) -> Box<Evaluate>
+where
+    B: Block<Fixed<i64, i64>, I, O, State = ()> + Block<Fixed<i128, i128>, I, O, State = ()>,
+    B: 'static,
+{
+    if narrow {
+        Box::new(move |inputs, outputs| {
+            let ar = Fixed::<i64, i64>::new();
+            let words = std::array::from_fn(|k| inputs[k] as i64);
+            let results = Block::<_, I, O>::step(&block, &ar, &mut (), words);
+            for (output, word) in outputs.iter_mut().zip(results) {
+                *output = i128::from(word);
+            }
+            ar.overflowed().map_or(0, |o| o.cast as u32 + 1)
+        })
+    } else {
+        Box::new(move |inputs, outputs| {
+            let ar = Fixed::<i128, i128>::new();
+            let words = std::array::from_fn(|k| inputs[k]);
+            let results = Block::<_, I, O>::step(&block, &ar, &mut (), words);
+            outputs[..O].copy_from_slice(&results);
+            ar.overflowed().map_or(0, |o| o.cast as u32 + 1)
+        })
+    }
+}
+
+/// Copies of a block in which one rounding constant is off by one.
+fn nudged<B: Clone>(block: &B, casts: fn(&mut B) -> Vec<&mut Cast>) -> Vec<B> {
+    let mut blocks = Vec::new();
+    for k in 0..casts(&mut block.clone()).len() {
+        for step in [-1, 1] {
+            let mut damaged = block.clone();
+            let moved = casts(&mut damaged).into_iter().nth(k).and_then(|cast| {
+                *cast = cast.nudged(step)?;
+                Some(())
+            });
+            if moved.is_some() {
+                blocks.push(damaged);
+            }
+        }
+    }
+    blocks
+}
+
+/// Models of the functions without state that a program has, in the program's order.
+///
+/// Functions with inputs of more than 64 bits are left out: only the chain reaches them.
+pub fn models(design: &Design, program: &Program) -> Vec<Model> {
+    match design.circuit.decimator.stages {
+        1 => of_chain(&Chain::<1>::new(design), design, program),
+        2 => of_chain(&Chain::<2>::new(design), design, program),
+        3 => of_chain(&Chain::<3>::new(design), design, program),
+        4 => of_chain(&Chain::<4>::new(design), design, program),
+        5 => of_chain(&Chain::<5>::new(design), design, program),
+        _ => of_chain(&Chain::<6>::new(design), design, program),
+    }
+}
+
+fn of_chain<const N: usize>(chain: &Chain<N>, design: &Design, program: &Program) -> Vec<Model> {
+    let alone = crate::emit::bundle::compensation_alone(design);
+    let compensation = chain.compensation.clone().or(alone);
+    let variants = program
+        .functions
+        .iter()
+        .filter(|f| f.name.starts_with("demodulate"))
+        .count();
+    let mut models = Vec::new();
+    for function in &program.functions {
+        let fits = |range: &Interval| range.bits() <= 64;
+        if !function.inputs.iter().all(|(_, range)| fits(range)) {
+            continue;
+        }
+        let narrow = program.word_bits(function) <= 64;
+        let base = function
+            .name
+            .trim_end_matches(|c: char| c == '_' || c.is_ascii_digit());
+        let model = match (base, &compensation) {
+            ("demodulate", _) => {
+                // One for all channels, or one for each in the channels' order.
+                let variant = function.name.trim_start_matches("demodulate_");
+                let channel = variant.parse::<usize>().map_or(0, |k| k - 1);
+                let channel = if variants > 1 { channel.min(3) } else { 0 };
+                let mixer = &chain.mixers[channel];
+                Model::new(function, mixer.clone(), narrow)
+                    .with_damage(nudged(mixer, |m| vec![&mut m.product]), narrow)
+            }
+            ("cordic", _) => Model::new(function, chain.cordic.clone(), narrow),
+            ("bias", Some((bias, _))) => Model::new(function, bias.clone(), narrow)
+                .with_damage(nudged(bias, Bias::casts_mut), narrow),
+            ("rate", Some((_, rate))) => Model::new(function, rate.clone(), narrow)
+                .with_damage(nudged(rate, Rate::casts_mut), narrow),
+            ("in_range", _) => {
+                let Some(flag) = crate::emit::bundle::in_range(design) else {
+                    continue;
+                };
+                Model::new(function, flag, narrow)
+            }
+            ("compensate", Some((bias, rate))) => {
+                let (bias, rate) = (bias.clone(), rate.clone());
+                // The callees' words count too.
+                let narrow = program.functions.iter().all(|f| program.word_bits(f) <= 64);
+                Model::new(function, Compensate { bias, rate }, narrow)
+            }
+            _ => continue,
+        };
+        models.push(model);
+    }
+    models
+}
+
+/// For each coefficient of the polynomial, inputs at which the model's output changes if the
+/// coefficient moves by one LSB, or by one LSB of the accumulator that emitted code aligns it to:
+/// vectors that catch such damage.
+pub fn sensitive_inputs(design: &Design, candidates: &[i128]) -> Vec<i128> {
+    const EACH: usize = 4;
+    let Some(compensation) = &design.compensation else {
+        return Vec::new();
+    };
+    let evaluate = |bias: &Bias, input: i128| {
+        let ar = Fixed::<i128, i128>::new();
+        Block::<_, 1, 1>::step(bias, &ar, &mut (), [input])
+    };
+    let nominal = Bias::new(&design.circuit, compensation);
+    let mut inputs = Vec::new();
+    if let Evaluation::Form(form) = &nominal.evaluation {
+        for damaged in crate::firmware::approximation::damaged(form) {
+            let mut other = nominal.clone();
+            other.evaluation = Evaluation::Form(Box::new(damaged));
+            let differs = |x: &&i128| evaluate(&other, **x) != evaluate(&nominal, **x);
+            inputs.extend(candidates.iter().filter(differs).take(EACH));
+        }
+        return inputs;
+    }
+    let mut search = |damaged: &Compensation| {
+        let damaged = Bias::new(&design.circuit, damaged);
+        let differs = |x: &&i128| evaluate(&damaged, **x) != evaluate(&nominal, **x);
+        inputs.extend(candidates.iter().filter(differs).take(EACH));
+    };
+    for k in 0..compensation.coefficients_raw.len() {
+        for step in [-1, 1] {
+            let mut damaged = compensation.clone();
+            damaged.coefficients_raw[k] += step;
+            search(&damaged);
+            let mut damaged = aligned(compensation);
+            damaged.coefficients_raw[k] += step;
+            search(&damaged);
+        }
+    }
+    inputs
+}
+
+/// The same polynomial with coefficients in the accumulator's LSB.
+fn aligned(compensation: &Compensation) -> Compensation {
+    let mut aligned = compensation.clone();
+    let fine = compensation.accumulator.format.fraction_bits;
+    let shift = fine - compensation.coefficient_format.fraction_bits;
+    aligned.coefficient_format.fraction_bits = fine;
+    for coefficient in &mut aligned.coefficients_raw {
+        *coefficient <<= shift;
+    }
+    aligned
+}
