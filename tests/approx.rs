@@ -385,7 +385,7 @@ fn damage_of_one_lsb_is_caught() {
             // The manifest follows, so that only the numbers can tell.
             let manifest = folder.path().join("c/manifest.json");
             let before = std::fs::read_to_string(&manifest).unwrap();
-            let sum = |text: &str| gyrogen::firmware::manifest::sha256(text.as_bytes());
+            let sum = |text: &str| gyrogen::digest::sha256(text.as_bytes());
             let damaged = std::fs::read_to_string(&path).unwrap();
             std::fs::write(&manifest, before.replace(&sum(&text), &sum(&damaged))).unwrap();
             let output = gyrogen(&["verify", folder.path().join("c").to_str().unwrap()]);

@@ -1,9 +1,9 @@
 //! The proved bound against the greatest error that is met, over random requests of every kind.
 
-use gyrogen::tabulate::cost::Target;
 use gyrogen::approx::form::polynomial::{Monomials, Scheme};
-use gyrogen::tabulate::job::{Asked, Request, Weight, approximate};
+use gyrogen::design::target::Target;
 use gyrogen::numeric::format::Format;
+use gyrogen::tabulate::job::{Asked, Request, Weight, approximate};
 
 const FUNCTIONS: [(&str, &str, &str); 14] = [
     ("atan(x)/(2*pi)", "0", "1"),

@@ -5,9 +5,9 @@
 mod blind;
 
 use blind::{Class, Scenario, tally};
+use gyrogen::design::reader;
 use gyrogen::thermal::close;
 use gyrogen::thermal::search::Effort;
-use gyrogen::design::reader;
 use serde_json::Value;
 use std::path::Path;
 

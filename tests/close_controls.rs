@@ -9,12 +9,12 @@ mod common {
 use common::closing::closed;
 use common::command::gyrogen_in;
 use common::design::design;
-use gyrogen::thermal::close::Named;
-use gyrogen::thermal::search::Effort;
 use gyrogen::error::Result;
 use gyrogen::plant::noise::Noise;
 use gyrogen::record::{ThermalRecord, thermal};
 use gyrogen::selftest::controls::{self, Controls, Seen};
+use gyrogen::thermal::close::Named;
+use gyrogen::thermal::search::Effort;
 use serde_json::Value;
 use std::path::Path;
 

@@ -3,8 +3,8 @@
 use gyrogen::design::{Design, reader};
 use gyrogen::equivalence::job::{Stimulus, counterexample};
 use gyrogen::equivalence::outcome::Emitted;
-use gyrogen::equivalence::run::run;
 use gyrogen::equivalence::shrink::{MOST_RUNS, capture_text, shrink};
+use gyrogen::nodes::run::run;
 use gyrogen::verify::compare::Compared;
 use proptest::prelude::*;
 use serde_json::Value;

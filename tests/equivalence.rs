@@ -10,7 +10,7 @@ use gyrogen::design::{Design, reader};
 use gyrogen::equivalence::job::{Stimulus, repairs};
 use gyrogen::equivalence::overflow::{one_bit_less, smallest_repair};
 use gyrogen::equivalence::predicted::predict;
-use gyrogen::equivalence::run::{run, run_with_rows};
+use gyrogen::nodes::run::{run, run_with_rows};
 use gyrogen::numeric::format::{Format, Overflow, Rounding};
 use oracle::generate::{self, Aim};
 use oracle::harness::setting;

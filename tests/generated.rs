@@ -4,9 +4,9 @@
 //! `GYROGEN_WRITE=1 cargo test --test generated` writes the folder anew.
 
 use gyrogen::emit::bundle::Part;
+use gyrogen::emit::views::Language;
 use gyrogen::firmware::files;
 use gyrogen::firmware::files::EmittedFile;
-use gyrogen::emit::views::Language;
 use std::path::{Path, PathBuf};
 
 fn emitted(language: Language, name: &str) -> (PathBuf, Vec<EmittedFile>) {

@@ -6,9 +6,9 @@ mod common {
 }
 
 use common::closing;
+use gyrogen::plant::noise::Noise;
 use gyrogen::thermal::close::Closed;
 use gyrogen::verdict::{Fate, Step};
-use gyrogen::plant::noise::Noise;
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 

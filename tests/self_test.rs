@@ -7,13 +7,13 @@ mod common {
 
 use common::command::gyrogen_in;
 use common::design::design;
-use gyrogen::thermal::close;
-use gyrogen::thermal::close::Named;
-use gyrogen::thermal::search::Effort;
 use gyrogen::error::Result;
 use gyrogen::record::ThermalRecord;
 use gyrogen::selftest::outcome::Outcome;
 use gyrogen::selftest::{Request, run, run_with};
+use gyrogen::thermal::close;
+use gyrogen::thermal::close::Named;
+use gyrogen::thermal::search::Effort;
 
 fn request(only: &[&str], records: usize, clean: usize) -> Request {
     Request {

@@ -2,8 +2,8 @@
 //! a median over blocks is moved by neither.
 
 use super::input::Capture;
-use crate::statistics::normal::median;
 use super::tone::{Tone, fold};
+use crate::statistics::normal::median;
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::TAU;
 use std::ops::Range;

@@ -7,8 +7,8 @@
 use super::blocks::{self, Block, noise, phase, wrapped};
 use super::first_break::first_break;
 use super::input::Capture;
-use crate::statistics::normal::median;
 use super::tone::Tone;
+use crate::statistics::normal::median;
 
 /// Blocks to each side of a row, the medians of which tell a step.
 const SIDE: usize = 4;

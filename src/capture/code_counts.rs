@@ -5,8 +5,8 @@
 
 use super::columns::{Model, Rows, SEGMENT, SEGMENTS, chunks};
 use super::input::{Capture, Part};
-use crate::statistics::normal;
 use super::steps;
+use crate::statistics::normal;
 
 /// Codes on each side of a run that are looked at, at most.
 const NEAR: usize = 24;

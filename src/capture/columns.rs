@@ -8,11 +8,11 @@
 use super::clipping::Limits;
 use super::input::Capture;
 use super::missing::Missing;
-use crate::statistics::normal;
 use super::steps;
 use super::tone::{Phases, Tone};
 use super::truncation::Truncation;
 use crate::numeric::turn;
+use crate::statistics::normal;
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 

@@ -5,8 +5,8 @@ use super::synthetic_rows::{
     ROWS, WORDS, capture, clean, codes, judged, late, lose, meta, names, said, wrong,
 };
 use super::{analyse, clock};
-use crate::thermal::synthetic::Random;
 use crate::record::capture_meta::CaptureMeta;
+use crate::thermal::synthetic::Random;
 use std::f64::consts::TAU;
 
 #[test]

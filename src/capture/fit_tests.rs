@@ -2,8 +2,8 @@
 
 use super::super::synthetic_rows::{WORDS, judged, late, meta, names};
 use super::*;
-use crate::thermal::synthetic::Random;
 use crate::record::capture_meta::CaptureMeta;
+use crate::thermal::synthetic::Random;
 use std::f64::consts::TAU;
 
 #[test]

@@ -2,8 +2,8 @@
 
 use super::examine::examined;
 use super::synthetic_rows::{ROWS, WORDS, capture, clean, judged, meta, names, said};
-use crate::thermal::synthetic::Random;
 use crate::record::capture_meta::CaptureMeta;
+use crate::thermal::synthetic::Random;
 use std::f64::consts::TAU;
 
 #[test]

@@ -9,9 +9,9 @@ use super::input::Capture;
 use super::reported_steps::{clipping_step, jitter_step, linear_step, missing_step, own_combos};
 use super::search::Search;
 use super::{bend, firmware, jitter, rivals, structure};
+use crate::record::Warning;
 use crate::statistics::tail::chi_square_surprise;
 use crate::verdict::{Errors, Evidence, FirmwareErrors, Step, Structure};
-use crate::record::Warning;
 
 /// What the report of a capture is made of.
 #[derive(Debug, Clone)]

@@ -1,7 +1,7 @@
 //! The residual's spectrum: the noise's level, and lines that stand out of what is around them.
 
-use crate::statistics::normal;
 use super::tone::Tone;
+use crate::statistics::normal;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 

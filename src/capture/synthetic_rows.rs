@@ -4,9 +4,9 @@ use super::analyse;
 use super::examine::examined;
 use super::input::Capture;
 use super::report::Findings;
-use crate::thermal::synthetic::Random;
 use crate::record::Warning;
 use crate::record::capture_meta::CaptureMeta;
+use crate::thermal::synthetic::Random;
 use std::f64::consts::TAU;
 
 /// A tone of few phases (128 samples a period), and one of many.

@@ -2,8 +2,8 @@
 
 use super::blocks;
 use super::input::Capture;
-use crate::statistics::normal::median;
 use crate::numeric::turn;
+use crate::statistics::normal::median;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 use std::f64::consts::TAU;

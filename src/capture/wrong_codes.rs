@@ -7,8 +7,8 @@
 
 use super::blocks::{self, Block};
 use super::input::{Capture, Part};
-use crate::statistics::normal::median;
 use super::tone::Tone;
+use crate::statistics::normal::median;
 
 /// Deviations from which on a code stands out: Gaussian noise makes none in a million captures, and a code that is less
 /// apart moves no fit by more than it knows.

@@ -6,11 +6,10 @@
 //! Two blocks: [`Bias`] depends on the thermometer alone, so that its emitted code can be compared
 //! with the model over every input code; [`Rate`] subtracts it.
 
-use crate::approx::form::{Codes, Form};
+use crate::approx::form::Form;
 use crate::design::{Circuit, Compensation, CompensationInput, Outside};
 use crate::numeric::arithmetic::{Arithmetic, Block, Port};
 use crate::numeric::cast::{Cast, Label, Target};
-use crate::numeric::format::Format;
 use crate::numeric::trace::ir::Interval;
 
 const ACCUMULATOR: Label = Label::of("compensation.accumulator");
@@ -129,30 +128,9 @@ impl Bias {
 /// The stored form, if the design has one; a design with one that cannot be built has been refused.
 fn form(circuit: &Circuit, compensation: &Compensation) -> Option<Form> {
     let stored = compensation.form.as_ref()?;
-    let codes = codes(circuit, compensation);
+    let codes = compensation.codes(circuit);
     let built = stored.build(codes, compensation.output.format);
     built.ok()
-}
-
-/// The words of the polynomial's variable inside the calibrated range (every word, where there is none).
-pub fn codes(circuit: &Circuit, compensation: &Compensation) -> Codes {
-    let (offset, fraction_bits) = compensation.variable_scale(circuit);
-    let all = match &compensation.input {
-        CompensationInput::Phase => Interval::of_bits(circuit.cordic.angle_bits),
-        CompensationInput::TuningWord(_) => Interval::of_bits(circuit.nco.phase_bits),
-        CompensationInput::Channel(channel) => {
-            Interval::new(channel.format.min_raw(), channel.format.max_raw())
-        }
-    };
-    let (low, high) = compensation.clamp_raw.unwrap_or((all.low, all.high));
-    let range = Interval::new(low - offset, high - offset);
-    let fraction_bits = fraction_bits.max(0) as u32;
-    let integer_bits = range.bits().saturating_sub(fraction_bits).max(1);
-    Codes {
-        format: Format::q(integer_bits, fraction_bits),
-        low: range.low,
-        high: range.high,
-    }
 }
 
 impl Horner {

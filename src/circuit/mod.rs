@@ -15,6 +15,7 @@
 
 pub mod amplitude_loop;
 pub mod chain;
+pub mod compensate;
 pub mod compensation;
 pub mod cordic;
 pub mod decimator;

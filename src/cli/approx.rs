@@ -1,17 +1,17 @@
 //! `gyrogen approx`: a function in fixed point, with its certified error.
 
 use super::{OutputFormat, alternatives};
-use crate::firmware::approximation;
-use crate::tabulate::cost::Target;
 use crate::approx::form::polynomial::{Monomials, Scheme};
+use crate::design::target::Target;
+use crate::emit::views::Language;
+use crate::error::{Error, InputError, Result};
+use crate::firmware::approximation;
+use crate::firmware::files;
+use crate::numeric::format::Format;
 use crate::tabulate::job;
 use crate::tabulate::job::{Asked, Request, Weight};
 use crate::tabulate::outcome::{Alternative, Outcome, Search};
 use crate::tabulate::selection::Reason;
-use crate::firmware::files;
-use crate::emit::views::Language;
-use crate::error::{Error, InputError, Result};
-use crate::numeric::format::Format;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Mutex;
@@ -99,7 +99,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     });
     bar.done();
     let made = made?;
-    let model = approximation::model(&made.settled)?;
+    let model = crate::vectors::form::model(&made.settled)?;
     let vectors = approximation::vectors(&made.settled, &model, threads);
     let emit = |language| {
         approximation::emit(

@@ -2,22 +2,23 @@
 
 use super::OutputFormat;
 use crate::capture;
+use crate::correction::Planned;
+use crate::design::Design;
+use crate::emit::views::Language;
+use crate::error::{Error, InputError, Result};
+use crate::firmware::correction;
+use crate::firmware::correction::Origin;
+use crate::firmware::files::EmittedFile;
+use crate::record::{ThermalRecord, Warning};
+use crate::report::closure::Beside;
+use crate::report::design_diff::DesignDiff;
+use crate::selftest::controls::Controls;
 use crate::thermal::close;
 use crate::thermal::close::Closed;
 use crate::thermal::firmware::emitted;
 use crate::thermal::firmware::emitted::{Emitted, Told};
 use crate::thermal::search::Effort;
 use crate::verdict::{Closure, Verdict};
-use crate::correction::Planned;
-use crate::correction::firmware::{self, Origin};
-use crate::design::Design;
-use crate::firmware::files::EmittedFile;
-use crate::emit::views::Language;
-use crate::error::{Error, InputError, Result};
-use crate::record::{ThermalRecord, Warning};
-use crate::report::closure::Beside;
-use crate::report::design_diff::DesignDiff;
-use crate::selftest::controls::Controls;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
@@ -195,7 +196,7 @@ fn sources(closed: &Closed, prefix: &str) -> Result<Option<[Vec<EmittedFile>; 2]
         sha256: &closed.closure.design_sha256,
         command: &closed.closure.command,
     };
-    let of = |language| firmware::emit(correction, &origin, language);
+    let of = |language| correction::emit(correction, &origin, language);
     Ok(Some([of(Language::C)?, of(Language::Rust)?]))
 }
 

@@ -1,11 +1,11 @@
 //! `gyrogen close --controls`: what a name, and what silence is worth in this record.
 
-use crate::thermal::close::Closed;
 use crate::design::Design;
 use crate::error::Result;
 use crate::record::ThermalRecord;
 use crate::report::closure::controls as words;
 use crate::selftest::controls::{self, Controls};
+use crate::thermal::close::Closed;
 
 /// Controls of a closed record, with progress on a terminal.
 ///

@@ -3,13 +3,14 @@
 //! A design that carries a `[correction]` is there for its correction: that is the part which is emitted unless
 //! another one is asked for, and then it is said what is missing.
 
-use crate::correction::firmware::{self, Origin};
 use crate::design::{Compensation, Design};
 use crate::emit::bundle::Part;
-use crate::firmware::files;
-use crate::firmware::files::EmittedFile;
 use crate::emit::views::Language;
 use crate::error::{InputError, Result};
+use crate::firmware::correction;
+use crate::firmware::correction::Origin;
+use crate::firmware::files;
+use crate::firmware::files::EmittedFile;
 use std::path::PathBuf;
 
 /// Write a firmware bundle: sources, self-test, test vectors and a manifest of its files.
@@ -113,5 +114,5 @@ fn correction(design: &Design, language: Language, command: &str) -> Result<Vec<
         sha256: &design.source.sha256,
         command,
     };
-    firmware::emit(&planned.compile()?, &origin, language)
+    correction::emit(&planned.compile()?, &origin, language)
 }

@@ -2,20 +2,20 @@
 
 use super::Evaluation;
 use super::certainty::Bounds;
-use crate::tabulate::choice;
-use crate::tabulate::choice::{Candidate, Wanted};
-use crate::tabulate::cost;
-use crate::tabulate::cost::{Cost, Target};
 use crate::approx::form::Codes;
 use crate::approx::form::polynomial::Scheme;
 use crate::approx::form::stored::{Stored, WIDEST_BITS};
-use crate::tabulate::job::{Asked, Request, Weight};
-use crate::tabulate::outcome::Alternative;
 use crate::approx::reference::Function;
-use crate::circuit::compensation::codes;
+use crate::design::target::Target;
 use crate::design::{Compensation, Design};
 use crate::error::Result;
 use crate::numeric::format::Format;
+use crate::tabulate::choice;
+use crate::tabulate::choice::{Candidate, Wanted};
+use crate::tabulate::cost;
+use crate::tabulate::cost::Cost;
+use crate::tabulate::job::{Asked, Request, Weight};
+use crate::tabulate::outcome::Alternative;
 use std::collections::BTreeMap;
 
 /// A way to evaluate the bias.
@@ -68,7 +68,7 @@ pub fn horner(design: &Design, c: &Compensation, bounds: &Bounds, target: Target
 /// # Errors
 /// A polynomial that cannot be enclosed.
 pub fn forms(design: &Design, c: &Compensation, room_dps: f64, target: Target) -> Result<Vec<Way>> {
-    let codes = codes(&design.circuit, c);
+    let codes = c.codes(&design.circuit);
     if (codes.high - codes.low) >> WIDEST_BITS != 0 || codes.format.bits() > 63 {
         return Ok(Vec::new());
     }

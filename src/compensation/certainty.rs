@@ -2,13 +2,12 @@
 //! its input words, and bounded outside.
 
 use super::{Evaluation, alternatives, one_rounding};
-use crate::tabulate::choice;
-use crate::tabulate::describe;
 use crate::approx::form::stored::Stored;
 use crate::approx::real::{Domain, Dyadic, Enclosure};
-use crate::circuit::compensation::codes;
 use crate::design::{Compensation, Design, Outside};
 use crate::error::{Error, InputError, Result};
+use crate::tabulate::choice;
+use crate::tabulate::describe;
 use serde::Serialize;
 
 /// Words that are all run; of more, as many evenly spread.
@@ -100,7 +99,7 @@ pub fn bounds(design: &Design) -> Result<Option<Bounds>> {
 /// The bounds where a form stands for the polynomial.
 fn of_form(design: &Design, evaluation: &Evaluation, form: &Stored) -> Result<Bounds> {
     let c = evaluation.compensation;
-    let settled = form.settle(codes(&design.circuit, c), c.output.format)?;
+    let settled = form.settle(c.codes(&design.circuit), c.output.format)?;
     let measured = choice::quick(&settled, &alternatives::function(evaluation)?)?;
     let pieces = settled.form.pieces().into_iter();
     let evaluation_dps = pieces.map(|p| p.evaluation_bound).fold(0.0, f64::max);
@@ -201,7 +200,7 @@ fn run(evaluation: &Evaluation, wanted: &Enclosure) -> Run {
         piece
     };
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let pieces = crate::cosim::readings::in_parallel(&starts, threads, &|_| (), piece);
+    let pieces = crate::parallel::in_parallel(&starts, threads, &|_| (), piece);
     let first = Run {
         largest: -1.0,
         lower: 0.0,
@@ -302,7 +301,7 @@ pub fn sentences(design: &Design, bounds: &Bounds) -> Vec<String> {
         ));
     }
     if let Some(form) = c.form.as_ref() {
-        let built = form.build(codes(&design.circuit, c), c.output.format);
+        let built = form.build(c.codes(&design.circuit), c.output.format);
         let detail = built.map_or(String::new(), |f| describe::detail(&f));
         lines.push(format!("evaluated by a form that stands for it: {detail}"));
     }

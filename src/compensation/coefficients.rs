@@ -7,9 +7,9 @@ use crate::approx::minimax::{
     Basis, Budget, CoefficientFormat, Datapath, Monomials, Problem, Samples, Weight, minimax,
     search,
 };
-use crate::numeric::polynomial;
 use crate::design::{Circuit, Compensation};
 use crate::error::Result;
+use crate::numeric::polynomial;
 
 /// Words of the calibrated range that candidates are run over.
 const WORDS: i128 = 4096;

@@ -1,11 +1,12 @@
 //! Emitted C and Rust against the model, and damage to them.
 
-use super::firmware::{Origin, emit};
 use super::sample::{bends, plan, record};
 use super::*;
-use crate::firmware::files;
 use crate::emit::views::Language;
+use crate::firmware::correction::{Origin, emit};
+use crate::firmware::files;
 use crate::verify::bundle::verify;
+use crate::verify::correction::Firmware;
 use crate::verify::target::Target;
 
 const ORIGIN: Origin = Origin {

@@ -4,12 +4,10 @@
 //! a tenth of the noise, independent of it, raises the rms by 0.5 percent.
 
 use super::plan::{Plan, Term};
+pub use crate::design::correction::NOISE_PER_FULL_SCALE;
 use crate::error::{InputError, Result};
 use crate::numeric::format::{Format, pow2};
 
-/// The noise of a reading that words are chosen for if nothing else is said, in full scales: 1e-3 deg/s
-/// at 500 deg/s.
-pub const NOISE_PER_FULL_SCALE: f64 = 2e-6;
 /// One LSB of the rate is at most this share of the noise.
 const RATE_SHARE: f64 = 1.0 / 16.0;
 /// One LSB of the sum, and what the state of a lag or decay may be off by.

@@ -7,24 +7,22 @@
 pub mod block;
 mod bound;
 mod curve;
-pub mod firmware;
 mod formats;
 mod plan;
 mod rate_terms;
 mod run;
-mod sentences;
+pub mod sentences;
 mod states;
 mod terms;
 mod text;
 
-pub use firmware::Firmware;
 pub use formats::{Formats, NOISE_PER_FULL_SCALE};
 pub use plan::{
     HIGHEST_POWER, Input, LONGEST_TAU_PERIODS, MOST_INPUTS, MOST_KNOTS, MOST_OF_A_KIND,
     MOST_SLOPE_ROWS, Plan, SHORTEST_TAU_PERIODS, Term,
 };
 pub use run::{Correction, MOST_STEPS, Reading, Steps, readings, schedule};
-pub use text::Planned;
+pub use text::{Planned, refuse_unbuildable};
 
 #[cfg(test)]
 mod emission_tests;

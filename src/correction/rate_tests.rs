@@ -1,10 +1,11 @@
 //! A scale that bends with an input: against its formula, its passes and words, refusals, its text.
 
-use crate::correction::firmware::Origin;
 use crate::correction::sample::{evaluate, record};
-use crate::correction::{Correction, Firmware, Formats, Input, Plan, Planned, Reading, Term};
+use crate::correction::{Correction, Formats, Input, Plan, Planned, Reading, Term};
 use crate::design::reader::parse;
+use crate::firmware::correction::Origin;
 use crate::numeric::trace::ir::Op;
+use crate::verify::correction::Firmware;
 
 /// Full scale, deg/s.
 const FULL_SCALE_DPS: f64 = 500.0;

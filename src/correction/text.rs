@@ -1,18 +1,28 @@
 //! A plan as the table `[correction]` of a design file, so that a corrected gyro is a design.
 
 use super::formats::Formats;
-use super::plan::{Plan, Term};
+use super::plan::Term;
 use super::run::Correction;
-use crate::error::Result;
+use crate::design::Design;
+pub use crate::design::correction::Planned;
+use crate::error::{Error, Result};
 use std::fmt::Write as _;
 
-/// A plan and the noise that its words are chosen for: the table `[correction]`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Planned {
-    /// The plan.
-    pub plan: Plan,
-    /// Noise of a reading, deg/s rms.
-    pub noise_dps: f64,
+/// Refuses a design whose `[correction]` cannot become firmware.
+///
+/// # Errors
+/// As [`Planned::compile`], at the table.
+pub fn refuse_unbuildable(design: &Design) -> Result<()> {
+    let Some(planned) = &design.correction else {
+        return Ok(());
+    };
+    planned.compile().map(drop).map_err(|e| match e {
+        Error::Input(e) => design
+            .error_at("correction", e.message.clone())
+            .help(e.help.clone().unwrap_or_default())
+            .into(),
+        other => other,
+    })
 }
 
 impl Planned {

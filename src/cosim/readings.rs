@@ -7,6 +7,7 @@ use super::surroundings::{Moment, World};
 use crate::circuit::engine::ArithmeticKind;
 use crate::design::Design;
 use crate::error::Result;
+use crate::parallel::in_parallel;
 use crate::plant::noise::Noise;
 use crate::plant::profile::{Profile, Reading};
 use serde::Serialize;
@@ -180,39 +181,4 @@ impl Averager {
             rate_std_dps: std(4),
         }
     }
-}
-
-/// `work` on every job by `threads` threads; results in the jobs' order.
-pub fn in_parallel<J: Sync, T: Send>(
-    jobs: &[J],
-    threads: usize,
-    said: &(dyn Fn(usize) + Sync),
-    work: impl Fn(&J) -> T + Sync,
-) -> Vec<T> {
-    use std::sync::atomic::{AtomicUsize, Ordering};
-    let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
-    let one = || {
-        let mut own = Vec::new();
-        while let Some((k, job)) = {
-            let k = next.fetch_add(1, Ordering::Relaxed);
-            jobs.get(k).map(|job| (k, job))
-        } {
-            own.push((k, work(job)));
-            said(done.fetch_add(1, Ordering::Relaxed) + 1);
-        }
-        own
-    };
-    let mut results = std::thread::scope(|scope| {
-        let others: Vec<_> = (1..threads.max(1)).map(|_| scope.spawn(one)).collect();
-        let mut all = one();
-        for other in others {
-            match other.join() {
-                Ok(part) => all.extend(part),
-                Err(panic) => std::panic::resume_unwind(panic),
-            }
-        }
-        all
-    });
-    results.sort_by_key(|(k, _)| *k);
-    results.into_iter().map(|(_, result)| result).collect()
 }

@@ -3,12 +3,11 @@
 
 use super::schema::{Circuit, Compensation, Outside};
 use super::table::{Real, Table, Value};
-use crate::tabulate::cost::Target;
 use crate::approx::form::polynomial::Monomials;
 use crate::approx::form::split::{Spacing, Symmetry};
 use crate::approx::form::stored::{LARGEST_ENTRY, Read, Stored, WIDEST_BITS};
 use crate::approx::form::table::Kind;
-use crate::circuit::compensation::codes;
+use crate::design::target::Target;
 use crate::error::{Error, Result};
 use crate::numeric::format::{Overflow, Rounding};
 
@@ -92,7 +91,7 @@ pub(super) fn evaluation(t: &Table, c: &Compensation, circuit: &Circuit) -> Resu
         return Err(table.error(reason).help(help).into());
     }
     let stored = stored(&table)?;
-    let settled = stored.settle(codes(circuit, c), c.output.format);
+    let settled = stored.settle(c.codes(circuit), c.output.format);
     settled.map_err(|e| match e {
         Error::Input(e) => {
             let help = e.help.clone().unwrap_or_default();

@@ -1,8 +1,8 @@
 //! The table `[correction]`: the plan of a correction of averaged readings.
 
+use super::correction::{Input, NOISE_PER_FULL_SCALE, Plan, Planned, Term};
 use super::table::{Real, Table, Value};
-use crate::correction::{Correction, Input, Plan, Planned, Term};
-use crate::error::{Error, Result};
+use crate::error::Result;
 
 const KINDS: [&str; 11] = [
     "product",
@@ -18,7 +18,7 @@ const KINDS: [&str; 11] = [
     "even",
 ];
 
-/// Reads the table; a plan that cannot become firmware is refused here.
+/// Reads the table. Whether the plan can become firmware is for [`crate::correction::refuse_unbuildable`] to say.
 pub(super) fn correction(table: &Table) -> Result<Planned> {
     let real = |key: &str, meaning: &str| table.need(key)?.real(Real::Positive, meaning);
     let inputs = table.need("inputs")?.array("[]")?;
@@ -31,19 +31,10 @@ pub(super) fn correction(table: &Table) -> Result<Planned> {
     };
     let noise_dps = table.take(
         "noise_dps",
-        Some(plan.full_scale_dps * crate::correction::NOISE_PER_FULL_SCALE),
+        Some(plan.full_scale_dps * NOISE_PER_FULL_SCALE),
         |v| v.real(Real::Positive, "noise of a reading, deg/s rms"),
     )?;
-    let planned = Planned { plan, noise_dps };
-    let compiled: Result<Correction> = planned.compile();
-    compiled.map_err(|e| match e {
-        Error::Input(e) => {
-            let help = e.help.clone().unwrap_or_default();
-            table.error(e.message.clone()).help(help).into()
-        }
-        other => other,
-    })?;
-    Ok(planned)
+    Ok(Planned { plan, noise_dps })
 }
 
 fn input(value: &Value) -> Result<Input> {

@@ -3,7 +3,6 @@
 pub use super::effect_catalogue::{CATALOGUE, EffectKind, Parameter};
 pub use super::table::Real;
 
-use super::suggest;
 use super::table::Table;
 use crate::error::{InputError, Result};
 
@@ -85,7 +84,7 @@ impl Effects {
     pub fn set(&mut self, id: &str, values: &[f64]) -> Result<()> {
         let Some(kind) = EffectKind::named(id) else {
             let ids: Vec<&str> = CATALOGUE.iter().map(|kind| kind.id).collect();
-            let help = match suggest::nearest(id, &ids) {
+            let help = match crate::nearest::nearest(id, &ids) {
                 Some(near) => format!("did you mean `{near}`?"),
                 None => format!("it can be {}", super::keys::one_of(ids.into_iter())),
             };

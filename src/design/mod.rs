@@ -7,6 +7,7 @@
 
 pub mod bound;
 mod circuit_tables;
+pub mod correction;
 mod correction_table;
 mod device_tables;
 mod effect_catalogue;
@@ -15,9 +16,11 @@ mod keys;
 pub mod limits;
 mod log_axis;
 pub mod reader;
+pub mod record_columns;
 pub mod schema;
 pub(crate) mod suggest;
 mod table;
+pub mod target;
 pub mod template;
 pub mod user_effects;
 

@@ -5,9 +5,8 @@ use super::{
     bound, circuit_tables, correction_table, device_tables, limits, template, user_effects,
 };
 use crate::design::schema::*;
+use crate::digest::sha256;
 use crate::error::{Error, InputError, Result, io_error};
-use sha2::{Digest, Sha256};
-use std::fmt::Write as _;
 use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -101,7 +100,7 @@ fn build(text: &str, file: Option<&Path>, base: Option<&Design>) -> Result<Desig
         source: Source {
             path: file.map(Path::to_path_buf),
             text: text.to_owned(),
-            sha256: sha256(text),
+            sha256: sha256(text.as_bytes()),
         },
     };
     limits::check(&design).map_err(|excess| {
@@ -114,14 +113,18 @@ fn build(text: &str, file: Option<&Path>, base: Option<&Design>) -> Result<Desig
     Ok(design)
 }
 
-/// Lower-case hexadecimal.
-fn sha256(text: &str) -> String {
-    let digest = Sha256::digest(text.as_bytes());
-    digest.iter().fold(String::new(), |mut hex, byte| {
-        // Writing to a String cannot fail.
-        let _ = write!(hex, "{byte:02x}");
-        hex
-    })
+impl Design {
+    /// An error at the place of a dotted key in the design's text (of its table, where the key is left out).
+    pub fn error_at(&self, key: &str, message: impl Into<String>) -> InputError {
+        let text = &self.source.text;
+        let doc = Doc {
+            text: text.strip_prefix('\u{feff}').unwrap_or(text),
+            file: self.source.path.as_deref(),
+        };
+        // A design has been read from this text.
+        let offset = DeTable::parse(doc.text).map_or(0, |root| locate(root.get_ref(), key));
+        doc.error(offset, message)
+    }
 }
 
 /// The byte offset of a dotted key's value, or of the innermost table on the way that is there.

@@ -2,12 +2,14 @@
 //! `docs/manual.md`; their meaning is stated there and only summarised here.
 
 use super::bound::BiasBound;
+use super::correction::Planned;
 use super::effects::Effects;
 pub use super::log_axis::LogAxis;
 use super::user_effects::UserEffect;
+use crate::approx::form::Codes;
 use crate::approx::form::stored::Stored;
-use crate::correction::Planned;
 use crate::numeric::format::{Format, Overflow, Quantizer, Rounding, pow2};
+use crate::numeric::trace::ir::Interval;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -290,6 +292,27 @@ impl Compensation {
             CompensationInput::Phase => (0, circuit.cordic.angle_bits as i32 - 1),
             CompensationInput::TuningWord(t) => (t.offset_raw, t.scale_bits as i32),
             CompensationInput::Channel(c) => (c.offset_raw, c.scale_bits as i32),
+        }
+    }
+
+    /// The words of the polynomial's variable inside the calibrated range (every word, where there is none).
+    pub fn codes(&self, circuit: &Circuit) -> Codes {
+        let (offset, fraction_bits) = self.variable_scale(circuit);
+        let all = match &self.input {
+            CompensationInput::Phase => Interval::of_bits(circuit.cordic.angle_bits),
+            CompensationInput::TuningWord(_) => Interval::of_bits(circuit.nco.phase_bits),
+            CompensationInput::Channel(channel) => {
+                Interval::new(channel.format.min_raw(), channel.format.max_raw())
+            }
+        };
+        let (low, high) = self.clamp_raw.unwrap_or((all.low, all.high));
+        let range = Interval::new(low - offset, high - offset);
+        let fraction_bits = fraction_bits.max(0) as u32;
+        let integer_bits = range.bits().saturating_sub(fraction_bits).max(1);
+        Codes {
+            format: Format::q(integer_bits, fraction_bits),
+            low: range.low,
+            high: range.high,
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::effects::EffectKind;
 use super::keys::{EFFECTS, KEYS, example, is_table, one_of, title};
+use crate::nearest::nearest;
 use crate::numeric::format::Format;
 
 /// Endings of keys that are units, and their names; the longer before the shorter.
@@ -206,16 +207,6 @@ fn unit_confusion(known: &[&str], unknown: &str) -> Option<String> {
     })
 }
 
-/// The known word within two edits of `word`, the nearest first.
-pub(crate) fn nearest<'a>(word: &str, known: &[&'a str]) -> Option<&'a str> {
-    known
-        .iter()
-        .map(|key| (edits(word, key), *key))
-        .filter(|(distance, key)| *distance <= 2 && *distance < key.len())
-        .min_by_key(|(distance, _)| *distance)
-        .map(|(_, key)| key)
-}
-
 /// As [`nearest`], for words that other tools spell differently.
 pub(crate) fn nearest_word<'a>(word: &str, known: &[&'a str]) -> Option<&'a str> {
     let plain = word.trim().to_lowercase().replace(['-', ' '], "_");
@@ -223,25 +214,6 @@ pub(crate) fn nearest_word<'a>(word: &str, known: &[&'a str]) -> Option<&'a str>
     alias
         .and_then(|(_, ours)| known.iter().find(|k| *k == ours).copied())
         .or_else(|| nearest(&plain, known))
-}
-
-/// Insertions, deletions, replacements and swaps of neighbours that lead from `a` to `b`.
-fn edits(a: &str, b: &str) -> usize {
-    let (a, b): (Vec<char>, Vec<char>) = (a.chars().take(80).collect(), b.chars().collect());
-    let mut before: Vec<usize> = Vec::new();
-    let mut last: Vec<usize> = (0..=b.len()).collect();
-    for i in 1..=a.len() {
-        let mut row = vec![i; b.len() + 1];
-        for j in 1..=b.len() {
-            let replace = last[j - 1] + usize::from(a[i - 1] != b[j - 1]);
-            row[j] = replace.min(last[j] + 1).min(row[j - 1] + 1);
-            if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
-                row[j] = row[j].min(before[j - 2] + 1);
-            }
-        }
-        before = std::mem::replace(&mut last, row);
-    }
-    last[b.len()]
 }
 
 /// What to write instead of a format that cannot be read.
@@ -269,14 +241,6 @@ pub(super) fn format_remedy(text: &str) -> String {
 mod tests {
     use super::super::keys::names;
     use super::*;
-
-    #[test]
-    fn edits_count_swaps_as_one() {
-        assert_eq!(edits("ratio", "ratio"), 0);
-        assert_eq!(edits("raito", "ratio"), 1);
-        assert_eq!(edits("", "abc"), 3);
-        assert_eq!(edits("kitten", "sitting"), 3);
-    }
 
     #[test]
     fn remedies_name_the_key_the_unit_and_the_place() {

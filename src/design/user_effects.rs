@@ -2,11 +2,10 @@
 //! They are candidates of `gyrogen close`; the simulated gyro's are in [`super::effects`].
 
 use super::effects::EffectKind;
-use super::suggest;
+use super::record_columns::is_known;
 use super::table::{Doc, Real, Table, Value};
 use crate::approx::real::Formula;
 use crate::error::{Error, Result};
-use crate::record::columns::is_known;
 
 /// Most effects in a file.
 pub const MOST: usize = 32;
@@ -232,7 +231,7 @@ fn check(doc: &Doc, table: &Table, expression: &Value, effect: &UserEffect) -> R
     let unused = |p: &&UserParameter| !names.contains(&p.name);
     if let Some(p) = effect.parameters.iter().find(unused) {
         let columns: Vec<&str> = effect.columns().collect();
-        let meant = suggest::nearest(&p.name, &columns);
+        let meant = crate::nearest::nearest(&p.name, &columns);
         let help = match meant {
             Some(name) => format!("the formula has `{name}`: is that the same?"),
             None => "use it there, or delete it".to_owned(),

@@ -6,7 +6,7 @@ use super::{c, rust};
 use crate::numeric::trace::ir::Interval;
 
 /// A language to print.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Language {
     /// C99.
     C,

@@ -3,12 +3,12 @@
 //! Both run once and leave a digest of all words after every `SPAN` samples. In the first span whose
 //! digests differ, both run again and keep their words; these are compared one by one.
 
-use super::layout::Layout;
-use super::probe::Tap;
-use super::run::run_tapped;
 use crate::circuit::engine;
 use crate::design::Design;
 use crate::error::{InputError, Result};
+use crate::nodes::layout::Layout;
+use crate::nodes::probe::Tap;
+use crate::nodes::run::run_tapped;
 use crate::numeric::format::pow2;
 use serde::Serialize;
 use std::cell::RefCell;

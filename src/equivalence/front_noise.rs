@@ -1,8 +1,8 @@
 //! Predicted rms at the sample rate and behind the decimator: table, products, decimators.
 
-use super::node::Node;
 use super::predicted::{DOUBTFUL, ENOUGH_WORDS, Prediction, Theory, set};
-use super::quantisation::{Moments, Spread};
+use crate::nodes::node::Node;
+use crate::nodes::quantisation::{Moments, Spread};
 use crate::numeric::format::{Rounding, pow2};
 
 /// Mean square errors of a decimator's output, with what of it the table's errors make.

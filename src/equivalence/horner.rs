@@ -1,9 +1,9 @@
 //! The compensation's errors: Horner's slopes and the roundings on the way.
 
 use super::front_noise::with_sign;
-use super::node::Node;
-use super::quantisation::Moments;
 use crate::design::{Compensation, Design};
+use crate::nodes::node::Node;
+use crate::nodes::quantisation::Moments;
 use crate::numeric::format::pow2;
 
 /// The polynomial with its casts.

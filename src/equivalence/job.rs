@@ -3,16 +3,16 @@
 use super::outcome::{Emitted, Equivalence, FirstOverflow, LoopReport, NodeReport};
 use super::overflow::{self, Repair};
 use super::predicted;
-use super::probe::Seen;
-use super::run;
 use super::{against, shrink};
 use crate::design::Design;
 use crate::emit::bundle::Bundle;
 use crate::error::Result;
-use crate::verify::firmware::{Built, Firmware};
+use crate::nodes::probe::Seen;
+use crate::nodes::run;
 use crate::simulation::hunting::{Hunting, hunting};
 use crate::spectrum::{NcoSpurs, nco_spurs};
 use crate::verify::compare;
+use crate::verify::firmware::{Built, Firmware};
 
 /// Rows that are compared with emitted code; a decimator of small ratio makes as many rows as samples.
 const MOST_ROWS: usize = 1 << 20;

@@ -1,11 +1,11 @@
 //! `equiv.json` (`gyrogen.equiv/1`): what a run comes to.
 
 use super::against::{Against, FirstDifference};
-use super::node::Node;
 use super::overflow::{self, Repair};
 use super::predicted::Prediction;
-use super::probe::Seen;
 use crate::design::Design;
+use crate::nodes::node::Node;
+use crate::nodes::probe::Seen;
 use crate::simulation::hunting::Hunting;
 use crate::spectrum::NcoSpurs;
 use crate::verify::compare::Compared;

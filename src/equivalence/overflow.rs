@@ -1,28 +1,10 @@
 //! The first overflow: where it came from, where it goes, and the smallest format that removes it.
 
-use super::node::Node;
-use super::probe::Seen;
 use crate::design::{Design, limits};
-use crate::numeric::cast::Label;
+use crate::nodes::node::Node;
+use crate::nodes::probe::Seen;
 use crate::numeric::format::{Format, Overflow, Quantizer};
 use serde::Serialize;
-
-/// A word that did not fit.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Event {
-    /// 0-based ADC sample; at the slow rate the period's last.
-    pub sample: u64,
-    /// The key, with its channel.
-    pub label: Label,
-    /// The node's own name.
-    pub part: String,
-    /// The node's number.
-    pub node: usize,
-    /// What went into it, raw.
-    pub operands: Vec<i128>,
-    /// The raw word before the overflow step.
-    pub value: i128,
-}
 
 /// A change of one format.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]

@@ -21,12 +21,12 @@
 //!
 //! [`Lines`]: super::table_noise::Lines
 
-use super::activity::{Activity, PHASE_BINS};
-use super::node::Node;
-use super::probe::Seen;
-use super::quantisation::{Spread, cic_noise_gain, spread};
 use super::table_noise::TableErrors;
 use crate::design::Design;
+use crate::nodes::activity::{Activity, PHASE_BINS};
+use crate::nodes::node::Node;
+use crate::nodes::probe::Seen;
+use crate::nodes::quantisation::{Spread, cic_noise_gain, spread};
 use crate::numeric::format::pow2;
 
 /// What theory says of a node.

@@ -1,12 +1,12 @@
 //! Predicted rms behind the CORDIC: phase, magnitude, bias, rate.
 
-use super::activity::PHASE_BINS;
 use super::cordic_noise::BlockNoise;
 use super::front_noise::{Channel, with_sign};
 use super::horner::Horner;
 use super::predicted::{DOUBTFUL, ENOUGH_ROWS, MOVING, Prediction, Theory, bin_turns, set};
-use super::quantisation::Moments;
 use crate::design::CompensationInput;
+use crate::nodes::activity::PHASE_BINS;
+use crate::nodes::quantisation::Moments;
 use std::f64::consts::TAU;
 
 /// The phase error by bins of the phase.

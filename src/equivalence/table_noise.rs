@@ -7,9 +7,9 @@
 //! each of sine and cosine, filtered here once. Lines that fold to zero frequency, that fall on the
 //! decimator's zeros, that drift: all are in it.
 
-use super::quantisation::Moments;
 use crate::circuit::nco::Oscillator;
 use crate::design::Design;
+use crate::nodes::quantisation::Moments;
 use crate::numeric::format::{Rounding, pow2};
 use std::f64::consts::TAU;
 

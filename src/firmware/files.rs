@@ -1,28 +1,26 @@
 //! The files of a firmware bundle: sources, harness, self-test, vectors, manifest.
 
-use crate::emit::bundle::{Bundle, Part};
-use crate::emit::machine::{Type, Width};
+use super::calibrated;
 use super::manifest::{self, Header, Manifest};
 use super::stepped::StreamView;
+use crate::circuit::engine::{self};
+use crate::compensation::certainty;
+use crate::design::Design;
+use crate::emit::bundle::{Bundle, Part};
+use crate::emit::machine::{Type, Width};
 use crate::emit::views;
 use crate::emit::views::{FunctionView, Language, StateView, StructView, TableView, mix};
 use crate::emit::{c, rust};
-use super::calibrated;
-use crate::compensation::certainty;
-use crate::circuit::engine::{self, ArithmeticKind, Rows};
-use crate::design::Design;
 use crate::error::{InputError, Result, io_error};
 use crate::numeric::trace::ir::Interval;
-use crate::verify::compare;
 use crate::vectors::model;
 use crate::vectors::model::Model;
+use crate::vectors::rows;
 use crate::vectors::stimulus;
-use crate::vectors::stimulus::Lcg;
+use crate::vectors::stimulus::{Lcg, SEED};
 use askama::Template;
 use std::path::Path;
 
-/// Seed of everything that a bundle's tests draw.
-pub const SEED: u64 = 2004;
 /// Draws for each function in the self-test.
 const SELFTEST_DRAWS: u32 = 256;
 /// Decimation periods in the self-test, and least number of them in the vectors.
@@ -388,23 +386,10 @@ fn chain_checksum(design: &Design, bundle: &Bundle) -> u64 {
         drive.push(lcg.word(code) as i32);
         sense.push(lcg.word(code) as i32);
     }
-    let words = saturating_rows(design, &drive, &sense);
+    let words = rows::saturating_rows(design, &drive, &sense);
     words
         .iter()
         .fold(views::BASIS, |h, word| mix(h, *word as u64))
-}
-
-/// Rows of the model, where `error` saturates and goes on as the emitted code does.
-pub fn saturating_rows(design: &Design, drive: &[i32], sense: &[i32]) -> Vec<i128> {
-    let design = design.without_stops();
-    let mut engine = engine::engine(&design, ArithmeticKind::Fixed);
-    let mut rows = engine.no_rows();
-    // No cast stops this run.
-    let _ = engine.process(drive, sense, &mut rows);
-    match rows {
-        Rows::Integer(words) => words,
-        Rows::Real(_) => Vec::new(),
-    }
 }
 
 pub(super) fn csv_line(words: &[i128]) -> String {
@@ -468,7 +453,7 @@ fn chain_vectors(design: &Design, bundle: &Bundle) -> [EmittedFile; 2] {
         input += &format!("{d},{s}\n");
     }
     let mut output = engine::columns(design).join(",") + ",fault\n";
-    for row in compare::expected_rows(design, &drive, &sense) {
+    for row in rows::expected_rows(design, &drive, &sense) {
         output += &csv_line(&row);
     }
     [

@@ -1,16 +1,16 @@
 //! The bundle of one function that stands alone: no chain, no state, one word in, one word out.
 
-use crate::emit::bundle::{Bundle, Part};
 use super::files::{self, EmittedFile, View, csv_line};
-use crate::emit::lower::lower;
 use super::manifest::{self, Header, Manifest};
+use crate::emit::bundle::{Bundle, Part};
+use crate::emit::lower::lower;
 use crate::emit::views;
 use crate::emit::views::{Language, mix};
 use crate::error::Result;
 use crate::numeric::trace::ir::{Interval, Program};
-use crate::verify::compare::EXHAUSTIVE_BITS;
 use crate::vectors::model::Model;
-use crate::vectors::stimulus;
+use crate::vectors::stimulus::EXHAUSTIVE_BITS;
+use crate::vectors::stimulus::{self, SEED};
 
 /// Random vectors.
 const VECTORS: usize = 1024;
@@ -103,8 +103,8 @@ fn chosen(program: &Program, model: &Model) -> EmittedFile {
         let names = names.chain(f.outputs.iter().map(|(port, _)| port.name));
         text = names.chain(["fault"]).collect::<Vec<_>>().join(",") + "\n";
     }
-    let mut inputs = stimulus::inputs(&model.inputs, VECTORS, files::SEED);
-    let candidates = stimulus::inputs(&model.inputs, CANDIDATES, files::SEED + 4);
+    let mut inputs = stimulus::inputs(&model.inputs, VECTORS, SEED);
+    let candidates = stimulus::inputs(&model.inputs, CANDIDATES, SEED + 4);
     inputs.extend(model.near_ties(&candidates));
     let mut outputs = vec![0; model.outputs];
     for input in inputs {

@@ -1,12 +1,12 @@
 //! What a bundle says of itself: the manifest, and the banner and facts at the head of each file.
 
-use crate::emit::bundle::Bundle;
 use super::files::EmittedFile;
-use crate::emit::views::{FunctionView, Language, TableView};
 use crate::design::{CompensationInput, Design, Outside};
+use crate::digest::sha256;
+use crate::emit::bundle::Bundle;
+use crate::emit::views::{FunctionView, Language, TableView};
 use crate::numeric::format::Overflow;
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
 /// The manifest's file name.
 pub const NAME: &str = "manifest.json";
@@ -100,14 +100,6 @@ pub struct FileEntry {
     pub path: String,
     /// Lower-case hexadecimal.
     pub sha256: String,
-}
-
-/// SHA-256 in lower-case hexadecimal.
-pub fn sha256(bytes: &[u8]) -> String {
-    Sha256::digest(bytes)
-        .iter()
-        .map(|b| format!("{b:02x}"))
-        .collect()
 }
 
 /// The first line of every emitted file.

@@ -1,10 +1,11 @@
 //! Firmware bundles, as files in memory: sources with self-test, harness, vectors and manifest.
 //!
 //! [`files`] assembles the chain or its compensation, [`function`] one function alone, [`stepped`] one with a state,
-//! [`approximation`] what `gyrogen approx` found; [`manifest`] says what is in a bundle, [`calibrated`] where it holds.
+//! [`correction`] the step of a correction, [`approximation`] what `gyrogen approx` found; [`manifest`] says what is in a bundle, [`calibrated`] where it holds.
 
 pub mod approximation;
 pub mod calibrated;
+pub mod correction;
 pub mod files;
 pub mod function;
 pub mod manifest;

@@ -2,15 +2,15 @@
 //!
 //! Its first input restarts the state where it is 1. The state starts at zeros.
 
-use crate::emit::bundle::{Bundle, Part, states};
-use super::files::{self, EmittedFile, SEED, View, csv_line};
-use crate::emit::lower::lower;
+use super::files::{self, EmittedFile, View, csv_line};
 use super::manifest::{self, Header, Manifest};
+use crate::emit::bundle::{Bundle, Part, states};
+use crate::emit::lower::lower;
 use crate::emit::views;
 use crate::emit::views::{FunctionView, Language, mix};
 use crate::error::{Error, Result};
 use crate::numeric::trace::ir::{Interval, Program};
-use crate::vectors::stimulus::Lcg;
+use crate::vectors::stimulus::{Lcg, SEED};
 
 /// Calls of the self-test, and of each of the three parts of the vectors.
 const CALLS: usize = 1024;

@@ -10,13 +10,14 @@ use crate::compensation::alternatives;
 use crate::compensation::alternatives::Way;
 use crate::compensation::certainty::{Bounds, Certainty, bounds};
 use crate::compensation::{Evaluation, coefficients, one_rounding};
-use crate::tabulate::choice;
-use crate::tabulate::cost::{Cost, Target};
-use crate::thermal::BaselineFit;
 use crate::design::bound::hindrance;
+use crate::design::target::Target;
 use crate::design::{BiasBound, Compensation, CompensationInput, Design, limits};
 use crate::error::{InputError, Result};
 use crate::numeric::format::Format;
+use crate::tabulate::choice;
+use crate::tabulate::cost::Cost;
+use crate::thermal::BaselineFit;
 use serde::Serialize;
 
 /// The widest format that is chosen or proposed.

@@ -1,14 +1,13 @@
 //! Random fitted polynomials under random bounds: what is certified, what is run, what is written and read again.
 
 use super::*;
-use crate::compensation::certainty::certainty;
 use crate::approx::draws::Draws;
 use crate::approx::form::stored::{Read, Stored};
-use crate::circuit::compensation::codes;
-use crate::thermal::BaselineFit;
+use crate::compensation::certainty::certainty;
 use crate::design::{ChannelInput, Fitted, Outside, reader};
 use crate::job::fitted_design;
 use crate::numeric::format::Rounding;
+use crate::thermal::BaselineFit;
 
 /// A fit of a die's temperature, in a word of 14 bits, by a polynomial of a random order.
 fn random(seed: u64) -> Design {
@@ -151,7 +150,7 @@ fn every_alternative_survives_its_text() {
             assert_eq!(a, b);
             let of = |c| Evaluation::new(&design.circuit, c);
             let (first, last) = of(&a).words();
-            let at = codes(&design.circuit, &a);
+            let at = a.codes(&design.circuit);
             let settled = stored.settle(at, a.output.format).unwrap();
             let offset = a.variable_scale(&design.circuit).0;
             for word in (first..=last).step_by(37) {

@@ -2,9 +2,9 @@
 
 use super::coefficients::variable;
 use crate::compensation::certainty::Certainty;
-use crate::thermal::BaselineFit;
 use crate::design::{Compensation, CompensationInput, Design};
 use crate::numeric::format::pow2;
+use crate::thermal::BaselineFit;
 use serde::Serialize;
 
 /// One contribution.

@@ -3,11 +3,11 @@
 use super::bound::{self, Kept};
 use super::coefficients::{self, Rounded};
 use super::{formats, warning};
-use crate::thermal;
-use crate::thermal::BaselineFit;
 use crate::design::{Compensation, CompensationInput, Design, FitOptions, FitOrder};
 use crate::error::{InputError, Result};
 use crate::record::{ThermalRecord, Warning};
+use crate::thermal;
+use crate::thermal::BaselineFit;
 
 /// A fit that has been put into a design.
 #[derive(Debug, Clone)]

@@ -2,10 +2,10 @@
 
 use super::{compensation, thermometer_raw};
 use crate::compensation::coefficients as best_coefficients;
-use crate::thermal::BaselineFit;
 use crate::design::{Circuit, Compensation, CompensationInput, Design, Fitted, Outside};
 use crate::error::{InputError, Result};
 use crate::numeric::format::{Format, pow2};
+use crate::thermal::BaselineFit;
 
 /// Rounded coefficients.
 #[derive(Debug, Clone, PartialEq)]

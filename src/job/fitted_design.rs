@@ -1,8 +1,8 @@
 //! The design with the fitted compensation as a design file of its own: what reproduces the firmware.
 
-use crate::tabulate::cost::Target;
 use crate::correction::Planned;
 use crate::design::bound::evaluation_text;
+use crate::design::target::Target;
 use crate::design::{BiasBound, Compensation, CompensationInput, Design, Outside};
 use crate::numeric::format::Quantizer;
 use std::fmt::Write as _;

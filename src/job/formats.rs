@@ -1,6 +1,5 @@
 //! The thermometer of the firmware, and formats where the design leaves them open.
 
-use crate::thermal::BaselineFit;
 use crate::cosim::scale::{nominal_full_scale_dps, power_of_two_near};
 use crate::design::{
     BiasBound, ChannelInput, Circuit, Compensation, CompensationInput, Design, Outside,
@@ -9,6 +8,7 @@ use crate::design::{
 use crate::error::{InputError, Result};
 use crate::numeric::format::{Format, Overflow, Quantizer, Rounding};
 use crate::record::ThermalRecord;
+use crate::thermal::BaselineFit;
 
 /// Bits of a chosen coefficient and of a chosen output.
 const WORD_BITS: u32 = 32;

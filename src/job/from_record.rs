@@ -1,16 +1,16 @@
 //! A measured record through the compensation alone: the thermometer's and the rate's words as
 //! firmware would read them.
 
-use crate::verify::firmware::{Built, Firmware};
 use super::outcome::Point;
 use super::{clamped_bias, compensation, thermometer_raw};
-use crate::thermal::BaselineFit;
 use crate::design::{Compensation, CompensationInput, Design};
 use crate::error::{InputError, Result};
 use crate::numeric::format::Format;
 use crate::record::ThermalRecord;
+use crate::thermal::BaselineFit;
 use crate::vectors::model;
 use crate::vectors::model::Model;
+use crate::verify::firmware::{Built, Firmware};
 
 /// Every usable row through every path.
 ///

@@ -19,10 +19,10 @@ pub mod outcome;
 pub mod own_run;
 
 use crate::compensation::certainty;
-use crate::thermal::BaselineFit;
 use crate::design::{Compensation, CompensationInput, Design};
 use crate::error::Result;
 use crate::record::{self, Warning};
+use crate::thermal::BaselineFit;
 use outcome::{Outcome, Point};
 use std::path::Path;
 use std::time::Instant;

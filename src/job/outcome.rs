@@ -3,15 +3,15 @@
 use super::bound::Kept;
 use super::budget::Budget;
 use super::coefficients::Rounded;
-use crate::verify::firmware::Firmware;
 use super::{drift_pp, rms};
 use crate::compensation::certainty;
 use crate::compensation::certainty::Certainty;
-use crate::thermal::BaselineFit;
 use crate::design::Design;
-use crate::firmware::manifest::sha256;
+use crate::digest::sha256;
 use crate::record::Warning;
+use crate::thermal::BaselineFit;
 use crate::verify::compare::Compared;
+use crate::verify::firmware::Firmware;
 use serde::Serialize;
 use std::path::PathBuf;
 

@@ -1,11 +1,9 @@
 //! The design's own thermal run: plant and circuit in closed loop, in one stream without a break.
 
-use crate::verify::firmware::Firmware;
 use super::formats;
 use super::outcome::Point;
 use super::{clamped_bias, compensation, warning};
 use crate::circuit::engine::{self, ArithmeticKind, Rows};
-use crate::thermal::BaselineFit;
 use crate::cosim::scale::{full_scale_dps, nominal_full_scale_dps};
 use crate::cosim::surroundings::Moment;
 use crate::cosim::{readings, stream};
@@ -14,6 +12,8 @@ use crate::error::{Error, InputError, Result};
 use crate::numeric::format::pow2;
 use crate::plant::profile::{Profile, Reading};
 use crate::record::Warning;
+use crate::thermal::BaselineFit;
+use crate::verify::firmware::Firmware;
 use std::f64::consts::TAU;
 
 /// Codes of the whole run and what the uncompensated circuit makes of them.

@@ -15,5 +15,6 @@ pub mod lane;
 pub mod paired;
 mod paired_word;
 pub mod polynomial;
+pub mod splitmix;
 pub mod trace;
 pub mod turn;

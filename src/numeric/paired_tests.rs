@@ -9,7 +9,7 @@ use super::super::lane::Lane;
 use super::{Pair, Paired, Watch};
 use crate::circuit::engine::{self, ArithmeticKind, Rows};
 use crate::design::{Design, template::default_design};
-use crate::equivalence::run::run_with_rows;
+use crate::nodes::run::run_with_rows;
 use proptest::prelude::*;
 
 /// Looks on; makes the bounds of casts smaller by a factor, 1 for an honest one.

@@ -7,18 +7,8 @@
 //! streams apart even where their counters meet. Only integers and IEEE basic operations are used
 //! ([`turn`]), so the values are the same on every machine.
 
+use crate::numeric::splitmix::{GOLDEN, mix};
 use crate::numeric::turn;
-
-/// 2^64 over the golden ratio, odd.
-const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
-
-/// The finaliser of splitmix64.
-#[inline(always)]
-const fn mix(z: u64) -> u64 {
-    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
-}
 
 /// One stream of noise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -5,9 +5,9 @@ use super::log_bytes::Damage;
 use super::thermal::{LEAST_ROWS, ThermalRecord};
 use super::warning::Warning;
 use super::{frozen, plausibility};
-use crate::statistics::stats;
 use crate::design::RecordMapping;
 use crate::error::{InputError, Result};
+use crate::statistics::stats;
 use std::collections::BTreeMap;
 use std::path::Path;
 

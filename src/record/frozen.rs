@@ -5,9 +5,9 @@
 //! while another thermometer, or the bias itself, runs on.
 
 use super::columns::{THERMOMETERS, unit_of};
-use crate::statistics::stats;
 use super::thermal::ThermalRecord;
 use super::warning::Warning;
+use crate::statistics::stats;
 
 /// Adds a warning for each channel that stands still.
 pub(super) fn check(record: &ThermalRecord, warnings: &mut Vec<Warning>) {

@@ -5,10 +5,10 @@
 //! `scale`, the clock in `timing`.
 
 use super::columns;
-use crate::statistics::stats;
 use super::thermal::ThermalRecord;
 use super::warning::Warning;
 use super::{scale, timing};
+use crate::statistics::stats;
 use std::f64::consts::{PI, TAU};
 
 /// Adds a warning for each column whose values are unlikely.

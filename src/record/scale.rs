@@ -1,9 +1,9 @@
 //! Does the output follow the applied rate as `rate_out_dps` at nominal scale has to?
 
 use super::columns::THERMOMETERS;
-use crate::statistics::stats;
 use super::thermal::ThermalRecord;
 use super::warning::Warning;
+use crate::statistics::stats;
 
 /// Rates of a table are round in deg/s: so close to a whole number of them.
 const ROUND: f64 = 2e-3;

@@ -1,8 +1,8 @@
 //! Is the clock of a record in seconds since its start?
 
-use crate::statistics::stats;
 use super::thermal::ThermalRecord;
 use super::warning::Warning;
+use crate::statistics::stats;
 
 /// No die moves faster over 10 K, K/s: a chamber's ramp makes 0.2, power-on and hot air 0.5. Ramps
 /// of 1.5 K/min and more are told from it when their minutes pass for seconds.

@@ -17,11 +17,11 @@ pub mod svg;
 pub mod tables;
 pub mod text;
 
-use crate::thermal::BaselineFit;
 use crate::design::Design;
 use crate::error::{InputError, Result};
 use crate::job::coefficients::Rounded;
 use crate::job::outcome::{Outcome, Point, Summary};
+use crate::thermal::BaselineFit;
 use askama::Template;
 
 /// What the report is made from.

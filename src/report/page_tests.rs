@@ -2,13 +2,13 @@
 
 use super::super::{Shown, render};
 use crate::compensation::certainty;
-use crate::thermal;
-use crate::thermal::BaselineFit;
 use crate::design::Design;
 use crate::job::coefficients::{self, Rounded};
 use crate::job::outcome::{After, Drift, Emitted, Equivalence, FitSummary, Point, Summary};
 use crate::job::{budget, drift_pp, formats, rms};
 use crate::record::{self, Warning};
+use crate::thermal;
+use crate::thermal::BaselineFit;
 use crate::verify::compare::Compared;
 use std::path::Path;
 
@@ -33,7 +33,7 @@ impl Made {
         let (record, _) =
             record::thermal::parse(text.as_bytes(), Path::new("r.csv"), &Default::default())
                 .unwrap();
-        let fit = closure::fit(&record, &Default::default(), &design.fit).unwrap();
+        let fit = thermal::fit(&record, &Default::default(), &design.fit).unwrap();
         let chosen = formats::fill(&mut design, &fit, &record).unwrap();
         let rounded = coefficients::round(&mut design, &fit).unwrap();
         let certainty = certainty::certainty(&design).unwrap().unwrap();

@@ -13,14 +13,14 @@ use super::scene::Scene;
 use super::score::{counted, scores};
 use super::trial::{Answer, Mark};
 use super::{Case, Progress, Request, marked, of_record, trials};
+use crate::design::Design;
+use crate::error::Result;
+use crate::record::{ThermalRecord, condensed};
 use crate::thermal::close;
 use crate::thermal::close::{Closed, Named, channels_of, own_candidates};
 use crate::thermal::intake::refused;
 use crate::thermal::search::{Effort, Search};
 use crate::verdict::Fate;
-use crate::design::Design;
-use crate::error::Result;
-use crate::record::{ThermalRecord, condensed};
 use serde::Serialize;
 use std::collections::BTreeMap;
 

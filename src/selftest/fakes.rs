@@ -3,9 +3,9 @@
 //! Surrogates by Fourier transform (Theiler et al. 1992, "Testing for nonlinearity in time series"), over the
 //! rows as if they were evenly spaced: as slow, as periodic and as large as what they copy, and about nothing.
 
+use crate::statistics::random::Stream;
 use crate::thermal::channels::range;
 use crate::thermal::close::Closed;
-use crate::statistics::random::Stream;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 use std::f64::consts::TAU;

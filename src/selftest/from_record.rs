@@ -6,9 +6,9 @@
 //! thermometer that is no phase stands for the phase in the cubic bias, scaled to -1..1.
 
 use super::scene::Scene;
-use crate::thermal::close::Closed;
 use crate::plant::effects::Instant;
 use crate::plant::profile::NOMINAL_SUPPLY_V;
+use crate::thermal::close::Closed;
 
 /// The scene of a closed record.
 pub fn scene(closed: &Closed) -> Scene {

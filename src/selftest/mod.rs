@@ -17,11 +17,11 @@ mod score;
 pub mod statistics;
 pub mod trial;
 
-use crate::thermal::close;
-use crate::thermal::search::Effort;
 use crate::design::{Design, RecordMapping, UserEffect};
 use crate::error::{InputError, Result};
 use crate::record::{ThermalRecord, Warning};
+use crate::thermal::close;
+use crate::thermal::search::Effort;
 use outcome::{NoiseOf, Outcome, SCHEMA};
 use planted::{CATALOGUE, COUPLING, Kind};
 use programs::Program;
@@ -156,7 +156,7 @@ pub fn run_with(
     Ok(Outcome {
         schema: SCHEMA,
         version: env!("CARGO_PKG_VERSION"),
-        design_sha256: crate::firmware::manifest::sha256(design.source.text.as_bytes()),
+        design_sha256: crate::digest::sha256(design.source.text.as_bytes()),
         command: request.command.clone(),
         record: record.map(|r| r.0.source.display().to_string()),
         own_steps,

@@ -8,10 +8,10 @@
 use super::programs::Program;
 use super::scene::{Plant, Scene, Taken};
 use crate::approx::real::formula::Operand;
-use crate::thermal::channels::scaled;
-use crate::statistics::linear::{Basis, dot};
 use crate::design::UserEffect;
 use crate::plant::noise::Noise;
+use crate::statistics::linear::{Basis, dot};
+use crate::thermal::channels::scaled;
 
 /// An effect that is planted.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,12 +2,12 @@
 //! needs to be seen. The gyro is the design's ([`crate::plant`]), without any of its effects.
 
 use super::scene::Scene;
-use crate::statistics::noise::NoiseModel;
 use crate::design::{Design, Effects};
 use crate::plant::effects::Instant;
 use crate::plant::profile::NOMINAL_SUPPLY_V;
 use crate::plant::slow_noise::{dps_of_dph, dps_rts_of_dph_rth};
 use crate::plant::{Device, Thermal};
+use crate::statistics::noise::NoiseModel;
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 

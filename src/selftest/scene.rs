@@ -1,10 +1,10 @@
 //! What a gyro goes through in an experiment, row by row, and what a laboratory writes down of it.
 
-use crate::statistics::noise::NoiseModel;
 use crate::design::Effects;
 use crate::plant::effects::{self, Instant, StressJump};
 use crate::plant::resonator::{Resonator, Response};
 use crate::record::ThermalRecord;
+use crate::statistics::noise::NoiseModel;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 

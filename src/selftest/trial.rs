@@ -2,12 +2,12 @@
 
 use super::planted::{Draw, Kind};
 use super::scene::{Plant, Scene};
-use crate::thermal::close::Named;
-use crate::statistics::noise::NoiseModel;
 use crate::error::Result;
 use crate::plant::noise::Noise;
 use crate::plant::slow_noise::SlowNoise;
 use crate::record::ThermalRecord;
+use crate::statistics::noise::NoiseModel;
+use crate::thermal::close::Named;
 
 /// What gives a record its names.
 pub type Answer<'a> = &'a (dyn Fn(&ThermalRecord) -> Result<Vec<Named>> + Sync);

@@ -8,7 +8,7 @@ use crate::cosim::rest::rows_per_s;
 use crate::cosim::surroundings::{Moment, World};
 use crate::design::Design;
 use crate::error::{InputError, Result};
-use crate::verify::firmware::both;
+use crate::parallel::both;
 use crate::plant::noise::Noise;
 use crate::plant::profile::{Profile, Reading};
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -3,10 +3,11 @@
 //! Only the seed's own gyro is compared: with other parameters the paper says nothing.
 
 use crate::circuit::engine::ArithmeticKind;
-use crate::cosim::readings::{self, Taken, in_parallel};
+use crate::cosim::readings::{self, Taken};
 use crate::design::template::default_design;
 use crate::design::{Design, Gyro};
 use crate::error::Result;
+use crate::parallel::in_parallel;
 use crate::plant::Device;
 use serde::Serialize;
 

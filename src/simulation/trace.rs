@@ -1,15 +1,15 @@
 //! The words of the circuit's nodes from power-on, for tables and wave viewers.
 //!
 //! The codes of [`super::startup`] are run once more through fixed and float at once
-//! ([`crate::equivalence::run`]), every node keeping its words. The design is the one with the fitted
+//! ([`crate::nodes::run`]), every node keeping its words. The design is the one with the fitted
 //! compensation, so that the trace shows the whole firmware.
 
 use crate::circuit::engine::ArithmeticKind;
 use crate::design::Design;
 use crate::design::suggest;
-use crate::equivalence::node::Node;
-use crate::equivalence::run;
 use crate::error::{InputError, Result};
+use crate::nodes::node::Node;
+use crate::nodes::run;
 use crate::trace_file::{Signal, Trace, Values};
 
 /// What is traced.

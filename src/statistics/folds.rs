@@ -1,8 +1,8 @@
 //! Held-out blocks: contiguous in time, fixed by the number of rows alone.
 
+use super::weights::{self, Bins};
 use crate::numeric::polynomial;
 use crate::numeric::polynomial::LeastSquares;
-use super::weights::{self, Bins};
 use crate::statistics::stats;
 use std::ops::Range;
 

@@ -1,13 +1,6 @@
 //! Numbers that are functions of (seed, stream, index): surrogates that are the same in every run.
 
-const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
-
-/// The finaliser of splitmix64 (Steele, Lea, Flood 2014).
-const fn mix(z: u64) -> u64 {
-    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
-}
+use crate::numeric::splitmix::{GOLDEN, mix};
 
 /// One stream of numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

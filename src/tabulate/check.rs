@@ -1,11 +1,11 @@
 //! What a request of `gyrogen approx` must be like.
 
+use super::job::{Asked, Request};
 use crate::approx::form::coefficient_formats::CoefficientFormats;
 use crate::approx::form::measure::Reference;
 use crate::approx::form::polynomial;
 use crate::approx::form::polynomial::{Monomials, Scheme};
 use crate::approx::form::{Codes, piecewise};
-use super::job::{Asked, Request};
 use crate::approx::real::{Domain, Expression};
 use crate::approx::reference::Function;
 use crate::error::{InputError, Result};

@@ -1,7 +1,9 @@
 //! Forms that meet a bound, and the cheapest of them.
 
-use super::cost::{Cost, Target};
+use super::cost::Cost;
 use super::describe;
+use super::job::{self, Request};
+use super::outcome::Alternative;
 use crate::approx::form::generate;
 use crate::approx::form::generate::{MOST_BIPARTITE_CODES, MOST_SEGMENTS};
 use crate::approx::form::measure::{Effort, Measured, Reference, measure};
@@ -9,9 +11,8 @@ use crate::approx::form::polynomial::Monomials;
 use crate::approx::form::split::{Spacing, Split, Symmetry};
 use crate::approx::form::table::Kind;
 use crate::approx::form::{Codes, Form, Settled};
-use super::job::{self, Request};
-use super::outcome::Alternative;
 use crate::approx::reference::Function;
+use crate::design::target::Target;
 use crate::error::Result;
 use crate::numeric::format::Format;
 

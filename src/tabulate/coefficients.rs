@@ -1,18 +1,18 @@
 //! A polynomial's coefficients: from the search, with the bit-accurate evaluation in its loop.
 
 use super::datapath::Evaluation;
+use super::job::{self, Request, Weight};
+use super::outcome::{Compared, Search};
+use super::selection::{self, Errors, Reason};
 use crate::approx::form::coefficient_formats::CoefficientFormats;
 use crate::approx::form::measure::Reference;
 use crate::approx::form::polynomial;
 use crate::approx::form::polynomial::{Monomials, Polynomial};
 use crate::approx::form::{Codes, Form};
-use super::job::{self, Request, Weight};
-use crate::approx::minimax::search::{Effort, Found, Judged};
 use crate::approx::minimax;
+use crate::approx::minimax::search::{Effort, Found, Judged};
 use crate::approx::minimax::{Basis, Budget, CoefficientFormat, Datapath, Problem, Samples};
-use super::outcome::{Compared, Search};
 use crate::approx::reference::Function;
-use super::selection::{self, Errors, Reason};
 use crate::error::Result;
 use crate::numeric::format::Format;
 use crate::numeric::trace::ir::Interval;

@@ -1,6 +1,7 @@
 //! What a form costs: read-only memory, operations, and an estimate of cycles.
 
 use crate::approx::form::{Form, Settled};
+use crate::design::target::Target;
 use crate::emit::machine::Width;
 use crate::emit::views::entry_type;
 use crate::numeric::format::Format;
@@ -9,21 +10,6 @@ use serde::Serialize;
 
 /// Bytes of read-only memory that weigh as much as a cycle.
 const BYTES_A_CYCLE: u64 = 32;
-
-/// A processor to estimate cycles for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, clap::ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-pub enum Target {
-    /// A 64-bit processor.
-    #[default]
-    Host,
-    /// 32 bits with a single-cycle 32 x 32 -> 64 bit multiplier.
-    CortexM4,
-    /// 32 bits with a 32 x 32 -> 32 bit multiplier of many cycles and none for the upper half.
-    CortexM0,
-    /// RV32IM.
-    Riscv32,
-}
 
 /// Estimated cycles of an operation on words of 32, 64 and 128 bits.
 struct Weights {
@@ -34,19 +20,9 @@ struct Weights {
     select: u32,
 }
 
-impl Target {
-    /// As the command line and a design file spell it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Target::Host => "host",
-            Target::CortexM4 => "cortex-m4",
-            Target::CortexM0 => "cortex-m0",
-            Target::Riscv32 => "riscv32",
-        }
-    }
-
-    fn weights(self) -> Weights {
-        match self {
+impl Weights {
+    fn of(target: Target) -> Self {
+        match target {
             Target::Host => Weights {
                 multiply: [3, 3, 12],
                 add: [1, 1, 3],
@@ -113,7 +89,7 @@ impl Cost {
             cycles: 0,
         };
         for function in &program.functions {
-            count(function, &target.weights(), &mut cost);
+            count(function, &Weights::of(target), &mut cost);
         }
         cost
     }

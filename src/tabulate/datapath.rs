@@ -1,9 +1,9 @@
 //! The bit-accurate evaluation of a polynomial as the search of its coefficients sees it.
 
+use super::job::Weight;
 use crate::approx::form::measure::Reference;
 use crate::approx::form::polynomial::{Formats, Monomials, Polynomial};
 use crate::approx::form::{Codes, Form, Settled, run_in};
-use super::job::Weight;
 use crate::approx::minimax::{Datapath, Slab, Slabs};
 use crate::approx::reference::Function;
 use std::cell::RefCell;

@@ -1,11 +1,11 @@
 //! A form for the report: in words, and its data.
 
+use super::job::Request;
+use super::outcome::{Formats, TableData, Word};
 use crate::approx::form::Form;
 use crate::approx::form::polynomial::{Monomials, Scheme};
 use crate::approx::form::split::{Spacing, Split};
 use crate::approx::form::table::Kind;
-use super::job::Request;
-use super::outcome::{Formats, TableData, Word};
 use crate::numeric::arithmetic::Table as Entries;
 use crate::numeric::cast::Target as Quantised;
 

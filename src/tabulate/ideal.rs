@@ -4,11 +4,11 @@
 //! others may be better by themselves. Nobody is to take the emitted ones' own error for the least that the formats allow.
 
 use super::coefficients::BEST_NAME;
+use super::outcome::{Search, Word};
 use crate::approx::form::Form;
 use crate::approx::form::measure;
 use crate::approx::form::measure::Reference;
 use crate::approx::form::polynomial::Polynomial;
-use super::outcome::{Search, Word};
 use serde::Serialize;
 
 /// Coefficients with the least error under ideal evaluation, in the formats of the emitted ones.

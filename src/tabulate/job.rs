@@ -3,17 +3,18 @@
 use super::check;
 use super::choice::{self, Candidate, Wanted};
 use super::coefficients::{self, Chosen};
-use super::cost::{Cost, Target};
+use super::cost::Cost;
 use super::describe;
+use super::ideal;
+use super::outcome::{ErrorBounds, Outcome};
 use crate::approx::form::coefficient_formats::CoefficientFormats;
 use crate::approx::form::measure::{Effort, Measured, SAMPLE, measure};
 use crate::approx::form::polynomial;
 use crate::approx::form::polynomial::{Monomials, Polynomial, Scheme};
 use crate::approx::form::{Codes, Form, Settled, overflow};
-use super::ideal;
-use super::outcome::{ErrorBounds, Outcome};
 use crate::approx::reference::Function;
-use crate::firmware::manifest::sha256;
+use crate::design::target::Target;
+use crate::digest::sha256;
 use crate::error::{Error, InputError, Result};
 use crate::numeric::cast::Target as Quantised;
 use crate::numeric::format::Format;
@@ -25,7 +26,7 @@ pub const EXHAUSTIVE_CODES: u128 = 1 << 24;
 pub const MOST_CODES: u128 = 1 << 32;
 
 /// Which form is asked for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Asked {
     /// One polynomial.
     #[default]
@@ -39,7 +40,7 @@ pub enum Asked {
 }
 
 /// What the error is weighed with when coefficients are chosen.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Weight {
     /// The function's own unit.
     #[default]

@@ -50,7 +50,7 @@ pub struct Outcome {
     #[serde(flatten)]
     pub cost: Cost,
     /// The processor of the estimate.
-    pub target: super::cost::Target,
+    pub target: crate::design::target::Target,
     /// How the coefficients were found.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub search: Option<Search>,

@@ -4,13 +4,13 @@
 //! offset of I and Q that turns with the tone's amplitude and phase. Noise before the ADC takes it away: of the
 //! error's k-th harmonic in the input it leaves exp(-2 pi^2 k^2 sigma^2), sigma in LSB (Widrow & Kollár 2008, ch. 19).
 
-use crate::statistics::normal;
 use crate::circuit::demodulator::Mixer;
 use crate::circuit::nco::Oscillator;
 use crate::design::Design;
 use crate::numeric::arithmetic::{Arithmetic, Block};
 use crate::numeric::fixed::Fixed;
 use crate::numeric::format::pow2;
+use crate::statistics::normal;
 use std::f64::consts::{PI, TAU};
 
 /// Most phases of the oscillator that are followed one by one.

@@ -4,9 +4,9 @@ use super::*;
 use crate::circuit::CHANNELS;
 use crate::circuit::engine::{ArithmeticKind, Rows, columns, engine};
 use crate::circuit::scale::amplitude_lsb_per_magnitude;
-use crate::statistics::random::Stream;
 use crate::design::reader;
 use crate::numeric::format::Format;
+use crate::statistics::random::Stream;
 
 /// An ADC of few bits, and an oscillator that samples `count` phases.
 fn design(adc: &str, count: u32) -> Design {

@@ -8,11 +8,11 @@
 
 use super::adc_rounding::{Rounding, phases, rms_lsb};
 use super::channels::{self, Channels};
-use crate::statistics::reml;
 use super::search::{Effort, declared_by, powers};
 use crate::circuit::scale::{amplitude_lsb_per_magnitude, sense_lsb_dps};
 use crate::design::Design;
 use crate::record::Warning;
+use crate::statistics::reml;
 use crate::statistics::stats;
 use std::collections::BTreeMap;
 

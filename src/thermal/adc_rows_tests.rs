@@ -1,10 +1,10 @@
 //! Records with an error that is known.
 
 use super::*;
-use crate::thermal::intake::channels_of;
-use crate::thermal::synthetic::{Random, record, triangle};
 use crate::design::reader;
 use crate::record::ThermalRecord;
+use crate::thermal::intake::channels_of;
+use crate::thermal::synthetic::{Random, record, triangle};
 
 const ROWS: usize = 240;
 

@@ -2,21 +2,21 @@
 //! (`docs/manual.md`, "Thermal records"; eq. 9 of the seed paper where the thermometer is the phase).
 
 use super::checks::{self, Checked};
-use crate::statistics::folds;
-use crate::statistics::folds::Sample;
-use crate::statistics::correlation;
-use crate::statistics::correlation::NoiseModel;
 use super::order::{self, OrderTrial};
-use crate::numeric::polynomial;
 use super::sweep::{self, Loop};
-use crate::statistics::weights;
-use crate::statistics::weights::{BINS, Bins};
 use crate::design::{FitOptions, FitOrder, RecordMapping};
 use crate::error::{InputError, Result};
+use crate::numeric::polynomial;
 use crate::record::columns::{self, THERMOMETERS};
 use crate::record::thermal::LEAST_ROWS;
 use crate::record::{ThermalRecord, Warning};
+use crate::statistics::correlation;
+use crate::statistics::correlation::NoiseModel;
+use crate::statistics::folds;
+use crate::statistics::folds::Sample;
 use crate::statistics::stats;
+use crate::statistics::weights;
+use crate::statistics::weights::{BINS, Bins};
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 

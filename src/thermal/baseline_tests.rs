@@ -1,9 +1,9 @@
 //! The fit against records whose truth is known.
 
 use super::baseline::{BaselineFit, fit};
-use crate::numeric::polynomial::evaluate;
 use super::synthetic::{Random, few, options, record, triangle};
 use crate::design::{FitOrder, RecordMapping};
+use crate::numeric::polynomial::evaluate;
 use nalgebra::DVector;
 
 const TRUTH: [f64; 3] = [1.5, -0.8, 0.35];

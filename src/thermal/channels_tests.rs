@@ -1,8 +1,8 @@
 //! What stands for channels with holes, and which way a temperature goes.
 
 use super::channels::{Channels, filled};
-use crate::statistics::smooth::{averaged, reading_noise, smoothed};
 use super::synthetic::Random;
+use crate::statistics::smooth::{averaged, reading_noise, smoothed};
 use crate::statistics::stats;
 use std::collections::BTreeMap;
 

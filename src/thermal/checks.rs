@@ -5,11 +5,11 @@
 //! heated. Each check is a warning with its figures; none stops the fit.
 
 use super::baseline::BaselineFit;
-use crate::statistics::folds::Sample;
 use super::sweep::Loop;
-use crate::statistics::weights::BINS;
 use crate::record::Warning;
+use crate::statistics::folds::Sample;
 use crate::statistics::stats;
+use crate::statistics::weights::BINS;
 
 /// A Celsius thermometer that moved by less than this, K, cannot carry a temperature law.
 pub const LEAST_SPAN_K: f64 = 5.0;

@@ -8,14 +8,14 @@ use super::channels::Channels;
 use super::effects::{Candidate, user};
 pub use super::intake::channels_of;
 use super::intake::{refused, without_glitches};
-use crate::statistics::blocks::Split;
 use super::search::{Effort, Found, Model, Search};
-use crate::verdict::{Closure, Errors, FirmwareErrors, SCHEMA, Step, Structure, Verdict};
 use crate::correction::Correction;
 use crate::design::Design;
 use crate::error::Result;
 use crate::record::{ThermalRecord, Warning, condensed};
+use crate::statistics::blocks::Split;
 use crate::statistics::stats;
+use crate::verdict::{Closure, Errors, FirmwareErrors, SCHEMA, Step, Structure, Verdict};
 use std::sync::Arc;
 
 /// A closed record, with what a report shows.
@@ -140,7 +140,7 @@ pub fn close(
             .map_or_else(FirmwareErrors::default, |f| f.errors);
         closure.warnings = warnings;
         closure.command = command.to_owned();
-        closure.design_sha256 = crate::firmware::manifest::sha256(design.source.text.as_bytes());
+        closure.design_sha256 = crate::digest::sha256(design.source.text.as_bytes());
         (closure, before, after, accidents, firmware)
     };
     let (correction, firmware_dps) = firmware.map(|f| (f.correction, f.residual_dps)).unzip();

@@ -4,8 +4,8 @@ use super::channels::lag;
 use super::close::close;
 use super::search::Effort;
 use super::synthetic::{self, Random};
-use crate::verdict::{Closure, Fate, Step};
 use crate::design::reader;
+use crate::verdict::{Closure, Fate, Step};
 
 const ROWS: usize = 900;
 const NOISE_DPS: f64 = 0.01;

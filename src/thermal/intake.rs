@@ -7,12 +7,12 @@ use super::holes;
 use super::quadrature;
 use super::quantised::{self, Course};
 use super::repeated;
-use crate::statistics::weights;
 use crate::design::{Design, Gyro, RecordMapping};
 use crate::error::{InputError, Result};
 use crate::record::columns::THERMOMETERS;
 use crate::record::{ThermalRecord, Warning};
 use crate::statistics::stats;
+use crate::statistics::weights;
 use std::collections::BTreeMap;
 
 /// The bias model's thermometer in a record, if it has one: the first in the contract's order that has at least half as many

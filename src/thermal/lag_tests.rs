@@ -4,9 +4,9 @@ use super::channels::lag;
 use super::close::{Closed, close};
 use super::search::{Effort, Search};
 use super::synthetic::{self, Random, triangle};
-use crate::verdict::Step;
 use crate::correction::Term;
 use crate::design::reader;
+use crate::verdict::Step;
 use std::ops::Range;
 
 const ROWS: usize = 600;

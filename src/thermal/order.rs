@@ -1,8 +1,8 @@
 //! The polynomial's order: as asked for, or by held-out error.
 
+use crate::design::FitOrder;
 use crate::statistics::folds;
 use crate::statistics::folds::{HeldOut, Sample};
-use crate::design::FitOrder;
 use crate::statistics::stats;
 use std::ops::Range;
 

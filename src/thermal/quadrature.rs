@@ -7,9 +7,9 @@
 //! then the applied rate does not stand in the quadrature.
 
 use super::channels::Channels;
-use crate::statistics::linear::dot;
 use super::search::declared_by;
 use crate::record::Warning;
+use crate::statistics::linear::dot;
 use crate::statistics::stats;
 
 /// The channel.

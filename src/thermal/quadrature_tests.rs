@@ -1,12 +1,12 @@
 //! A quadrature that contains the output is told from one that leaks into it.
 
 use super::*;
+use crate::design::reader;
+use crate::record::ThermalRecord;
 use crate::thermal::close::close;
 use crate::thermal::intake::channels_of;
 use crate::thermal::search::Effort;
 use crate::thermal::synthetic::{Random, record, triangle};
-use crate::design::reader;
-use crate::record::ThermalRecord;
 
 const ROWS: usize = 240;
 const NOISE_DPS: f64 = 0.02;

@@ -8,9 +8,9 @@
 
 use super::channels::Channels;
 use super::search::declared_by;
-use crate::statistics::smooth::averaged;
 use super::staircase::Staircase;
 use crate::design::Design;
+use crate::statistics::smooth::averaged;
 use crate::statistics::stats;
 use std::f64::consts::TAU;
 

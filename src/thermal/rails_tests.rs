@@ -1,13 +1,13 @@
 //! Rails: where the output stands still, and where it only seems to.
 
 use super::*;
-use crate::thermal::close::{Closed, close};
+use crate::design::reader;
 use crate::statistics::reml;
+use crate::thermal::close::{Closed, close};
 use crate::thermal::search::{Effort, Search, Term};
 use crate::thermal::synthetic;
 use crate::thermal::synthetic::{Random, triangle};
 use crate::verdict::Fate;
-use crate::design::reader;
 use std::collections::BTreeMap;
 
 const UPPER_DPS: f64 = 70.123;

@@ -1,11 +1,11 @@
 //! Thermometers that repeat their readings, and such that do not although it looks so.
 
 use super::*;
+use crate::design::reader;
+use crate::record::ThermalRecord;
 use crate::thermal::close::close;
 use crate::thermal::search::Effort;
 use crate::thermal::synthetic::{Random, record, triangle};
-use crate::design::reader;
-use crate::record::ThermalRecord;
 
 const ROWS: usize = 600;
 

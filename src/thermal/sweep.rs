@@ -1,9 +1,9 @@
 //! Rising against falling thermometer: the loop that no function of the reading can follow.
 
-use crate::statistics::folds::Sample;
+use crate::numeric::polynomial;
 use crate::statistics::correlation;
 use crate::statistics::correlation::NoiseModel;
-use crate::numeric::polynomial;
+use crate::statistics::folds::Sample;
 use crate::statistics::weights::{BINS, Bins};
 use nalgebra::DMatrix;
 

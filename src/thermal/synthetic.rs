@@ -2,6 +2,7 @@
 
 use super::channels::Channels;
 use crate::design::{FitOptions, FitOrder};
+use crate::numeric::splitmix::{GOLDEN, mix};
 use crate::record::ThermalRecord;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -15,11 +16,8 @@ impl Random {
     }
 
     fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
+        self.0 = self.0.wrapping_add(GOLDEN);
+        mix(self.0)
     }
 
     /// Within (0, 1).

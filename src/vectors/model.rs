@@ -1,9 +1,9 @@
 //! The bit-accurate model of each emitted function without state, as something that can be called.
 
 use crate::circuit::chain::Chain;
+use crate::circuit::compensate::Compensate;
 use crate::circuit::compensation::{Bias, Evaluation, Rate};
 use crate::design::{Compensation, Design};
-use crate::emit::bundle::Compensate;
 use crate::numeric::arithmetic::Block;
 use crate::numeric::cast::Cast;
 use crate::numeric::fixed::Fixed;
@@ -186,7 +186,7 @@ pub fn models(design: &Design, program: &Program) -> Vec<Model> {
 }
 
 fn of_chain<const N: usize>(chain: &Chain<N>, design: &Design, program: &Program) -> Vec<Model> {
-    let alone = crate::emit::bundle::compensation_alone(design);
+    let alone = crate::circuit::compensate::compensation_alone(design);
     let compensation = chain.compensation.clone().or(alone);
     let variants = program
         .functions
@@ -219,7 +219,7 @@ fn of_chain<const N: usize>(chain: &Chain<N>, design: &Design, program: &Program
             ("rate", Some((_, rate))) => Model::new(function, rate.clone(), narrow)
                 .with_damage(nudged(rate, Rate::casts_mut), narrow),
             ("in_range", _) => {
-                let Some(flag) = crate::emit::bundle::in_range(design) else {
+                let Some(flag) = crate::circuit::compensate::in_range(design) else {
                     continue;
                 };
                 Model::new(function, flag, narrow)
@@ -252,7 +252,7 @@ pub fn sensitive_inputs(design: &Design, candidates: &[i128]) -> Vec<i128> {
     let nominal = Bias::new(&design.circuit, compensation);
     let mut inputs = Vec::new();
     if let Evaluation::Form(form) = &nominal.evaluation {
-        for damaged in crate::firmware::approximation::damaged(form) {
+        for damaged in super::form::damaged(form) {
             let mut other = nominal.clone();
             other.evaluation = Evaluation::Form(Box::new(damaged));
             let differs = |x: &&i128| evaluate(&other, **x) != evaluate(&nominal, **x);

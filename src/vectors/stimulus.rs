@@ -4,6 +4,11 @@
 use crate::design::Design;
 use crate::numeric::trace::ir::Interval;
 
+/// Seed of everything that a bundle's tests draw.
+pub const SEED: u64 = 2004;
+/// Inputs of at most this many bits are compared exhaustively.
+pub const EXHAUSTIVE_BITS: u32 = 24;
+
 /// The multiplier and increment of Knuth's MMIX generator; the emitted self-test uses the same.
 pub const LCG: (u64, u64) = (6_364_136_223_846_793_005, 1_442_695_040_888_963_407);
 

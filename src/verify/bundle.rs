@@ -3,10 +3,10 @@
 use super::compare::{self, Compared};
 use super::target::{self, Target};
 use super::toolchain;
-use crate::firmware::manifest;
-use crate::firmware::manifest::Manifest;
 use crate::emit::views::Language;
 use crate::error::{InputError, Result, io_error};
+use crate::firmware::manifest;
+use crate::firmware::manifest::Manifest;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -178,7 +178,7 @@ fn read_manifest(folder: &Path) -> Result<Manifest> {
 fn changed(manifest: &Manifest, folder: &Path) -> Vec<String> {
     let differs = |file: &&manifest::FileEntry| {
         let bytes = std::fs::read(folder.join(&file.path));
-        bytes.map_or(true, |b| manifest::sha256(&b) != file.sha256)
+        bytes.map_or(true, |b| crate::digest::sha256(&b) != file.sha256)
     };
     let files = manifest.files.iter().filter(differs);
     files.map(|file| file.path.clone()).collect()

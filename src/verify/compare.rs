@@ -1,19 +1,16 @@
 //! Runs emitted code beside the model and finds the first difference.
 
-use crate::vectors::model;
-use crate::vectors::model::Model;
-use crate::vectors::stimulus;
 use super::toolchain::Harness;
-use crate::circuit::engine::{self, ArithmeticKind};
 use crate::design::Design;
 use crate::emit::bundle::Bundle;
-use crate::firmware::files::{SEED, saturating_rows};
 use crate::emit::views::{self, Language};
 use crate::error::Result;
+use crate::vectors::model;
+use crate::vectors::model::Model;
+use crate::vectors::rows::expected_rows;
+use crate::vectors::stimulus::{self, EXHAUSTIVE_BITS, SEED};
 use serde::Serialize;
 
-/// Inputs of at most this many bits are compared exhaustively.
-pub const EXHAUSTIVE_BITS: u32 = 24;
 /// Random inputs of a function that is not compared exhaustively.
 const RANDOM_INPUTS: usize = 1 << 18;
 /// ADC samples of the chain's comparison.
@@ -309,25 +306,6 @@ pub fn chain(
     let mut compared = chain_rows(language, harness, drive, sense, &rows)?;
     compared.inputs = drive.len() as u64;
     Ok(compared)
-}
-
-/// The model's rows, each with the number of the fault so far as its last word.
-pub fn expected_rows(design: &Design, drive: &[i32], sense: &[i32]) -> Vec<Vec<i128>> {
-    let columns = engine::columns(design).len();
-    let ratio = design.circuit.decimator.ratio as u64;
-    let mut watching = engine::engine(design, ArithmeticKind::Fixed);
-    let mut rows = watching.no_rows();
-    let stopped = watching.process(drive, sense, &mut rows).err();
-    saturating_rows(design, drive, sense)
-        .chunks_exact(columns)
-        .enumerate()
-        .map(|(k, row)| {
-            let end = (k as u64 + 1) * ratio;
-            let noted = stopped.as_ref().filter(|o| o.sample < end);
-            let fault = noted.map_or(0, |o| o.cast + 1);
-            row.iter().copied().chain([fault as i128]).collect()
-        })
-        .collect()
 }
 
 /// Compares the chain with given rows, each with the fault as its last word.

@@ -2,10 +2,11 @@
 
 use crate::design::Design;
 use crate::emit::bundle::{Bundle, Part};
-use crate::firmware::files;
-use crate::firmware::files::EmittedFile;
 use crate::emit::views::Language;
 use crate::error::{Result, io_error};
+use crate::firmware::files;
+use crate::firmware::files::EmittedFile;
+use crate::parallel::both;
 use crate::verify::compare::{self, Compared};
 use crate::verify::toolchain::{self, Harness};
 use std::path::Path;
@@ -172,17 +173,5 @@ fn built(files: Vec<EmittedFile>, language: Language, prefix: &str) -> Result<Bu
         files,
         harness,
         _folder: folder,
-    })
-}
-
-/// Two jobs side by side; what they give does not depend on which ends first.
-pub(crate) fn both<T: Send>(a: impl FnOnce() -> T + Send, b: impl FnOnce() -> T + Send) -> (T, T) {
-    std::thread::scope(|scope| {
-        let second = scope.spawn(b);
-        let first = a();
-        match second.join() {
-            Ok(second) => (first, second),
-            Err(panic) => std::panic::resume_unwind(panic),
-        }
     })
 }

@@ -4,6 +4,7 @@
 
 pub mod bundle;
 pub mod compare;
+pub mod correction;
 pub mod firmware;
 pub mod target;
 pub mod toolchain;

@@ -19,7 +19,7 @@ const RUNTIME: [(&str, &str); 5] = [
 ];
 
 /// A processor to verify for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Target {
     /// This machine.
     #[default]

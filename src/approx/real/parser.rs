@@ -9,8 +9,8 @@ use dashu_int::IBig;
 
 use super::expression::{Expression, Function, Kind, pi};
 use super::interval::Interval;
-use crate::design::suggest::nearest;
 use crate::error::{InputError, Result};
+use crate::nearest::nearest;
 
 /// Longest text, in bytes.
 const LONGEST: usize = 4000;

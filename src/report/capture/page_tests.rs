@@ -3,9 +3,9 @@
 use super::*;
 use crate::capture::closed;
 use crate::capture::input::Capture;
-use crate::thermal::synthetic::Random;
 use crate::design::reader;
 use crate::record::capture_meta::CaptureMeta;
+use crate::thermal::synthetic::Random;
 use std::f64::consts::TAU;
 
 const ROWS: usize = 12_000;

@@ -2,9 +2,9 @@
 
 use crate::capture::Closed;
 use crate::capture::input::Part;
-use crate::verdict::Closure;
 use crate::report::closure::tables::{TakenStep, next, probability, value, with_deviation};
 use crate::report::text::{fixed, grouped, significant};
+use crate::verdict::Closure;
 
 /// What happens, and the equation, of an effect of the contract.
 fn sheet(id: &str) -> [&'static str; 2] {

@@ -1,7 +1,7 @@
 //! What each step of a closure adds to the output, row by row, and how sure that is.
 
-use crate::thermal::channels::Channels;
 use crate::statistics::linear::add_scaled;
+use crate::thermal::channels::Channels;
 use crate::thermal::search::Model;
 use crate::thermal::search::estimate::{Covariance, Tangent, tangents};
 

@@ -2,8 +2,8 @@
 
 use super::contribution::Contribution;
 use super::view::View;
-use crate::verdict::Step;
 use crate::report::axis::{Axis, Interval};
+use crate::verdict::Step;
 
 /// The abscissa of a step's figure.
 pub struct Abscissa {

@@ -4,11 +4,11 @@
 use super::contribution::Contribution;
 use super::view::{DRAWN, View, scatter, thin};
 use super::{allan, curve};
-use crate::thermal::channels::range;
 use crate::report::axis::{Axis, Interval};
 use crate::report::figures::Figure;
 use crate::report::svg::{Frame, Shape, Svg, Swatch};
 use crate::report::text::significant;
+use crate::thermal::channels::range;
 
 /// Width of a figure, px.
 const WIDTH: f64 = 960.0;

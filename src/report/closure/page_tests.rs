@@ -1,10 +1,10 @@
 //! The page of records that are made up.
 
 use super::*;
+use crate::design::reader;
 use crate::thermal::close::close;
 use crate::thermal::search::Effort;
 use crate::thermal::synthetic::{Random, record, triangle};
-use crate::design::reader;
 
 const EFFORT: Effort = Effort {
     rows: 400,

@@ -1,11 +1,11 @@
 //! A closure in words and tables.
 
 use super::view::View;
+use crate::report::text::{fixed, grouped, minus, significant, trimmed};
+use crate::statistics::stats;
 use crate::thermal::close::Closed;
 use crate::thermal::effects::Sheet;
 use crate::verdict::{Closure, Errors, Fate, Step, Verdict};
-use crate::statistics::stats;
-use crate::report::text::{fixed, grouped, minus, significant, trimmed};
 
 /// A step as the page shows it.
 #[derive(Debug, Clone, PartialEq)]

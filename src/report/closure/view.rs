@@ -1,13 +1,13 @@
 //! What the figures of a closure have in common: residuals, the readings that are drawn, axes.
 
 use super::contribution::{self, Contribution};
-use crate::thermal::channels::range;
-use crate::thermal::close::Closed;
 use crate::record::columns::unit_of;
-use crate::statistics::stats;
 use crate::report::axis::{Axis, Interval};
 use crate::report::svg::{Frame, Shape};
 use crate::report::text::grouped;
+use crate::statistics::stats;
+use crate::thermal::channels::range;
+use crate::thermal::close::Closed;
 
 /// Points of a series up to which each is drawn.
 pub const DRAWN: usize = 600;

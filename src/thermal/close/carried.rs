@@ -1,11 +1,11 @@
 //! What firmware carries of a closed record's model.
 
 use super::Told;
-use crate::thermal::firmware;
 use crate::correction::{Formats, Plan, Term};
 use crate::design::Design;
 use crate::record::{ThermalRecord, Warning};
 use crate::statistics::stats;
+use crate::thermal::firmware;
 
 /// A held-out error that is so many times another one is more: that of firmware beside the model's, or the declared one's.
 const MORE: f64 = 1.02;
@@ -125,10 +125,10 @@ impl Told<'_> {
 #[cfg(test)]
 mod tests {
     use super::MORE;
+    use crate::design::reader;
     use crate::thermal::close::close;
     use crate::thermal::search::Effort;
     use crate::thermal::synthetic::{Random, record, triangle};
-    use crate::design::reader;
 
     /// The full scale of the correction of a record with rates up to `most_dps` in noise of `noise_dps`, and how many times the
     /// model's held-out error its firmware leaves. The scale factor bends by `bend_ppm` a kelvin squared.

@@ -1,8 +1,8 @@
 //! What is said beside a closed record's figures.
 
 use super::Told;
-use crate::thermal::search::LEVEL;
 use crate::record::Warning;
+use crate::thermal::search::LEVEL;
 
 impl Told<'_> {
     /// All of it but what firmware has to say.

@@ -1,8 +1,8 @@
 //! Auxiliary columns: any one of them may be a cause, by a smooth function of it.
 
 use super::{Bias, Candidate, Estimate, Missing, Point, Reported, Sheet, entry};
-use crate::thermal::channels::{Channels, lag, scaled};
 use crate::record::columns::is_known;
+use crate::thermal::channels::{Channels, lag, scaled};
 
 /// A candidate for each auxiliary column that moves, and for thermometers beside the model's own.
 pub fn all(c: &Channels) -> Vec<Box<dyn Candidate>> {

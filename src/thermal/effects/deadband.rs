@@ -9,9 +9,9 @@ use super::{
     Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, entry, from_log, map,
     spaced,
 };
+use crate::statistics::stats;
 use crate::thermal::channels::Channels;
 use crate::thermal::search::declared_by;
-use crate::statistics::stats;
 
 /// Dead zone around rate zero.
 pub(super) struct Deadband;

@@ -4,10 +4,10 @@ use super::{
     Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, UNUSUAL, entry, gain,
     map, moving, spaced,
 };
+use crate::correction::Term;
+use crate::statistics::linear::Basis;
 use crate::thermal::channels::Channels;
 use crate::thermal::firmware::Words;
-use crate::statistics::linear::Basis;
-use crate::correction::Term;
 
 /// All of this file.
 pub fn all(c: &Channels) -> Vec<Box<dyn Candidate>> {

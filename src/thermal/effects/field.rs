@@ -4,10 +4,10 @@ use super::{
     Bias, Candidate, Estimate, MOST_BENT, Missing, Parameter, Point, Reported, Sheet, gain, map,
     moving, product,
 };
-use crate::thermal::channels::{Channels, mean, scaled};
-use crate::thermal::firmware::Words;
 use crate::correction::Term;
 use crate::statistics::stats;
+use crate::thermal::channels::{Channels, mean, scaled};
+use crate::thermal::firmware::Words;
 
 /// All of this file.
 pub fn all() -> Vec<Box<dyn Candidate>> {

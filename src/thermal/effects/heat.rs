@@ -5,12 +5,12 @@ use super::{
     Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, UNUSUAL, entry,
     from_log, gain, heated, map, spaced,
 };
-use crate::thermal::channels::{Channels, lag};
-use crate::thermal::firmware::{Trial, Words, knots};
+use crate::correction::Term;
 use crate::statistics::linear::add_scaled;
 use crate::statistics::smooth::slope;
 use crate::statistics::trend;
-use crate::correction::Term;
+use crate::thermal::channels::{Channels, lag};
+use crate::thermal::firmware::{Trial, Words, knots};
 
 /// All of this file.
 pub fn all() -> Vec<Box<dyn Candidate>> {

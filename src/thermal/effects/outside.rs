@@ -5,9 +5,9 @@
 
 use super::covariate::spline;
 use super::{Bias, Candidate, Estimate, Missing, Point, Reported, Sheet, gain, map, product};
-use crate::thermal::channels::{Channels, lag, scaled};
-use crate::statistics::linear::Basis;
 use crate::record::columns::is_known;
+use crate::statistics::linear::Basis;
+use crate::thermal::channels::{Channels, lag, scaled};
 
 /// What the shape is of.
 #[derive(Debug, Clone, PartialEq)]

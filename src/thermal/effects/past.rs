@@ -1,9 +1,9 @@
 //! Effects of heat's history in firmware, which has no readings to come: lags and differences that come nearest.
 
+use crate::correction::Term;
+use crate::statistics::linear::{Basis, add_scaled, dot};
 use crate::thermal::channels::Channels;
 use crate::thermal::firmware::{Trial, Words};
-use crate::statistics::linear::{Basis, add_scaled, dot};
-use crate::correction::Term;
 
 /// Time constants, in periods of the firmware, of a second lag beside a lag.
 const SHORTER: [f64; 6] = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0];

@@ -5,9 +5,9 @@ use super::{
     Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, entry, gain, heated,
     map, moving, product,
 };
+use crate::correction::Term;
 use crate::thermal::channels::{Channels, range};
 use crate::thermal::firmware::Words;
-use crate::correction::Term;
 
 /// All of this file.
 pub fn all() -> Vec<Box<dyn Candidate>> {

@@ -4,9 +4,9 @@ use super::switching::{at_jumps, ends, levels, thresholds};
 use super::{
     Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, entry, gain, heated, map,
 };
+use crate::correction::Term;
 use crate::thermal::channels::Channels;
 use crate::thermal::firmware::{Words, knots};
-use crate::correction::Term;
 
 /// All of this file.
 pub fn all() -> Vec<Box<dyn Candidate>> {

@@ -1,14 +1,14 @@
 //! A bias that steps at a temperature, closed: where the firmware's relay switches.
 
 use super::{Bias, Candidate, Point, at_jumps};
+use crate::correction::Term;
+use crate::design::reader;
 use crate::thermal::channels::Channels;
 use crate::thermal::close::close;
 use crate::thermal::effects::Reported;
 use crate::thermal::search::{Effort, Search};
 use crate::thermal::synthetic;
 use crate::thermal::synthetic::Random;
-use crate::correction::Term;
-use crate::design::reader;
 use std::collections::BTreeMap;
 
 /// Held-out error of the firmware over the model's, and the relay's centre (degC) and gap (K): stairs of 5 K, up and

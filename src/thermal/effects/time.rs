@@ -4,9 +4,9 @@ use super::{
     Bias, Candidate, Estimate, Missing, Parameter, Point, Reported, Sheet, UNUSUAL, entry,
     from_log, gain, map, spaced,
 };
+use crate::correction::Term;
 use crate::thermal::channels::{Channels, range};
 use crate::thermal::firmware::Words;
-use crate::correction::Term;
 
 /// All of this file.
 pub fn all() -> Vec<Box<dyn Candidate>> {

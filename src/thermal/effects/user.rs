@@ -4,11 +4,11 @@
 
 use super::{Bias, Candidate, Estimate, Missing, Point, Reported, Sheet, entry, gain};
 use crate::approx::real::formula::Operand;
-use crate::thermal::channels::{Channels, range};
-use crate::thermal::firmware::{Words, knots, sees};
-use crate::statistics::linear::{Basis, dot};
 use crate::correction::Term;
 use crate::design::UserEffect;
+use crate::statistics::linear::{Basis, dot};
+use crate::thermal::channels::{Channels, range};
+use crate::thermal::firmware::{Words, knots, sees};
 
 /// Most points of the grid over all axes, and those that it starts from.
 const MOST_POINTS: [usize; 3] = [400, 20, 7];

@@ -1,13 +1,13 @@
 //! The emitted correction, built with the host's compilers, beside the model's block on the record.
 
 use super::stream;
+use crate::error::Result;
+use crate::firmware::files::EmittedFile;
+use crate::record::{ThermalRecord, condensed};
 use crate::thermal::close::Closed;
 use crate::verdict::Closure;
-use crate::correction::Firmware;
-use crate::firmware::files::EmittedFile;
-use crate::error::Result;
-use crate::record::{ThermalRecord, condensed};
 use crate::verify::compare::Compared;
+use crate::verify::correction::Firmware;
 use serde::Serialize;
 
 /// What came of the comparison. Where nothing differs, the held-out errors of

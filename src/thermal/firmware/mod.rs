@@ -9,13 +9,13 @@ pub use trial::Trial;
 
 use super::channels::{Channels, scaled};
 use super::effects::{Bias, Estimate};
-use crate::statistics::linear::{Basis, dot};
 use super::search::Model;
-use crate::verdict::FirmwareErrors;
 use crate::correction::{Correction, Formats, Input, Plan, Reading, Term, readings};
 use crate::error::Result;
 use crate::record::ThermalRecord;
+use crate::statistics::linear::{Basis, dot};
 use crate::statistics::stats;
+use crate::verdict::FirmwareErrors;
 
 /// Columns that firmware sees by itself.
 const SEEN: [&str; 6] = [

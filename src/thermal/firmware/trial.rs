@@ -2,8 +2,8 @@
 
 use super::Words;
 use super::clock;
-use crate::thermal::channels::Channels;
 use crate::correction::{Correction, Input, Plan, Reading, Term};
+use crate::thermal::channels::Channels;
 
 /// An input as the firmware reads it, period by period.
 pub struct Trial {

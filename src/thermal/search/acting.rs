@@ -9,9 +9,9 @@
 //! are in small matrices ([`normal`]).
 
 use super::declared;
+use crate::statistics::linear::{add_scaled, dots, normal};
 use crate::thermal::channels::Channels;
 use crate::thermal::effects::{Bias, Candidate, Point};
-use crate::statistics::linear::{add_scaled, dots, normal};
 use nalgebra::{DMatrix, DVector};
 
 /// Most turns, and the share by which the bias still moves in the last.

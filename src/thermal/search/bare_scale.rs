@@ -2,8 +2,8 @@
 //! bends with the rate, and is neither.
 
 use super::{Found, Search, Term};
-use crate::thermal::effects::{Candidate, Point, outside};
 use crate::statistics::Unusable;
+use crate::thermal::effects::{Candidate, Point, outside};
 use std::sync::Arc;
 
 /// Net log-likelihood that a name has to bring beside the shape without a name that it has in it.

@@ -112,9 +112,9 @@ fn stretches(columns: &[Vec<f64>]) -> Vec<std::ops::Range<usize>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::statistics::blocks::Split;
     use crate::thermal::channels::Channels;
     use crate::thermal::effects::{Candidate, Point};
-    use crate::statistics::blocks::Split;
     use crate::thermal::search::Effort;
     use crate::thermal::synthetic::{Pull, Random, triangle};
     use std::collections::BTreeMap;

@@ -2,9 +2,9 @@
 
 use super::Search;
 use super::judge::Judged;
+use crate::statistics::linear::{Basis, add_scaled, dot};
 use crate::thermal::channels::{Channels, range};
 use crate::thermal::effects::Bias;
-use crate::statistics::linear::{Basis, add_scaled, dot};
 
 /// The regressors of the declared model: 1, u, u^2.
 pub fn declared(c: &Channels) -> Vec<Vec<f64>> {

@@ -1,10 +1,10 @@
 //! Parameters of the terms with their standard deviations.
 
 use super::{Model, Search, Term, declared};
-use crate::thermal::channels::Channels;
-use crate::thermal::effects::Estimate;
 use crate::statistics::linear::{Basis, add_scaled};
 use crate::statistics::whiten::Whitener;
+use crate::thermal::channels::Channels;
+use crate::thermal::effects::Estimate;
 use nalgebra::DMatrix;
 use std::ops::Range;
 

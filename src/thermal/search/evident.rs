@@ -2,8 +2,8 @@
 
 use super::judge::PRICE;
 use super::{Model, Search, Term};
-use crate::thermal::effects::{Candidate, Point};
 use crate::statistics::Unusable;
+use crate::thermal::effects::{Candidate, Point};
 use std::sync::Arc;
 
 /// Log-likelihood that a level opposite to a rail has to bring: other effects are not in yet.

@@ -2,8 +2,8 @@
 //! rows about those means show them.
 
 use super::tones::{Tone, power};
-use crate::thermal::channels::Channels;
 use crate::statistics::robust;
+use crate::thermal::channels::Channels;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 use std::f64::consts::{LN_2, TAU};

@@ -4,9 +4,9 @@ use super::judge::{Judged, PRICE, Round};
 use super::memo::Memo;
 use super::otherwise::Due;
 use super::{Found, LEVEL, MOST_RIVALS, Model, Search, Term};
-use crate::thermal::effects::Candidate;
 use crate::statistics::robust::ACCIDENT;
 use crate::statistics::{Unusable, reml};
+use crate::thermal::effects::Candidate;
 use std::sync::Arc;
 
 /// By how much net gain a shape without a name has to be better than the best name.

@@ -2,11 +2,11 @@
 
 use super::judge::{EQUAL, Judged, PRICE};
 use super::{Model, Search, Term, declared};
-use crate::thermal::effects::{Candidate, Point};
 use crate::statistics::Unusable;
 use crate::statistics::linear::{Basis, add_scaled, dot};
 use crate::statistics::random::Stream;
 use crate::statistics::whiten::Whitener;
+use crate::thermal::effects::{Candidate, Point};
 use crate::thermal::rails;
 use crate::thermal::rails::Rails;
 

@@ -3,14 +3,14 @@
 use super::refine::{self, Profiled};
 use super::tones::Tone;
 use super::{LEVEL, MOST_RIVALS, Model, Search, fast, tones};
-use crate::thermal::channels::Channels;
-use crate::thermal::effects::tone::{Pickup, returns};
-use crate::thermal::effects::{Candidate, Missing, Point};
 use crate::statistics::candidates::{Grid, Group};
 use crate::statistics::noise::Shape;
 use crate::statistics::reml::Fit;
 use crate::statistics::score;
 use crate::statistics::score::Scores;
+use crate::thermal::channels::Channels;
+use crate::thermal::effects::tone::{Pickup, returns};
+use crate::thermal::effects::{Candidate, Missing, Point};
 use std::sync::Arc;
 
 /// What a coefficient or parameter costs in log-likelihood when explanations are compared.

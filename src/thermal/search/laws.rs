@@ -8,8 +8,8 @@
 use super::forward::STRANGER;
 use super::judge::Judged;
 use super::{Model, Search, Term};
-use crate::thermal::effects::MOST_BENT;
 use crate::statistics::Unusable;
+use crate::thermal::effects::MOST_BENT;
 
 /// Share of what a shape without a name explains, in squares, that a law of its channel may be short of; the same of what a law
 /// explains, up to which it is the law's own bend. A second name may be a cause of its own: a smaller share.

@@ -47,6 +47,7 @@ pub mod validate;
 
 use super::channels::Channels;
 use super::effects::{self, Bias, Candidate, Missing, Point};
+use super::rails::{self, Rails};
 use crate::statistics::Unusable;
 use crate::statistics::blocks::Split;
 use crate::statistics::linear::add_scaled;
@@ -54,7 +55,6 @@ use crate::statistics::reml;
 use crate::statistics::reml::Fit;
 use crate::statistics::robust::ACCIDENT;
 use crate::statistics::tail::Tail;
-use super::rails::{self, Rails};
 use acting::Settling;
 use clip::{Kind, clip};
 pub use declared::{declared, declared_by, powers, weighted};

@@ -1,10 +1,10 @@
 //! The declared model with terms, fitted: what it explains, and what shows beside it.
 
 use super::{Term, declared};
-use crate::thermal::channels::Channels;
-use crate::thermal::effects::Bias;
 use crate::statistics::linear::add_scaled;
 use crate::statistics::reml::Fit;
+use crate::thermal::channels::Channels;
+use crate::thermal::effects::Bias;
 
 /// The declared model with terms, fitted on training rows.
 #[derive(Clone)]

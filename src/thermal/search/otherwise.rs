@@ -11,9 +11,9 @@ use super::judge::{Judged, PRICE, Round, price};
 use super::reported::{BEYOND, WANDER};
 use super::together::{HOPE, WORTH};
 use super::{Found, LEVEL, Model, Search, Term, Visited};
-use crate::thermal::channels::range;
 use crate::statistics::Unusable;
 use crate::statistics::stats;
+use crate::thermal::channels::range;
 
 /// Most other beginnings without a shape, and most with another name first.
 const BEGINNINGS: usize = 3;

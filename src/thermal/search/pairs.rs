@@ -6,10 +6,10 @@
 
 use super::together::may_be_slow;
 use super::{LEVEL, Model, Search, Term};
-use crate::thermal::effects::Candidate;
 use crate::statistics::Unusable;
 use crate::statistics::candidates::Group;
 use crate::statistics::score;
+use crate::thermal::effects::Candidate;
 use std::sync::Arc;
 
 /// Places of a name's parameters that pairs are made of.

@@ -5,12 +5,12 @@ use super::judge::{PRICE, WHITE, price};
 use super::refine::{self, Bench};
 use super::reported::WANDER;
 use super::{Model, Search, Term, stairs};
-use crate::thermal::channels::Channels;
-use crate::thermal::effects::{Candidate, Point, map};
 use crate::statistics::Unusable;
 use crate::statistics::linear::add_scaled;
 use crate::statistics::noise::Shape;
 use crate::statistics::reml::Fit;
+use crate::thermal::channels::Channels;
+use crate::thermal::effects::{Candidate, Point, map};
 
 /// Most turns of a polish.
 const POLISHES: usize = 3;

@@ -11,11 +11,11 @@
 //! thermometer's noise makes of any bias.
 
 use super::declared::declared_by;
-use crate::thermal::channels::{Channels, range};
-use crate::thermal::effects::map;
 use crate::statistics::linear::Basis;
 use crate::statistics::smooth::{averaged, reading_noise};
 use crate::statistics::stats;
+use crate::thermal::channels::{Channels, range};
+use crate::thermal::effects::map;
 
 /// Powers of a channel that make the temperature of it.
 const POWERS: i32 = 6;

@@ -1,8 +1,6 @@
 //! Non-linear parameters, and likelihoods of a few shapes under every noise of the grid.
 
 use super::Model;
-use crate::thermal::channels::Channels;
-use crate::thermal::effects::{Bias, Candidate, Point};
 use crate::statistics::candidates::{AtShape, Grid, Group};
 use crate::statistics::lattice::Problem;
 use crate::statistics::linear::{Basis, dot};
@@ -10,6 +8,8 @@ use crate::statistics::noise::Shape;
 use crate::statistics::partial::Partial;
 use crate::statistics::reml::Fit;
 use crate::statistics::whiten::Whitener;
+use crate::thermal::channels::Channels;
+use crate::thermal::effects::{Bias, Candidate, Point};
 
 /// One noise, ready for many columns.
 pub struct Bench<'a> {

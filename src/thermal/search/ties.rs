@@ -9,10 +9,10 @@ use super::judge::{EQUAL, Judged, price};
 use super::reading::reads_temperature;
 use super::sweep::BETTER;
 use super::{Found, LEVEL, MOST_RIVALS, Model, Search, Term};
-use crate::thermal::effects::{Candidate, tone};
 use crate::statistics::Unusable;
 use crate::statistics::linear::{Basis, dot};
 use crate::statistics::smooth::reading_noise;
+use crate::thermal::effects::{Candidate, tone};
 use std::sync::Arc;
 
 /// Net gain behind a step's within which names are looked at, and how many of them.

@@ -7,9 +7,9 @@
 use super::judge::{Judged, PRICE, price};
 use super::reported::WANDER;
 use super::{LEVEL, Model, Search, Term, declared};
-use crate::thermal::effects::{Candidate, Point};
 use crate::statistics::Unusable;
 use crate::statistics::linear::{Basis, dot};
+use crate::thermal::effects::{Candidate, Point};
 use std::sync::Arc;
 
 /// Log-likelihood, less the price, by which two names have to be better than slow noise in their place: the best of

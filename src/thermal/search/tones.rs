@@ -3,18 +3,18 @@
 
 use super::refine::Bench;
 use super::{Model, Search};
-use crate::thermal::channels::Channels;
-use crate::thermal::effects::tone;
-use crate::thermal::effects::tone::Pickup;
-use crate::thermal::effects::{Point, map};
 use crate::statistics::Unusable;
 use crate::statistics::candidates::{Grid, bartlett};
 use crate::statistics::linear::{Basis, dot};
 use crate::statistics::partial::Partial;
 use crate::statistics::reml::Fit;
+use crate::statistics::smooth::slope;
 use crate::statistics::tail::chi_square_surprise;
 use crate::statistics::whiten::Whitener;
-use crate::statistics::smooth::slope;
+use crate::thermal::channels::Channels;
+use crate::thermal::effects::tone;
+use crate::thermal::effects::tone::Pickup;
+use crate::thermal::effects::{Point, map};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 

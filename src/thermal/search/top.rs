@@ -5,9 +5,9 @@ use super::judge::{PRICE, WHITE, price};
 use super::refine::{self, Bench};
 use super::unclipped::Unclipped;
 use super::{Model, Search};
-use crate::thermal::effects::{Bias, Candidate, Point, map};
 use crate::statistics::linear::add_scaled;
 use crate::statistics::noise::Shape;
+use crate::thermal::effects::{Bias, Candidate, Point, map};
 
 /// Sizes from which a shape that moves the bias is climbed where one without a size is the best of those tried.
 const SIZES: usize = 2;

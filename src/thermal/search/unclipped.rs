@@ -5,9 +5,9 @@
 //! whose reading is within the levels.
 
 use super::{Model, Search, Term, declared};
+use crate::statistics::linear::{add_scaled, dots, normal};
 use crate::thermal::channels::{Channels, range};
 use crate::thermal::effects::{Bias, Candidate, Point};
-use crate::statistics::linear::{add_scaled, dots, normal};
 use nalgebra::DMatrix;
 
 /// Most turns.

@@ -4,10 +4,10 @@ use super::judge::Judged;
 use super::reported::BEYOND;
 use super::structure::has_two_levels;
 use super::{Found, LEVEL, Model, Search, Term, declared};
-use crate::thermal::effects::tone;
-use crate::thermal::effects::tone::Pickup;
 use crate::statistics::Unusable;
 use crate::statistics::linear::Basis;
+use crate::thermal::effects::tone;
+use crate::thermal::effects::tone::Pickup;
 use std::sync::Arc;
 
 /// Slow noise, in units of white noise over the record, from which on a single step is no evidence.

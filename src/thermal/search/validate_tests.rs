@@ -1,9 +1,9 @@
 //! Records whose residual only resembles an effect, and the effect itself beside each.
 
 use super::*;
+use crate::statistics::blocks::Split;
 use crate::thermal::channels::Channels;
 use crate::thermal::effects::{Candidate, Point};
-use crate::statistics::blocks::Split;
 use crate::thermal::search::Effort;
 use crate::thermal::synthetic::{Random, triangle};
 use std::collections::BTreeMap;

@@ -1,6 +1,7 @@
 //! What is known of one node after a run: its range, its errors, its bound.
 
 use super::activity::Sketch;
+use crate::numeric::cast::Label;
 use crate::numeric::lane::Lane;
 use crate::numeric::paired::Pair;
 
@@ -17,6 +18,23 @@ pub struct Identity {
     pub limits: (i128, i128),
     /// A change of the value by less than this is no movement: a quarter of what is rounded there.
     pub step: f64,
+}
+
+/// A word that did not fit.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Event {
+    /// 0-based ADC sample; at the slow rate the period's last.
+    pub sample: u64,
+    /// The key, with its channel.
+    pub label: Label,
+    /// The node's own name.
+    pub part: String,
+    /// The node's number.
+    pub node: usize,
+    /// What went into it, raw.
+    pub operands: Vec<i128>,
+    /// The raw word before the overflow step.
+    pub value: i128,
 }
 
 /// Every word of a node, fixed and float.

@@ -1,10 +1,30 @@
 //! The nodes of a design: names, units and formats, in the order of the circuit's steps.
 
 use super::node::Identity;
-use super::probe::Places;
 use crate::circuit::CHANNELS;
 use crate::design::Design;
 use crate::numeric::format::{Format, Overflow, Quantizer, pow2};
+
+/// Nodes that are no casts.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Places {
+    /// Table, sine; cosine follows.
+    pub sine: usize,
+    /// Products by channel.
+    pub product: usize,
+    /// Decimators by channel.
+    pub decimator: usize,
+    /// CORDIC phase; magnitude follows.
+    pub phase: usize,
+    /// The Horner steps' first node, and how many there are.
+    pub horner: Option<(usize, usize)>,
+    /// Bias; the rate's input and the rate follow.
+    pub bias: Option<usize>,
+    /// Integral; tuning word follows.
+    pub phase_loop: Option<usize>,
+    /// Integrator; gain follows.
+    pub amplitude_loop: Option<usize>,
+}
 
 /// Identities and where they are.
 #[derive(Debug, Clone)]

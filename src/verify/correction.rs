@@ -1,28 +1,17 @@
 //! The correction as C and Rust: emitted, built, compared with the model on a record's readings.
 
-use super::run::{Correction, Reading};
-use super::sentences;
+use crate::correction::{Correction, Reading};
 use crate::emit::bundle::Bundle;
+use crate::emit::views::{self, Language};
+use crate::error::Result;
+use crate::firmware::correction::{Origin, emit};
 use crate::firmware::files;
 use crate::firmware::files::EmittedFile;
 use crate::firmware::stepped;
-use crate::firmware::stepped::Stepped;
-use crate::emit::views::{self, Language};
-use crate::error::Result;
-use crate::verify::firmware::{Built, both};
+use crate::parallel::both;
 use crate::verify::compare::{self, Compared};
+use crate::verify::firmware::Built;
 use std::path::Path;
-
-/// Where an emitted correction comes from.
-#[derive(Debug, Clone, Copy)]
-pub struct Origin<'a> {
-    /// Prefix of every name in C, the crate in Rust: a C identifier.
-    pub prefix: &'a str,
-    /// SHA-256 of the design (or of the request that stands in its place).
-    pub sha256: &'a str,
-    /// The command that makes it again.
-    pub command: &'a str,
-}
 
 /// Both languages' bundles, with their built test drivers.
 #[derive(Debug)]
@@ -33,27 +22,6 @@ pub struct Firmware {
     pub c: Built,
     /// Rust: files and driver.
     pub rust: Built,
-}
-
-/// Emits a correction in one language, as files in memory: sources, self-test, driver, vectors, manifest.
-///
-/// # Errors
-/// A template that cannot be printed (a fault of the tool).
-pub fn emit(
-    correction: &Correction,
-    origin: &Origin,
-    language: Language,
-) -> Result<Vec<EmittedFile>> {
-    let what = Stepped {
-        prefix: origin.prefix,
-        program: &correction.trace(),
-        model: &|calls| correction.run_words(calls),
-        part: "correction",
-        facts: sentences::facts(correction),
-        request_sha256: origin.sha256,
-        command: origin.command,
-    };
-    stepped::emit(&what, language)
 }
 
 impl Firmware {
@@ -104,7 +72,7 @@ impl Firmware {
                 let entries: Vec<i128> = table.entries.iter().map(|v| i128::from(*v)).collect();
                 all.push(compare::table(language, harness, &table.name, &entries)?);
             }
-            let name = super::block::STEP;
+            let name = crate::correction::block::STEP;
             all.push(compare::stream(language, harness, name, &calls, &expected)?);
             Ok(all)
         };

@@ -2,9 +2,9 @@
 //! name, adds up what it does, remembers the first overflow.
 
 use super::activity::Activity;
+use super::layout::Places;
 use super::loops::PhaseLoopBound;
-use super::node::{History, Node};
-use super::overflow::Event;
+use super::node::{Event, History, Node};
 use super::polar::Polar;
 use crate::circuit::chain::Chain;
 use crate::circuit::compensation::Evaluation;
@@ -29,27 +29,6 @@ enum Role {
     Integral(usize),
     /// No node: a shift inside a loop.
     Inside,
-}
-
-/// Nodes that are no casts.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Places {
-    /// Table, sine; cosine follows.
-    pub sine: usize,
-    /// Products by channel.
-    pub product: usize,
-    /// Decimators by channel.
-    pub decimator: usize,
-    /// CORDIC phase; magnitude follows.
-    pub phase: usize,
-    /// The Horner steps' first node, and how many there are.
-    pub horner: Option<(usize, usize)>,
-    /// Bias; the rate's input and the rate follow.
-    pub bias: Option<usize>,
-    /// Integral; tuning word follows.
-    pub phase_loop: Option<usize>,
-    /// Integrator; gain follows.
-    pub amplitude_loop: Option<usize>,
 }
 
 /// The observer of one run.

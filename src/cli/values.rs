@@ -1,0 +1,75 @@
+//! How the command line spells the library's choices.
+
+use clap::ValueEnum;
+use clap::builder::PossibleValue;
+
+/// A choice of the library's as a value of the command line: variant, spelling, what it means.
+macro_rules! values {
+    ($choice:ty { $($variant:ident = $spelled:literal, $means:literal;)+ }) => {
+        impl ValueEnum for $choice {
+            fn value_variants<'a>() -> &'a [Self] {
+                &[$(Self::$variant),+]
+            }
+
+            fn to_possible_value(&self) -> Option<PossibleValue> {
+                Some(match self {
+                    $(Self::$variant => PossibleValue::new($spelled).help($means),)+
+                })
+            }
+        }
+    };
+}
+
+values!(crate::emit::views::Language {
+    C = "c", "C99";
+    Rust = "rust", "Rust, `no_std`";
+});
+
+values!(crate::emit::bundle::Part {
+    Compensation = "compensation", "The bias polynomial of `[compensation]` and its subtraction from the rate";
+    Tables = "tables", "The constant tables alone: sine, arctangents";
+    Correction = "correction", "The correction of averaged readings that `gyrogen close` wrote as `[correction]`";
+    Chain = "chain", "The whole detection circuit with its compensation; the compensation alone where its thermometer is not the circuit's";
+});
+
+values!(crate::design::target::Target {
+    Host = "host", "A 64-bit processor";
+    CortexM4 = "cortex-m4", "32 bits with a single-cycle 32 x 32 -> 64 bit multiplier";
+    CortexM0 = "cortex-m0", "32 bits with a 32 x 32 -> 32 bit multiplier of many cycles and none for the upper half";
+    Riscv32 = "riscv32", "RV32IM";
+});
+
+values!(crate::tabulate::job::Asked {
+    Polynomial = "polynomial", "One polynomial";
+    Table = "table", "A table";
+    Piecewise = "piecewise", "A polynomial for each segment";
+    Auto = "auto", "The cheapest that meets the bound";
+});
+
+values!(crate::tabulate::job::Weight {
+    Absolute = "absolute", "The function's own unit";
+    Relative = "relative", "Parts of the function's magnitude";
+});
+
+values!(crate::verify::target::Target {
+    Host = "host", "This machine";
+    CortexM4 = "cortex-m4", "ARM Cortex-M4, Thumb-2, under emulation; C bundles only";
+    Riscv32 = "riscv32", "32-bit RISC-V (RV32IMAC), under emulation; C bundles only";
+});
+
+values!(crate::approx::form::polynomial::Monomials {
+    All = "all", "1, x, x^2, ..";
+    Odd = "odd", "x, x^3, x^5, ..";
+    Even = "even", "1, x^2, x^4, ..";
+});
+
+values!(crate::approx::form::plan::Scheme {
+    Horner = "horner", "One step after the other: fewest multiplications";
+    Estrin = "estrin", "Pairs, then pairs of pairs: more multiplications, a shorter chain of steps";
+});
+
+values!(crate::approx::form::table::Kind {
+    Plain = "plain", "The entry";
+    Linear = "linear", "Between two entries";
+    Quadratic = "quadratic", "Through three entries";
+});

@@ -1,0 +1,39 @@
+//! The correction's step as a bundle.
+
+use super::files::EmittedFile;
+use super::stepped::{self, Stepped};
+use crate::correction::{Correction, sentences};
+use crate::emit::views::Language;
+use crate::error::Result;
+
+/// Where an emitted correction comes from.
+#[derive(Debug, Clone, Copy)]
+pub struct Origin<'a> {
+    /// Prefix of every name in C, the crate in Rust: a C identifier.
+    pub prefix: &'a str,
+    /// SHA-256 of the design (or of the request that stands in its place).
+    pub sha256: &'a str,
+    /// The command that makes it again.
+    pub command: &'a str,
+}
+
+/// Emits a correction in one language, as files in memory: sources, self-test, driver, vectors, manifest.
+///
+/// # Errors
+/// A template that cannot be printed (a fault of the tool).
+pub fn emit(
+    correction: &Correction,
+    origin: &Origin,
+    language: Language,
+) -> Result<Vec<EmittedFile>> {
+    let what = Stepped {
+        prefix: origin.prefix,
+        program: &correction.trace(),
+        model: &|calls| correction.run_words(calls),
+        part: "correction",
+        facts: sentences::facts(correction),
+        request_sha256: origin.sha256,
+        command: origin.command,
+    };
+    stepped::emit(&what, language)
+}
