@@ -27,6 +27,21 @@ impl Error {
             Error::Input(_) => 2,
         }
     }
+
+    /// The text with the file's base name alone, for results: their bytes do not depend on where the file lies.
+    pub fn placeless(&self) -> String {
+        match self {
+            Error::Check(text) => text.clone(),
+            Error::Input(e) => InputError {
+                file: e
+                    .file
+                    .as_deref()
+                    .map(|f| crate::output::base_name(f).into()),
+                ..(**e).clone()
+            }
+            .to_string(),
+        }
+    }
 }
 
 /// One thing wrong with an input: what, where, and what to do.

@@ -33,6 +33,7 @@ pub mod spectrum;
 pub mod statistics;
 pub mod tabulate;
 pub mod thermal;
+pub mod timing;
 pub mod trace_file;
 pub mod vectors;
 pub mod verdict;

@@ -151,6 +151,4 @@ pub struct Closure {
     pub evidence: Vec<Evidence>,
     /// What the user should know of.
     pub warnings: Vec<Warning>,
-    /// Wall time, s.
-    pub seconds: f64,
 }

@@ -108,11 +108,10 @@ pub struct Closed {
 /// # Errors
 /// A file that cannot be read as a capture, too few rows, no tone.
 pub fn close(path: &Path, design: &Design, command: &str) -> Result<Closed> {
-    let start = std::time::Instant::now();
     let bits = design.circuit.adc.format.bits();
     let (capture, mut warnings) = input::read(path, bits)?;
     warnings.extend(key_warnings(&capture, bits));
-    closed(capture, warnings, design, command, start).map_err(|e| match e {
+    closed(capture, warnings, design, command).map_err(|e| match e {
         // What has a place has its file: the side-car's, for a key of an NPY capture.
         crate::error::Error::Input(e) if e.file.is_none() => (*e).in_file(path).into(),
         other => other,
@@ -128,7 +127,6 @@ pub fn closed(
     mut warnings: Vec<Warning>,
     design: &Design,
     command: &str,
-    start: std::time::Instant,
 ) -> Result<Closed> {
     let (capture, seen) = examine::examined(capture)?;
     warnings.extend(seen);
@@ -149,7 +147,6 @@ pub fn closed(
         residual_structure: findings.structure.clone(),
         evidence: findings.evidence.clone(),
         warnings,
-        seconds: start.elapsed().as_secs_f64(),
     };
     Ok(Closed {
         closure,

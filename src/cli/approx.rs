@@ -1,5 +1,6 @@
 //! `gyrogen approx`: a function in fixed point, with its certified error.
 
+use super::recorded::Recorded;
 use super::{OutputFormat, alternatives};
 use crate::approx::form::polynomial::{Monomials, Scheme};
 use crate::design::target::Target;
@@ -12,6 +13,7 @@ use crate::tabulate::job;
 use crate::tabulate::job::{Asked, Request, Weight};
 use crate::tabulate::outcome::{Alternative, Outcome, Search};
 use crate::tabulate::selection::Reason;
+use crate::timing::Stopwatch;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Mutex;
@@ -21,7 +23,7 @@ use std::time::{Duration, Instant};
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// The function of x, as a formula: numbers, + - * / ^, pi, sin cos tan asin acos atan sqrt exp log abs.
-    #[arg(long)]
+    #[arg(long, allow_hyphen_values = true)]
     function: String,
     /// Where it is wanted: least and greatest x, numbers or constants (`0,pi/4`).
     #[arg(long, value_name = "A,B", allow_hyphen_values = true)]
@@ -78,7 +80,7 @@ pub struct Arguments {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
     /// Folder for the results; made if it does not exist.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", default_value = "gyrogen-approx")]
     out: PathBuf,
     /// How the result is printed on stdout.
     #[arg(long, value_enum, default_value = "text")]
@@ -89,16 +91,17 @@ pub struct Arguments {
 ///
 /// # Errors
 /// A request that cannot be used (exit 2); a bound that is not met (exit 1).
-pub fn run(arguments: &Arguments) -> Result<()> {
+pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
+    let watch = Stopwatch::start("approximating");
     let request = request(arguments)?;
-    let command = command(arguments);
     let bar = Progress::new();
     let threads = super::threads(arguments.threads);
-    let made = job::approximate(&request, &command, threads, &|total, count| {
+    let made = job::approximate(&request, &recorded.command, threads, &|total, count| {
         bar.add(total, count)
     });
     bar.done();
     let made = made?;
+    watch.stage("emitting");
     let model = crate::vectors::form::model(&made.settled)?;
     let vectors = approximation::vectors(&made.settled, &model, threads);
     let emit = |language| {
@@ -113,10 +116,16 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     };
     let (c, rust) = (emit(Language::C)?, emit(Language::Rust)?);
     let json = super::json(&made.outcome);
+    watch.stage("writing");
     super::make_folder(&arguments.out)?;
     files::write(&c, &arguments.out.join("c"))?;
     files::write(&rust, &arguments.out.join("rust"))?;
     crate::output::write_whole(&arguments.out.join("approx.json"), json.as_bytes())?;
+    watch.write(
+        &arguments.out,
+        &made.outcome.design_sha256,
+        &recorded.command,
+    )?;
     match arguments.format {
         OutputFormat::Json => say!("{}", json.trim_end()),
         OutputFormat::Text => print(&made.outcome, &arguments.out),
@@ -177,52 +186,6 @@ fn spelled<T: clap::ValueEnum>(value: &T) -> String {
     value
         .to_possible_value()
         .map_or(String::new(), |v| v.get_name().to_owned())
-}
-
-/// The command that makes the same result again; where it is written does not matter.
-fn command(a: &Arguments) -> String {
-    let mut command = format!(
-        "gyrogen approx --function '{}' --domain={}",
-        a.function, a.domain
-    );
-    let mut push = |name: &str, value: Option<String>| {
-        if let Some(value) = value {
-            command += &format!(" --{name} {value}");
-        }
-    };
-    push("degree", a.degree.map(|d| d.to_string()));
-    push("monomials", a.monomials.as_ref().map(spelled));
-    push("input", Some(a.input.to_string()));
-    push("output", Some(a.output.to_string()));
-    let formats: Vec<String> = a.coefficients.iter().map(Format::to_string).collect();
-    push(
-        "coefficients",
-        (!formats.is_empty()).then(|| formats.join(",")),
-    );
-    push("intermediate", a.intermediate.map(|f| f.to_string()));
-    push(
-        "evaluation",
-        (a.evaluation != Scheme::default()).then(|| spelled(&a.evaluation)),
-    );
-    let form = (a.form != Asked::default()).then(|| spelled(&a.form));
-    push("form", form);
-    push("bound", a.bound.map(|b| b.to_string()));
-    push(
-        "weight",
-        (a.weight != Weight::default()).then(|| spelled(&a.weight)),
-    );
-    for parameter in &a.parameters {
-        push("parameter", Some(parameter.clone()));
-    }
-    push(
-        "target",
-        (a.target != Target::default()).then(|| spelled(&a.target)),
-    );
-    push("name", (a.name != "approx").then(|| a.name.clone()));
-    if a.exhaustive {
-        command += " --exhaustive";
-    }
-    command
 }
 
 fn print(o: &Outcome, out: &std::path::Path) {

@@ -1,6 +1,7 @@
 //! `gyrogen close`: what a measurement says beyond its declared model.
 
 use super::OutputFormat;
+use super::recorded::Recorded;
 use crate::capture;
 use crate::correction::Planned;
 use crate::design::Design;
@@ -9,6 +10,7 @@ use crate::error::{Error, InputError, Result};
 use crate::firmware::correction;
 use crate::firmware::correction::Origin;
 use crate::firmware::files::EmittedFile;
+use crate::output::name_of;
 use crate::record::{ThermalRecord, Warning};
 use crate::report::closure::Beside;
 use crate::report::design_diff::DesignDiff;
@@ -18,6 +20,7 @@ use crate::thermal::close::Closed;
 use crate::thermal::firmware::emitted;
 use crate::thermal::firmware::emitted::{Emitted, Told};
 use crate::thermal::search::Effort;
+use crate::timing::Stopwatch;
 use crate::verdict::{Closure, Verdict};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -65,47 +68,55 @@ const FOLDER: &str = "gyrogen-close";
 /// # Errors
 /// An unusable design or record; with `--verify` no compiler (exit 2); emitted code that differs from the model,
 /// and with `--controls` a name for a column without meaning (exit 1).
-pub fn run(arguments: &Arguments) -> Result<()> {
+pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
+    let watch = Stopwatch::start("reading the input");
     let design = super::design(arguments.design.as_deref())?;
     if arguments.self_test {
-        return super::self_test::run(arguments, &design);
+        return super::self_test::run(arguments, &design, recorded, &watch);
     }
     let loud = std::io::stderr().is_terminal();
-    let called = |what: &str, path: &Path| {
-        let mut command = format!("gyrogen close --{what} {}", path.display());
-        if let Some(design) = &arguments.design {
-            command += &format!(" --design {}", design.display());
-        }
+    let closing = |path: &Path| {
         if loud {
             eprintln!("closing {} ...", path.display());
         }
-        command
+        watch.stage("closing");
     };
     let out = arguments.out.as_deref().unwrap_or(Path::new(FOLDER));
     for given in [&arguments.record, &arguments.capture, &arguments.design] {
         kept(given.as_deref(), out)?;
     }
     let (closure, compared, controls) = if let Some(path) = &arguments.capture {
-        let closed = capture::close(path, &design, &called("capture", path))?;
-        let page = crate::report::capture::html(&closed, &file_name(path))?;
+        closing(path);
+        let closed = capture::close(path, &design, &recorded.command)?;
+        watch.stage("writing");
+        let page = crate::report::capture::html(&closed, &name_of(path))?;
         super::make_folder(out)?;
         crate::output::write_whole(&out.join("report.html"), page.as_bytes())?;
         (closed.closure, None, None)
     } else if let Some(path) = &arguments.record {
-        let command = called("record", path);
         let (record, warnings) = crate::record::read_any(path, &design.record)?;
-        let mut closed = close::close(&record, warnings, &design, &command, Effort::default())?;
+        closing(path);
+        let mut closed = close::close(
+            &record,
+            warnings,
+            &design,
+            &recorded.command,
+            Effort::default(),
+        )?;
+        watch.stage("emitting and verifying");
         let sources = sources(&closed, &design.name)?;
         let compared = if arguments.verify {
             compared(&mut closed, &record, &sources, &design.name)?
         } else {
             None
         };
+        watch.stage("controls");
         let controls = if arguments.controls {
             Some(super::controls::run(&closed, &record, &design)?)
         } else {
             None
         };
+        watch.stage("writing");
         let beside = Beside {
             emitted: compared.as_ref(),
             controls: controls.as_ref(),
@@ -124,6 +135,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         controls: controls.as_ref(),
     });
     crate::output::write_whole(&out.join("closure.json"), json.as_bytes())?;
+    watch.write(out, &closure.design_sha256, &recorded.command)?;
     match arguments.format {
         OutputFormat::Json => say!("{}", json.trim_end()),
         OutputFormat::Text => print(&closure, compared.as_ref(), controls.as_ref(), out),
@@ -180,12 +192,6 @@ struct All<'a> {
     controls: Option<&'a Controls>,
 }
 
-fn file_name(path: &Path) -> std::borrow::Cow<'_, str> {
-    path.file_name()
-        .unwrap_or(path.as_os_str())
-        .to_string_lossy()
-}
-
 /// The correction in C and in Rust, where there is one.
 fn sources(closed: &Closed, prefix: &str) -> Result<Option<[Vec<EmittedFile>; 2]>> {
     let Some(correction) = &closed.correction else {
@@ -238,7 +244,7 @@ fn write(
         diff: augmented.as_ref().map(|(diff, _)| diff),
         ..beside
     };
-    let page = crate::report::closure::html_beside(closed, &beside, &file_name(path))?;
+    let page = crate::report::closure::html_beside(closed, &beside, &name_of(path))?;
     super::make_folder(out)?;
     if augmented.is_none() && out.join("firmware").exists() {
         eprintln!(
@@ -309,7 +315,7 @@ fn print(c: &Closure, compared: Option<&Emitted>, controls: Option<&Controls>, o
     if let Some(controls) = controls {
         super::controls::print(controls);
     }
-    say!("wrote {} ({:.1} s)", out.display(), c.seconds);
+    say!("wrote {}", out.display());
 }
 
 /// A number with as many places as its standard deviation has at two digits.

@@ -3,6 +3,7 @@
 //! A design that carries a `[correction]` is there for its correction: that is the part which is emitted unless
 //! another one is asked for, and then it is said what is missing.
 
+use super::recorded::Recorded;
 use crate::design::{Compensation, Design};
 use crate::emit::bundle::Part;
 use crate::emit::views::Language;
@@ -25,7 +26,7 @@ pub struct Arguments {
     #[arg(long, value_enum)]
     part: Option<Part>,
     /// Folder for the bundle; made if it does not exist.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", default_value = "gyrogen-emit")]
     out: PathBuf,
 }
 
@@ -33,24 +34,15 @@ pub struct Arguments {
 ///
 /// # Errors
 /// An unusable design, a folder that cannot be written.
-pub fn run(arguments: &Arguments) -> Result<()> {
+pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let design = super::design(arguments.design.as_deref())?;
-    let named = match &arguments.design {
-        Some(path) => format!("{} ", path.display()),
-        None => String::new(),
-    };
     let part = arguments.part.unwrap_or(match design.correction {
         Some(_) => Part::Correction,
         None => Part::Chain,
     });
-    let command = format!(
-        "gyrogen emit {named}--lang {} --part {}",
-        format!("{:?}", arguments.lang).to_lowercase(),
-        part_name(part)
-    );
     let bundle = match part {
-        Part::Correction => correction(&design, arguments.lang, &command)?,
-        part => files::emit(&design, part, arguments.lang, &command)?,
+        Part::Correction => correction(&design, arguments.lang, &recorded.command)?,
+        part => files::emit(&design, part, arguments.lang, &recorded.command)?,
     };
     files::write(&bundle, &arguments.out)?;
     for remark in remarks(&design, part, arguments.part.is_some()) {

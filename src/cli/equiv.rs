@@ -1,13 +1,16 @@
 //! `gyrogen equiv`: float against fixed node by node, model against emitted C and Rust.
 
 use super::OutputFormat;
+use super::recorded::Recorded;
 use crate::cosim::stream::stimulus;
 use crate::design::Design;
 use crate::equivalence::job::{self, Request, Stimulus};
 use crate::equivalence::outcome::{Equivalence, NodeReport};
 use crate::equivalence::shrink;
 use crate::error::{Error, Result};
+use crate::output::name_of;
 use crate::record::capture::CaptureReader;
+use crate::timing::Stopwatch;
 use std::path::{Path, PathBuf};
 
 /// Compare the fixed-point circuit with its float twin, every word within a bound, and the emitted code with the model.
@@ -54,7 +57,8 @@ const SAMPLES: usize = 10_000_000;
 /// # Errors
 /// An unusable design or capture, no compiler (exit 2); a node outside its bound, an overflow, emitted
 /// code that differs, a difference from the design given with `--against` (exit 1).
-pub fn run(arguments: &Arguments) -> Result<()> {
+pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
+    let watch = Stopwatch::start("making the stimulus");
     let design = super::design(arguments.design.as_deref())?;
     let (drive, sense, origin) = codes(&design, arguments)?;
     let stimulus = Stimulus {
@@ -65,11 +69,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let other = arguments.against.as_deref().map(|p| super::design(Some(p)));
     let other = other.transpose()?;
     let request = Request {
-        command: &command(arguments),
+        command: &recorded.command,
         against: other.as_ref(),
         threads: super::threads(arguments.threads),
     };
+    watch.stage("comparing");
     let (result, counterexample) = job::equivalence(&design, stimulus, request)?;
+    watch.stage("writing");
     let json = super::json(&result);
     super::make_folder(&arguments.out)?;
     crate::output::write_whole(&arguments.out.join("equiv.json"), json.as_bytes())?;
@@ -82,6 +88,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let failed = |e: std::io::Error| crate::error::io_error(&shrunk, "remove", &e);
         std::fs::remove_file(&shrunk).map_err(failed)?;
     }
+    watch.write(&arguments.out, &result.design_sha256, &recorded.command)?;
     match arguments.format {
         OutputFormat::Json => say!("{}", json.trim_end()),
         OutputFormat::Text => print(&result),
@@ -92,37 +99,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     Err(Error::Check(result.reasons.join("; ")))
 }
 
-/// The command that makes the same result again; where it is written does not matter.
-fn command(arguments: &Arguments) -> String {
-    let mut command = String::from("gyrogen equiv");
-    let mut push = |text: String| {
-        command.push(' ');
-        command += &text;
-    };
-    if let Some(path) = &arguments.design {
-        push(path.display().to_string());
-    }
-    if let Some(path) = &arguments.capture {
-        push(format!("--capture {}", path.display()));
-    }
-    if let Some(path) = &arguments.against {
-        push(format!("--against {}", path.display()));
-    }
-    if let Some(samples) = arguments.samples {
-        push(format!("--samples {samples}"));
-    }
-    if let Kind::Adversarial = arguments.stimulus {
-        push("--stimulus adversarial".into());
-    }
-    command
-}
-
 /// Drive and sense codes, and their origin.
 fn codes(design: &Design, arguments: &Arguments) -> Result<(Vec<i32>, Vec<i32>, String)> {
     let most = arguments.samples.map(|n| n as usize);
     if let Some(path) = &arguments.capture {
         let (drive, sense) = read(design, path, most.unwrap_or(usize::MAX))?;
-        return Ok((drive, sense, format!("capture {}", path.display())));
+        return Ok((drive, sense, format!("capture {}", name_of(path))));
     }
     let samples = most.unwrap_or(SAMPLES);
     let (codes, origin) = match arguments.stimulus {

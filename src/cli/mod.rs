@@ -13,6 +13,7 @@ mod controls;
 mod emit;
 mod equiv;
 mod init;
+mod recorded;
 mod replay;
 mod run;
 mod self_test;
@@ -20,9 +21,10 @@ mod simulate;
 mod values;
 mod verify;
 
-use crate::error::Error;
-use clap::{Parser, Subcommand};
+use crate::error::{Error, Result};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use common::{OutputFormat, comparison_table, design, json, make_folder, table, threads, with_bar};
+use recorded::Recorded;
 use std::process::ExitCode;
 
 /// From a MEMS gyro's thermal drift to trusted fixed-point firmware.
@@ -48,18 +50,10 @@ enum Command {
 
 /// Runs the command that the process was started with.
 pub fn main() -> ExitCode {
-    let cli = Cli::parse();
-    let result = match &cli.command {
-        Command::Approx(arguments) => approx::run(arguments),
-        Command::Close(arguments) => close::run(arguments),
-        Command::Emit(arguments) => emit::run(arguments),
-        Command::Equiv(arguments) => equiv::run(arguments),
-        Command::Init(arguments) => init::run(arguments),
-        Command::Replay(arguments) => replay::run(arguments),
-        Command::Run(arguments) => run::run(arguments),
-        Command::Simulate(arguments) => simulate::run(arguments),
-        Command::Verify(arguments) => verify::run(arguments),
-    };
+    let parser = Cli::command();
+    let matches = parser.clone().get_matches();
+    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
+    let result = run(&cli.command, &recorded::recorded(&parser, &matches));
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(e) => {
@@ -69,5 +63,26 @@ pub fn main() -> ExitCode {
             }
             ExitCode::from(e.exit_status())
         }
+    }
+}
+
+/// Runs a subcommand; `recorded` is what its files say of how they were made.
+fn run(command: &Command, recorded: &Recorded) -> Result<()> {
+    if let Some(name) = &recorded.ambiguous {
+        eprintln!(
+            "warning: two inputs are called {name}, and the files written here name both by that name alone: rename one \
+             to be able to make them again [same_base_name]"
+        );
+    }
+    match command {
+        Command::Approx(arguments) => approx::run(arguments, recorded),
+        Command::Close(arguments) => close::run(arguments, recorded),
+        Command::Emit(arguments) => emit::run(arguments, recorded),
+        Command::Equiv(arguments) => equiv::run(arguments, recorded),
+        Command::Init(arguments) => init::run(arguments),
+        Command::Replay(arguments) => replay::run(arguments, recorded),
+        Command::Run(arguments) => run::run(arguments, recorded),
+        Command::Simulate(arguments) => simulate::run(arguments, recorded),
+        Command::Verify(arguments) => verify::run(arguments, recorded),
     }
 }

@@ -1,5 +1,6 @@
 //! `gyrogen replay`: captured ADC codes through the circuit, bit for bit.
 
+use super::recorded::Recorded;
 use crate::circuit::engine::{self, ArithmeticKind, Rows};
 use crate::design::Design;
 use crate::error::{Error, Result};
@@ -50,7 +51,7 @@ const BLOCK: usize = 1 << 16;
 /// # Errors
 /// An unusable design or capture (exit 2), or an overflow where the design says `error` (exit 1);
 /// no file is written then.
-pub fn run(arguments: &Arguments) -> Result<()> {
+pub fn run(arguments: &Arguments, _recorded: &Recorded) -> Result<()> {
     let design = super::design(arguments.design.as_deref())?;
     let kind = ArithmeticKind::from(arguments.arith);
     let mut capture = CaptureReader::open(&arguments.capture, design.circuit.adc.format)?;

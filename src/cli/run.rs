@@ -1,10 +1,12 @@
 //! `gyrogen run`: the main job, end to end.
 
+use super::recorded::Recorded;
 use super::{OutputFormat, alternatives};
 use crate::error::{Error, Result};
 use crate::job;
 use crate::job::bound::Line;
 use crate::job::outcome::{Drift, Outcome};
+use crate::timing::Stopwatch;
 use std::io::IsTerminal;
 use std::path::PathBuf;
 
@@ -29,22 +31,23 @@ pub struct Arguments {
 ///
 /// # Errors
 /// An unusable design or record (exit 2); emitted code that differs from the model (exit 1).
-pub fn run(arguments: &Arguments) -> Result<()> {
+pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
+    let watch = Stopwatch::start("reading the design");
     let design = super::design(arguments.design.as_deref())?;
-    let mut command = String::from("gyrogen run");
-    if let Some(path) = &arguments.design {
-        command += &format!(" {}", path.display());
-    }
-    if let Some(path) = &arguments.record {
-        command += &format!(" --record {}", path.display());
-    }
     let loud = std::io::stderr().is_terminal();
     let say = |step: &str| {
+        watch.stage(step);
         if loud {
             eprintln!("{step} ...");
         }
     };
-    let outcome = job::run(&design, arguments.record.as_deref(), &command, &say)?;
+    let outcome = job::run(
+        &design,
+        arguments.record.as_deref(),
+        &recorded.command,
+        &say,
+    )?;
+    watch.stage("writing");
     let html = crate::report::html(&outcome)?;
     let json = super::json(&outcome.summary);
     let out = &arguments.out;
@@ -57,6 +60,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     crate::output::write_whole(&out.join("design.toml"), fitted.as_bytes())?;
     crate::output::write_whole(&out.join("report.html"), html.as_bytes())?;
     crate::output::write_whole(&out.join("summary.json"), json.as_bytes())?;
+    watch.write(out, &outcome.summary.design_sha256, &recorded.command)?;
     match arguments.format {
         OutputFormat::Json => say!("{}", json.trim_end()),
         OutputFormat::Text => print(&outcome, out),
@@ -146,7 +150,7 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
         s.equivalence.compared,
         s.equivalence.mismatches
     );
-    say!("wrote {} ({:.1} s)", out.display(), s.seconds);
+    say!("wrote {}", out.display());
 }
 
 fn alternative(line: &Line) -> alternatives::Line<'_> {

@@ -2,11 +2,13 @@
 
 use super::OutputFormat;
 use super::close::Arguments;
+use super::recorded::Recorded;
 use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::report::text::significant;
 use crate::selftest::outcome::{EffectScore, Minimum, Outcome};
 use crate::selftest::{self, Request};
+use crate::timing::Stopwatch;
 
 /// Of a self-test.
 #[derive(Debug, clap::Args)]
@@ -36,7 +38,12 @@ pub struct Options {
 /// # Errors
 /// An unusable record or an effect that is not planted (exit 2); too many false alarms or a large effect that
 /// is not found (exit 1).
-pub fn run(arguments: &Arguments, design: &Design) -> Result<()> {
+pub fn run(
+    arguments: &Arguments,
+    design: &Design,
+    recorded: &Recorded,
+    watch: &Stopwatch,
+) -> Result<()> {
     let options = &arguments.test;
     let read = match &arguments.record {
         Some(path) => Some(crate::record::read_any(path, &design.record)?),
@@ -48,17 +55,20 @@ pub fn run(arguments: &Arguments, design: &Design) -> Result<()> {
         seed: options.seed,
         threads: super::threads(options.threads),
         only: options.effect.clone(),
-        command: command(arguments),
+        command: recorded.command.clone(),
         ..Request::default()
     };
+    watch.stage("planting and searching");
     let record = read.as_ref().map(|(r, w)| (r, w.as_slice()));
     let outcome = super::with_bar(|progress| selftest::run(design, record, &request, progress))?;
+    watch.stage("writing");
     let json = super::json(&outcome);
     if let Some(out) = &arguments.out {
         let page = crate::report::selftest::html(&outcome)?;
         super::make_folder(out)?;
         crate::output::write_whole(&out.join("selftest.json"), json.as_bytes())?;
         crate::output::write_whole(&out.join("selftest.html"), page.as_bytes())?;
+        watch.write(out, &outcome.design_sha256, &recorded.command)?;
     }
     match arguments.format {
         OutputFormat::Json => say!("{}", json.trim_end()),
@@ -71,25 +81,6 @@ pub fn run(arguments: &Arguments, design: &Design) -> Result<()> {
         return Ok(());
     }
     Err(Error::Check(outcome.failures.join("; ")))
-}
-
-/// The command but for what does not change the result.
-fn command(arguments: &Arguments) -> String {
-    let options = &arguments.test;
-    let mut out = String::from("gyrogen close --self-test");
-    if let Some(record) = &arguments.record {
-        out += &format!(" --record {}", record.display());
-    }
-    if let Some(design) = &arguments.design {
-        out += &format!(" --design {}", design.display());
-    }
-    for effect in &options.effect {
-        out += &format!(" --effect {effect}");
-    }
-    out + &format!(
-        " --records {} --clean {} --seed {}",
-        options.records, options.clean, options.seed
-    )
 }
 
 fn print(o: &Outcome) {

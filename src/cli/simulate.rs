@@ -1,12 +1,14 @@
 //! `gyrogen simulate`: plant and circuit in closed loop, float and fixed.
 
 use super::OutputFormat;
+use super::recorded::Recorded;
 use super::replay::Arith;
 use crate::error::{Error, Result};
 use crate::simulation::hunting::Hunting;
 use crate::simulation::outcome::{Both, Outcome};
 use crate::simulation::trace::Wanted;
 use crate::simulation::{self, Course, Request, record_csv};
+use crate::timing::Stopwatch;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
@@ -27,14 +29,14 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 500, value_parser = clap::value_parser!(u64).range(10..=1_000_000))]
     readings: u64,
     /// Folder for the results; made if it does not exist.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", default_value = "gyrogen-simulate")]
     out: PathBuf,
     /// Nodes (words of the circuit) to trace from power-on, separated by commas: names as `equiv` prints them, or their
     /// beginnings; all if left out.
     #[arg(long, value_name = "NODE", value_delimiter = ',')]
     trace: Vec<String>,
     /// Length of the trace, in decimated samples, 1 to 1000000.
-    #[arg(long, value_name = "N", default_value_t = TRACE_ROWS, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     trace_rows: u64,
     /// Format of the trace's file, `trace.FORMAT`.
     #[arg(long, value_enum, default_value = "vcd")]
@@ -49,9 +51,6 @@ pub struct Arguments {
     #[arg(long, value_enum, default_value = "text")]
     format: OutputFormat,
 }
-
-/// Rows of a trace if nobody says how many.
-const TRACE_ROWS: u64 = 64;
 
 /// Formats of a trace; the variants' names are the file's extensions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -78,7 +77,8 @@ impl TraceFormat {
 ///
 /// # Errors
 /// An unusable design or profile (exit 2); a circuit that stops on an overflow, a phase loop that does not lock (exit 1).
-pub fn run(arguments: &Arguments) -> Result<()> {
+pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
+    let watch = Stopwatch::start("reading the design");
     let design = super::design(arguments.design.as_deref())?;
     let request = Request {
         course: match (&arguments.duration, &arguments.profile) {
@@ -93,16 +93,25 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             rows: arguments.trace_rows as usize,
             arithmetic: arguments.trace_arith.into(),
         },
-        command: command(arguments),
+        command: recorded.command.clone(),
     };
     let bar = Bar::default();
-    let progress = |what: &str, done: u64, total: u64| bar.show(what, done, total);
+    let progress = |what: &str, done: u64, total: u64| {
+        watch.stage(what);
+        bar.show(what, done, total);
+    };
     let outcome = simulation::simulate(&design, &request, &progress)?;
     bar.done();
+    watch.stage("writing");
     let json = super::json(&outcome.summary);
     let html = crate::report::simulation::html(&outcome)?;
     let trace = arguments.trace_format.file_name();
     write(&outcome, &arguments.out, trace, &json, &html)?;
+    watch.write(
+        &arguments.out,
+        &outcome.summary.design_sha256,
+        &recorded.command,
+    )?;
     match arguments.format {
         OutputFormat::Json => say!("{}", json.trim_end()),
         OutputFormat::Text => print(&outcome, &arguments.out),
@@ -115,50 +124,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         return Ok(());
     }
     Err(Error::Check(failures.join("; ")))
-}
-
-/// The command that gives the same results.
-fn command(arguments: &Arguments) -> String {
-    let mut command = String::from("gyrogen simulate");
-    if let Some(path) = &arguments.design {
-        command += &format!(" {}", path.display());
-    }
-    if let Some(seconds) = arguments.duration {
-        command += &format!(" --duration {seconds}");
-    }
-    if let Some(path) = &arguments.profile {
-        command += &format!(
-            " --profile {} --readings {}",
-            path.display(),
-            arguments.readings
-        );
-    }
-    if !arguments.trace.is_empty() {
-        command += &format!(" --trace \"{}\"", arguments.trace.join(","));
-    }
-    let mut option = |name: &str, is_default: bool, value: String| {
-        if !is_default {
-            command += &format!(" --{name} {value}");
-        }
-    };
-    option(
-        "trace-rows",
-        arguments.trace_rows == TRACE_ROWS,
-        arguments.trace_rows.to_string(),
-    );
-    let format = arguments.trace_format;
-    let extension = format.file_name().trim_start_matches("trace.");
-    option(
-        "trace-format",
-        format == TraceFormat::Vcd,
-        extension.to_owned(),
-    );
-    option(
-        "trace-arith",
-        arguments.trace_arith == Arith::Fixed,
-        "float".to_owned(),
-    );
-    command
 }
 
 fn write(outcome: &Outcome, out: &Path, trace: &str, json: &str, html: &str) -> Result<()> {
@@ -230,7 +195,7 @@ fn print(outcome: &Outcome, out: &Path) {
         say!("{}", loops(&s.loops));
     }
     print_sentences(outcome);
-    say!("wrote {} ({:.1} s)", out.display(), s.seconds);
+    say!("wrote {}", out.display());
 }
 
 fn print_sentences(outcome: &Outcome) {

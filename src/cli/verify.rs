@@ -1,7 +1,9 @@
 //! `gyrogen verify`: rebuilds a bundle from its own files alone and runs its vectors.
 
 use super::OutputFormat;
+use super::recorded::Recorded;
 use crate::error::{Error, Result};
+use crate::timing::Stopwatch;
 use crate::verify::bundle::{self, Verification};
 use crate::verify::target::Target;
 use std::path::PathBuf;
@@ -26,16 +28,15 @@ pub struct Arguments {
 ///
 /// # Errors
 /// A folder that holds no bundle, no compiler for the target (exit 2); a difference (exit 1).
-pub fn run(arguments: &Arguments) -> Result<()> {
-    let mut command = format!("gyrogen verify {}", arguments.bundle.display());
-    if arguments.target != Target::Host {
-        command += &format!(" --target {}", arguments.target.name());
-    }
-    let verification = bundle::verify(&arguments.bundle, arguments.target, &command)?;
+pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
+    let watch = Stopwatch::start("building and running");
+    let verification = bundle::verify(&arguments.bundle, arguments.target, &recorded.command)?;
+    watch.stage("writing");
     let json = super::json(&verification);
     let folder = arguments.out.as_ref().unwrap_or(&arguments.bundle);
     super::make_folder(folder)?;
     crate::output::write_whole(&folder.join("verify.json"), json.as_bytes())?;
+    watch.write(folder, &verification.design_sha256, &recorded.command)?;
     match arguments.format {
         OutputFormat::Json => say!("{}", json.trim_end()),
         OutputFormat::Text => print(&verification),

@@ -25,7 +25,6 @@ use crate::record::{self, Warning};
 use crate::thermal::BaselineFit;
 use outcome::{Outcome, Point};
 use std::path::Path;
-use std::time::Instant;
 
 /// What a job says while it runs: a step's name.
 pub type Say<'a> = &'a dyn Fn(&str);
@@ -41,7 +40,6 @@ pub fn run(
     command: &str,
     say: Say,
 ) -> Result<Outcome> {
-    let started = Instant::now();
     let mut design = design.clone();
     let (simulated, (record, mut warnings)) = match record_path {
         Some(path) => (None, record::read_any(path, &design.record)?),
@@ -101,7 +99,6 @@ pub fn run(
         firmware,
         compared,
         points,
-        seconds: started.elapsed().as_secs_f64(),
     }))
 }
 

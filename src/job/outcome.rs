@@ -8,6 +8,7 @@ use crate::compensation::certainty;
 use crate::compensation::certainty::Certainty;
 use crate::design::Design;
 use crate::digest::sha256;
+use crate::output::name_of;
 use crate::record::Warning;
 use crate::thermal::BaselineFit;
 use crate::verify::compare::Compared;
@@ -69,8 +70,6 @@ pub struct Parts {
     pub compared: Vec<Compared>,
     /// Readings.
     pub points: Vec<Point>,
-    /// Wall time.
-    pub seconds: f64,
 }
 
 /// `summary.json` (`gyrogen.run/1`).
@@ -111,8 +110,6 @@ pub struct Summary {
     pub emitted: Vec<Emitted>,
     /// What the user should know of.
     pub warnings: Vec<Warning>,
-    /// Wall time, s.
-    pub seconds: f64,
 }
 
 /// How far the rate output drifts over the record.
@@ -232,7 +229,7 @@ impl Outcome {
             version: env!("CARGO_PKG_VERSION"),
             design_sha256: parts.design.source.sha256.clone(),
             command: parts.command.clone(),
-            record: parts.record_path.as_ref().map(|p| p.display().to_string()),
+            record: parts.record_path.as_ref().map(|p| name_of(p)),
             ratio: after.fixed.drift_pp_dps / before.drift_pp_dps.max(f64::MIN_POSITIVE),
             before,
             after,
@@ -276,7 +273,6 @@ impl Outcome {
                 })
                 .collect(),
             warnings: parts.warnings.clone(),
-            seconds: parts.seconds,
         };
         Outcome { summary, parts }
     }

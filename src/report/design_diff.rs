@@ -1,6 +1,7 @@
 //! What a closure adds to the design that it started from.
 
 use crate::design::Design;
+use crate::output::name_of;
 use similar::{DiffOp, TextDiff};
 
 /// Lines of context around a change.
@@ -39,7 +40,7 @@ impl DesignDiff {
     /// From a design to a text.
     pub fn of(design: &Design, text: &str) -> Self {
         let old = match &design.source.path {
-            Some(path) => path.display().to_string(),
+            Some(path) => name_of(path),
             None => "the embedded default".to_owned(),
         };
         Self::between(&old, &design.source.text, text)

@@ -5,6 +5,7 @@ use super::figures::{self, Figure};
 use super::tables;
 use super::text::{decimals_of, fixed, grouped, percent, significant};
 use crate::job::outcome::Drift;
+use crate::output::name_of;
 use crate::verify::compare::Compared;
 use askama::Template;
 
@@ -321,13 +322,12 @@ fn provenance(shown: &Shown) -> Vec<[String; 2]> {
         line("gyrogen", s.version.to_owned()),
         line(
             "design",
-            path.map_or("embedded default".to_owned(), |p| p.display().to_string()),
+            path.map_or("embedded default".to_owned(), |p| name_of(p)),
         ),
         line("design, sha256", s.design_sha256.clone()),
         line("record", s.record.clone().unwrap_or_else(|| own.to_owned())),
         line("C compiler and flags", shown.toolchains[0].to_owned()),
         line("Rust compiler and flags", shown.toolchains[1].to_owned()),
-        line("wall time", format!("{} s", fixed(s.seconds, 1))),
     ]
 }
 

@@ -120,7 +120,6 @@ impl Made {
                 sha256: "ab".repeat(32),
             }],
             warnings: Vec::new(),
-            seconds: 1.25,
         };
         Made {
             summary,

@@ -19,6 +19,7 @@ pub mod trial;
 
 use crate::design::{Design, RecordMapping, UserEffect};
 use crate::error::{InputError, Result};
+use crate::output::name_of;
 use crate::record::{ThermalRecord, Warning};
 use crate::thermal::close;
 use crate::thermal::search::Effort;
@@ -158,7 +159,7 @@ pub fn run_with(
         version: env!("CARGO_PKG_VERSION"),
         design_sha256: crate::digest::sha256(design.source.text.as_bytes()),
         command: request.command.clone(),
-        record: record.map(|r| r.0.source.display().to_string()),
+        record: record.map(|r| name_of(&r.0.source)),
         own_steps,
         rows: scenes.first().map_or(0, Scene::len),
         seed: request.seed,

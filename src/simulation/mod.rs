@@ -21,7 +21,6 @@ use crate::plant::profile::{Profile, Reading};
 use crate::record::{self, Warning};
 use outcome::Outcome;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 /// What is simulated.
 #[derive(Debug, Clone, PartialEq)]
@@ -70,7 +69,6 @@ pub struct Run {
 /// # Errors
 /// A design or profile that cannot be used; a circuit that stops on an overflow.
 pub fn simulate(design: &Design, request: &Request, progress: Progress) -> Result<Outcome> {
-    let started = Instant::now();
     let uncompensated = Design {
         compensation: None,
         ..design.clone()
@@ -119,7 +117,7 @@ pub fn simulate(design: &Design, request: &Request, progress: Progress) -> Resul
         match calibrate(design, &csv) {
             Ok(calibrated) => Some(calibrated),
             Err(e) => {
-                warnings.push(Warning::general("not_fitted", e.to_string()));
+                warnings.push(Warning::general("not_fitted", e.placeless()));
                 None
             }
         }
@@ -163,7 +161,6 @@ pub fn simulate(design: &Design, request: &Request, progress: Progress) -> Resul
         hunting,
         scale_factor,
         warnings,
-        seconds: started.elapsed().as_secs_f64(),
     }))
 }
 

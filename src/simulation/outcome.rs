@@ -38,8 +38,6 @@ pub struct Parts {
     pub scale_factor: Vec<ScaleFactor>,
     /// Of the run.
     pub warnings: Vec<Warning>,
-    /// Wall time.
-    pub seconds: f64,
 }
 
 /// Drift over the run, deg/s.
@@ -144,8 +142,6 @@ pub struct Summary {
     pub paper: Vec<Figure>,
     /// What the user should know of.
     pub warnings: Vec<Warning>,
-    /// Wall time, s.
-    pub seconds: f64,
 }
 
 /// A simulation's result.
@@ -206,7 +202,6 @@ impl Outcome {
             scale_factor: parts.scale_factor.clone(),
             paper,
             warnings: warnings(&parts),
-            seconds: parts.seconds,
         };
         Outcome { summary, parts }
     }

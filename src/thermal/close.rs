@@ -97,7 +97,6 @@ pub fn close(
     command: &str,
     effort: Effort,
 ) -> Result<Closed> {
-    let start = std::time::Instant::now();
     let condensed = condensed(record);
     let record = condensed.as_ref().map_or(record, |(short, warning)| {
         warnings.push(warning.clone());
@@ -144,7 +143,7 @@ pub fn close(
         (closure, before, after, accidents, firmware)
     };
     let (correction, firmware_dps) = firmware.map(|f| (f.correction, f.residual_dps)).unzip();
-    let mut closed = Closed {
+    Ok(Closed {
         closure,
         channels,
         split,
@@ -153,9 +152,7 @@ pub fn close(
         after,
         correction,
         firmware_dps,
-    };
-    closed.closure.seconds = start.elapsed().as_secs_f64();
-    Ok(closed)
+    })
 }
 
 /// The rows that errors are of, and those that stand out, alone or a few in a row.
@@ -229,7 +226,6 @@ impl Told<'_> {
             evidence: self.evidence(&steps),
             steps,
             warnings: Vec::new(),
-            seconds: 0.0,
         })
     }
 

@@ -32,8 +32,7 @@ fn made(fault: impl Fn(usize, f64, f64) -> f64, after: impl Fn(i32) -> i32) -> C
     };
     let capture = Capture::new(codes, meta, 12).unwrap();
     let design = reader::parse("", None).unwrap();
-    let now = std::time::Instant::now();
-    closed(capture, Vec::new(), &design, "gyrogen close <x>", now).unwrap()
+    closed(capture, Vec::new(), &design, "gyrogen close <x>").unwrap()
 }
 
 /// Every tag is closed in order, but for those of HTML that have no end.

@@ -347,7 +347,6 @@ pub fn provenance(closed: &Closed) -> Vec<[String; 2]> {
         ),
         ("thermometer", closed.channels.thermometer.clone()),
         ("noise after the steps", strengths),
-        ("wall time", format!("{} s", fixed(c.seconds, 1))),
     ]
     .map(|(name, value)| [name.to_owned(), value])
     .to_vec()

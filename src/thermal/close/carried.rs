@@ -64,7 +64,7 @@ impl Told<'_> {
         let carried = match judged(&plan) {
             Ok(carried) => carried,
             Err(e) => {
-                warnings.push(Warning::general("no_firmware", e.to_string()));
+                warnings.push(Warning::general("no_firmware", e.placeless()));
                 return None;
             }
         };
