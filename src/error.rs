@@ -36,7 +36,7 @@ impl Error {
                 file: e
                     .file
                     .as_deref()
-                    .map(|f| crate::output::base_name(f).into()),
+                    .map(|f| crate::base_name::base_name(f).into()),
                 ..(**e).clone()
             }
             .to_string(),

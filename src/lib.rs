@@ -6,6 +6,7 @@
 //! (C and Rust, and that they are the model), [`report`]; [`selftest`] says what [`closure`] finds and what not.
 
 pub mod approx;
+pub mod base_name;
 pub mod capture;
 pub mod circuit;
 pub mod cli;

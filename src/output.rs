@@ -1,7 +1,7 @@
 //! Files that appear whole or not at all.
 
+pub use crate::base_name::{base_name, name_of};
 use crate::error::{Error, InputError, Result, io_error};
-use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions, Permissions};
 use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -168,21 +168,6 @@ impl Target {
             permissions,
         })
     }
-}
-
-/// The name of a file or folder without its place, which results name it by: their bytes do not depend on where a command
-/// was started. Of `.`, `..` and the like the name of the folder that is meant.
-pub fn base_name(path: &Path) -> OsString {
-    let real = || Some(fs::canonicalize(path).ok()?.file_name()?.to_owned());
-    match path.file_name() {
-        Some(name) => name.to_owned(),
-        None => real().unwrap_or_else(|| path.as_os_str().to_owned()),
-    }
-}
-
-/// The same as text for a report.
-pub fn name_of(path: &Path) -> String {
-    base_name(path).to_string_lossy().into_owned()
 }
 
 /// The error of a failed write.

@@ -11,53 +11,7 @@ use super::crest::{Crest, Level, Side, reach};
 use super::flat_top::{Inside, Profile};
 use super::input::{Capture, Part};
 use super::instant::Instant;
-use crate::statistics::normal;
-
-/// The levels of a channel; infinite where there is none.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Limits {
-    /// Lower level, codes.
-    pub low: f64,
-    /// Upper level, codes.
-    pub high: f64,
-    /// Whether noise is added behind the limit, and nothing of it is limited.
-    pub is_front: bool,
-}
-
-impl Limits {
-    /// No limit.
-    pub const NONE: Limits = Limits {
-        low: f64::NEG_INFINITY,
-        high: f64::INFINITY,
-        is_front: false,
-    };
-
-    /// Whether there is a limit.
-    pub fn any(&self) -> bool {
-        self.low.is_finite() || self.high.is_finite()
-    }
-
-    /// Whether a signal with this noise is not touched by a limit (beyond one in a thousand rows).
-    pub fn is_free(&self, signal: f64, sigma: f64) -> bool {
-        signal > self.low + 3.0 * sigma && signal < self.high - 3.0 * sigma
-    }
-
-    /// Mean of the limited code less the signal: noise is limited with the signal.
-    pub fn shift(&self, signal: f64, sigma: f64) -> f64 {
-        if !self.any() || self.is_free(signal, 2.0 * sigma) {
-            return 0.0;
-        }
-        if self.is_front {
-            return signal.clamp(self.low, self.high) - signal;
-        }
-        let sigma = sigma.max(1e-6);
-        let over = |level: f64, sign: f64| match level.is_finite() {
-            true => sigma * normal::excess(sign * (signal - level) / sigma),
-            false => 0.0,
-        };
-        over(self.low, -1.0) - over(self.high, 1.0)
-    }
-}
+pub use super::signal::Limits;
 
 /// What a search for limits found in one channel.
 #[derive(Debug, Clone, Copy, PartialEq)]

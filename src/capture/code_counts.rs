@@ -5,7 +5,7 @@
 
 use super::columns::{Model, Rows, SEGMENT, SEGMENTS, chunks};
 use super::input::{Capture, Part};
-use super::steps;
+use super::signal;
 use crate::statistics::normal;
 
 /// Codes on each side of a run that are looked at, at most.
@@ -272,7 +272,7 @@ fn wander(capture: &Capture, model: &Model, channel: usize) -> f64 {
 /// Training rows that fall on the same phase and so on the same code, where noise was added after rounding or is
 /// small: they count once, as all of them miss a code if the tone is a little off.
 pub(super) fn repeats(capture: &Capture, model: &Model, channel: usize, sigma: f64) -> f64 {
-    if sigma > NARROW && !steps::is_undithered(&model.neutral[channel]) {
+    if sigma > NARROW && !signal::is_undithered(&model.neutral[channel]) {
         return 1.0;
     }
     let Some(word) = model.tone.word else {

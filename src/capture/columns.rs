@@ -5,117 +5,16 @@
 //! lines at other frequencies, what phase truncation makes of the tone. All that is nonlinear
 //! (frequencies, levels of clipping, truncation) is in [`Model`] and is fixed while coefficients are fitted.
 
-use super::clipping::Limits;
 use super::input::Capture;
-use super::missing::Missing;
-use super::steps;
-use super::tone::{Phases, Tone};
-use super::truncation::Truncation;
+use super::signal;
+pub use super::signal::{
+    ALL, CHUNK, COS, EXACT, HARMONICS, HAT, HATS, LINE, LINES, Model, ONE, OTHER, POWER, POWERS,
+    SAW, SEGMENT, SEGMENTS, SIN, TRUNCATED, Variance, WAVE, WAVES, chunks, harmonic, line,
+};
 use crate::numeric::turn;
 use crate::statistics::normal;
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
-
-/// Rows that are worked on at once.
-pub const CHUNK: usize = 256;
-/// Constant 1.
-pub const ONE: usize = 0;
-/// sin of the phase.
-pub const SIN: usize = 1;
-/// cos of the phase.
-pub const COS: usize = 2;
-/// First power of u = signal / span; then u^2 to u^5.
-pub const POWER: usize = 11;
-/// Highest power.
-pub const POWERS: usize = 5;
-/// Quantisation error of a code that is rounded before noise is added: round(x) - x.
-pub const SAW: usize = 16;
-/// sin(2 pi k x), k = 1 and on: what is left of it where noise before rounding smoothes it. Noise of sigma codes
-/// leaves exp(-2 (pi k sigma)^2) of wave k (Widrow and Kollar 2008).
-pub const WAVE: usize = 17;
-/// Waves: with 0.15 codes of noise the fourth is below a thousandth of a code.
-pub const WAVES: usize = 3;
-/// The drive channel's residual, in the sense channel only.
-pub const OTHER: usize = WAVE + WAVES;
-/// First line: sine and cosine for each.
-pub const LINE: usize = OTHER + 1;
-/// Lines at most.
-pub const LINES: usize = 6;
-/// Sine and cosine of the truncated phase, less those of the phase.
-pub const TRUNCATED: usize = LINE + 2 * LINES;
-/// The tone at the exact phase less that at the truncated one, over the span: makes a bend's line one of the exact tone.
-pub const EXACT: usize = TRUNCATED + 2;
-/// First hat function of the signal over -span .. span.
-pub const HAT: usize = EXACT + 1;
-/// Hat functions.
-pub const HATS: usize = 129;
-/// First of the equal parts of the converter's range -full scale .. full scale: 1 where the signal is in it.
-pub const SEGMENT: usize = HAT + HATS;
-/// Parts: those of a first stage of five bits.
-pub const SEGMENTS: usize = 32;
-/// All columns.
-pub const ALL: usize = SEGMENT + SEGMENTS;
-/// Highest harmonic.
-pub const HARMONICS: usize = 5;
-
-/// Columns of the sine and the cosine of harmonic k, 1 ..= [`HARMONICS`].
-pub const fn harmonic(k: usize) -> (usize, usize) {
-    (2 * k - 1, 2 * k)
-}
-
-/// Columns of line i.
-pub const fn line(i: usize) -> (usize, usize) {
-    (LINE + 2 * i, LINE + 2 * i + 1)
-}
-
-/// Variance of a row: base + jitter^2 slope^2.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Variance {
-    /// Of each channel, codes squared.
-    pub base: [f64; 2],
-    /// Variance of each channel's sampling instant, samples squared.
-    pub jitter: [f64; 2],
-}
-
-/// All that is not a coefficient, and the coefficients of the last fit (for the signal's value).
-#[derive(Debug, Clone)]
-pub struct Model {
-    /// Phases.
-    pub tone: Tone,
-    /// Their sines and cosines.
-    pub phases: Phases,
-    /// Sine and cosine of the declared tones, codes.
-    pub declared: [[f64; 2]; 2],
-    /// Coefficients of all columns: what is beyond the declared tones.
-    pub coefficients: [Vec<f64>; 2],
-    /// Coefficients of a fit with every freedom: where the codes are, whatever effect put them there. The
-    /// quantiser's error is taken at it, so that it takes no side.
-    pub neutral: [Vec<f64>; 2],
-    /// Frequencies of the lines, turns a sample.
-    pub lines: Vec<f64>,
-    /// Their standard deviations, as far as they were looked for.
-    pub line_stds: Vec<f64>,
-    /// Address of a truncated oscillator.
-    pub truncation: Option<Truncation>,
-    /// Limits of each channel.
-    pub limits: [Limits; 2],
-    /// Missing codes of each channel.
-    pub missing: [Missing; 2],
-    /// Of the noise.
-    pub variance: Variance,
-    /// What u is relative to: a little more than the largest code of both channels.
-    pub span_codes: f64,
-    /// 2^(bits-1), codes.
-    pub full_scale_codes: f64,
-}
-
-impl Model {
-    /// The part of the converter's range that a signal is in; the outermost ones go on beyond it.
-    pub fn segment(&self, signal: f64) -> usize {
-        let place = (0.5 + 0.5 * signal / self.full_scale_codes) * SEGMENTS as f64;
-        (place.max(0.0) as usize).min(SEGMENTS - 1)
-    }
-}
 
 /// Some rows of all columns.
 #[derive(Debug, Clone)]
@@ -174,12 +73,12 @@ impl Rows {
     pub fn error(&self, model: &Model, channel: usize, i: usize) -> f64 {
         let limits = model.limits[channel];
         let signal = self.signal[channel][i];
-        let undithered = steps::is_undithered(&model.neutral[channel]);
+        let undithered = signal::is_undithered(&model.neutral[channel]);
         let passes = undithered || limits.is_front;
         if passes && limits.any() && !(limits.low..limits.high).contains(&signal) {
             // Noise is added to the level or to its code, and nothing of it is limited.
             let level = signal.clamp(limits.low, limits.high);
-            return self.code[channel][i] - steps::mean_code(level, &model.neutral[channel]);
+            return self.code[channel][i] - signal::mean_code(level, &model.neutral[channel]);
         }
         let value = self.value(channel, i, &model.coefficients[channel]);
         let shift = match undithered {
@@ -395,13 +294,6 @@ impl Default for Rows {
     fn default() -> Self {
         Self::new()
     }
-}
-
-/// The chunks of a stretch of rows.
-pub fn chunks(rows: Range<usize>) -> impl Iterator<Item = Range<usize>> {
-    let end = rows.end;
-    rows.step_by(CHUNK)
-        .map(move |start| start..end.min(start + CHUNK))
 }
 
 #[cfg(test)]

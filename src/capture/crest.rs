@@ -12,7 +12,7 @@ use super::code_chances::{Cell, Chances, Limiter, Noise, cells, width};
 use super::code_counts::repeats;
 use super::columns::{Model, Rows, chunks};
 use super::input::{Capture, Part};
-use super::steps;
+use super::signal;
 
 /// Codes inside the crest, beside four deviations of the noise, of which the rows are looked at.
 const INSIDE: f64 = 2.0;
@@ -85,7 +85,7 @@ impl Crest {
         let mut rows = signals(capture, model, side, held);
         let free = rows.iter().filter(|row| row.is_free);
         let free = free.map(|row| (row.signal, row.code));
-        let noise = Noise::of(free, sigma, steps::is_undithered(&model.neutral[channel]));
+        let noise = Noise::of(free, sigma, signal::is_undithered(&model.neutral[channel]));
         let top = rows.iter().map(|r| r.signal);
         let top = top.fold(f64::NEG_INFINITY, f64::max);
         let reach = reach(sigma);

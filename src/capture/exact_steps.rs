@@ -8,7 +8,8 @@
 use super::columns::{HAT, Model, Rows, SAW, SEGMENT, chunks};
 use super::gram::Combo;
 use super::input::{Capture, Part};
-use super::steps::is_undithered;
+use super::signal::is_undithered;
+use super::signal::rest;
 use nalgebra::{DMatrix, DVector};
 
 /// Most directions that are searched.
@@ -91,11 +92,6 @@ fn value(rows: &Rows, combo: &Combo, channel: usize, i: usize) -> f64 {
         _ => rows.dense[channel][column][i],
     };
     parts.map(|p| p.2 * of(p.1)).sum()
-}
-
-/// Where the quantiser puts a signal, less the signal.
-pub(super) fn rest(signal: f64) -> f64 {
-    (signal + 0.5).floor() - signal
 }
 
 /// The training rows of both channels, with what each combo makes of them.

@@ -9,54 +9,7 @@ use super::code_counts::{Counts, Run};
 use super::columns::Model;
 use super::input::Capture;
 use super::missing_moves;
-use crate::statistics::normal;
-
-/// Missing codes of one channel.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Missing {
-    /// The codes, ascending.
-    pub codes: Vec<i32>,
-    /// Of each, the code that its inputs get instead, less itself.
-    pub moves: Vec<f64>,
-}
-
-impl Missing {
-    /// Whether a code from `low` to `high` is missing.
-    pub fn any_in(&self, low: f64, high: f64) -> bool {
-        let first = self.codes.partition_point(|c| f64::from(*c) < low);
-        self.codes.get(first).is_some_and(|c| f64::from(*c) <= high)
-    }
-
-    /// What it moves the mean code by at a signal with this noise, codes.
-    pub fn shift(&self, signal: f64, sigma: f64) -> f64 {
-        if self.codes.is_empty() {
-            return 0.0;
-        }
-        // The quantiser's own variance is no part of the noise before it. A little noise is always there; a wide
-        // one is looked at in its middle only.
-        let sigma = (sigma * sigma - 1.0 / 12.0).max(0.0).sqrt();
-        let sigma = sigma.clamp(0.05, 1e4);
-        let reach = 4.0 * sigma + 1.0;
-        let first = self
-            .codes
-            .partition_point(|c| f64::from(*c) < signal - reach);
-        let mut sum = 0.0;
-        for (code, by) in self.codes.iter().zip(&self.moves).skip(first) {
-            let distance = f64::from(*code) - signal;
-            if distance > reach {
-                break;
-            }
-            sum += by
-                * if sigma > 2.0 {
-                    normal::density(distance / sigma) / sigma
-                } else {
-                    normal::below((distance + 0.5) / sigma)
-                        - normal::below((distance - 0.5) / sigma)
-                };
-        }
-        sum
-    }
-}
+pub use super::signal::Missing;
 
 /// A set of missing codes and how surely it is one.
 #[derive(Debug, Clone, PartialEq)]

@@ -62,6 +62,7 @@ mod reported_steps;
 pub mod rivals;
 pub mod rounding;
 pub mod search;
+pub mod signal;
 pub mod skirts;
 pub mod spectrum;
 pub mod spur;
@@ -74,6 +75,7 @@ mod synthetic;
 mod synthetic_rows;
 pub mod tone;
 pub mod truncation;
+pub mod variant;
 pub mod wander;
 pub mod wrong_codes;
 

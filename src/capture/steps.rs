@@ -2,18 +2,15 @@
 
 use super::around::{TABLES, generous};
 use super::candidates::{Variant, base_ridge};
-use super::columns::{COS, Model, SAW, SIN, WAVE, WAVES};
-use super::exact_steps;
+use super::columns::{COS, Model, SAW, SIN, WAVE};
 use super::gram::{Combo, Detail, Gram, Summed, solve, spread};
 use super::input::Capture;
 use super::search::combos_of;
-use std::f64::consts::TAU;
+use super::signal::LEAST_SAW;
 
 /// Training rows from which the steps' places are found, at most (about).
 const ROWS: usize = 100_000;
-/// Share of the quantiser's own error from which on it shows.
-const LEAST_SAW: f64 = 0.3;
-/// The same of its smoothed wave, codes: what 0.3 codes of noise leave of it.
+/// Share of the smoothed wave of the quantiser's error from which on it shows, codes: what 0.3 codes of noise leave of it.
 const LEAST_WAVE: f64 = 0.05;
 /// Variance that hides the steps: what leaves [`LEAST_WAVE`].
 const HIDING: f64 = 0.09;
@@ -34,18 +31,6 @@ pub fn is_sharp(coefficients: &[Vec<f64>; 2], model: &Model) -> bool {
             && late < HIDING
             && (at(SAW).abs() > LEAST_SAW || at(WAVE).abs() > LEAST_WAVE)
     })
-}
-
-/// Whether a channel's noise was added after rounding, as far as these coefficients tell.
-pub fn is_undithered(coefficients: &[f64]) -> bool {
-    coefficients.get(SAW).is_some_and(|b| b.abs() > LEAST_SAW)
-}
-
-/// The mean code of a constant signal: what of the quantiser's error shows beside the noise.
-pub fn mean_code(signal: f64, coefficients: &[f64]) -> f64 {
-    let at = |k: usize| coefficients.get(k).copied().unwrap_or(0.0);
-    let wave = |k: usize| at(WAVE + k) * (TAU * (k + 1) as f64 * signal).sin();
-    signal + at(SAW) * exact_steps::rest(signal) + (0..WAVES).map(wave).sum::<f64>()
 }
 
 /// Finds where the codes are before anything is chosen, where the quantiser's error shows undithered: of

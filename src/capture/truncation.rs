@@ -6,42 +6,10 @@ use super::candidates::{base_ridge, per_column};
 use super::columns::{LINES, Model, TRUNCATED, line};
 use super::gram::{Combo, Detail, Gram, Summed, solve};
 use super::input::Capture;
+pub use super::signal::Truncation;
 use super::spectrum::{self, Spectrum};
 use super::spur::{self, ADDRESS_BITS};
 use std::f64::consts::TAU;
-
-/// How an oscillator comes from its phase to an address of its table.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Truncation {
-    /// Address bits.
-    pub bits: u32,
-    /// Half an address step is added to the phase before the bits below the address are dropped
-    /// (`address_rounding = "half_up"`); nothing is with `"floor"`.
-    pub half_up: bool,
-}
-
-impl Truncation {
-    /// Both roundings of some address bits.
-    fn both(bits: u32) -> [Truncation; 2] {
-        [false, true].map(|half_up| Truncation { bits, half_up })
-    }
-
-    /// Addresses a turn.
-    pub fn steps(self) -> f64 {
-        f64::powi(2.0, self.bits as i32)
-    }
-
-    /// What is added before truncation, in address steps.
-    pub fn added(self) -> f64 {
-        if self.half_up { 0.5 } else { 0.0 }
-    }
-
-    /// The phase (turns) of the table's entry that is read at a phase (turns in 0 .. 1); 1 is entry 0 again.
-    pub fn phase(self, phase: f64) -> f64 {
-        let steps = self.steps();
-        (phase * steps + self.added()).floor() / steps
-    }
-}
 
 /// Least gain in log-likelihood for a number of bits to be looked at.
 const LEAST_GAIN: f64 = 8.0;

@@ -42,7 +42,7 @@ impl Curve {
                 name: NAMES.get(number).copied().unwrap_or("curve"),
                 note: format!(
                     "Knots of a curve over {} from -1 to 1, in units of 2^-{fraction_bits}",
-                    super::sentences::name(input)
+                    name(input)
                 ),
                 entries: values.iter().map(entry).collect(),
                 fraction_bits,
@@ -102,4 +102,9 @@ impl Curve {
         let (least, largest) = self.range();
         ar.within(sum, least, largest)
     }
+}
+
+/// An input's name in the emitted sources; `k` counts from 0.
+pub(super) fn name(k: usize) -> String {
+    format!("input_{}", k + 1)
 }

@@ -78,11 +78,6 @@ impl Formats {
         Formats::choose(plan, plan.full_scale_dps * NOISE_PER_FULL_SCALE)
     }
 
-    /// How often the errors on the rate are taken off.
-    pub fn passes(&self, plan: &Plan) -> usize {
-        super::rate_terms::passes(plan, self)
-    }
-
     /// The rate word's full scale is 2^this, deg/s.
     pub fn rate_exponent(&self) -> i32 {
         self.rate.integer_bits as i32 - 1

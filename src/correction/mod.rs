@@ -8,6 +8,7 @@ pub mod block;
 mod bound;
 mod curve;
 mod formats;
+mod gain;
 mod plan;
 mod rate_terms;
 mod run;

@@ -194,6 +194,13 @@ fn tried(plan: &Plan, enough: f64) -> usize {
     first.map_or(1, |k| k + 1)
 }
 
+impl Formats {
+    /// How often the errors on the rate are taken off.
+    pub fn passes(&self, plan: &Plan) -> usize {
+        passes(plan, self)
+    }
+}
+
 impl OnRate {
     /// Compiles a term; `None` for one on the bias.
     pub fn new(formats: &Formats, term: &Term) -> Option<Self> {

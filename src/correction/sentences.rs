@@ -1,5 +1,6 @@
 //! A correction in sentences: what the head of its emitted sources says.
 
+use super::curve::name;
 use super::plan::{Plan, Term};
 use super::run::Correction;
 
@@ -69,11 +70,6 @@ fn outlasting(plan: &Plan) -> Option<String> {
     Some(format!(
         "worth keeping over a power cycle, of the state: {members}"
     ))
-}
-
-/// An input's name in the emitted sources; `k` counts from 0.
-pub(super) fn name(k: usize) -> String {
-    format!("input_{}", k + 1)
 }
 
 /// A term; `curves` counts the tables so far.

@@ -15,6 +15,7 @@ pub mod effects;
 mod keys;
 pub mod limits;
 mod log_axis;
+mod ranges;
 pub mod reader;
 pub mod record_columns;
 pub mod schema;

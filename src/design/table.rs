@@ -1,6 +1,7 @@
 //! A TOML table that remembers where everything stands, so that every mistake can be shown in
 //! its place: file, line, column, offending value, reason, remedy.
 
+pub use super::ranges::Real;
 use super::{keys, suggest};
 use crate::error::{Error, InputError, Result};
 use crate::numeric::format::{Format, Overflow, Quantizer, Rounding};
@@ -180,49 +181,6 @@ impl<'a> Table<'a> {
     pub fn need_section(&self, key: &str) -> Result<Table<'a>> {
         self.need(key)?;
         self.section(key)
-    }
-}
-
-/// Which reals a key takes (never a NaN or an infinity).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Real {
-    /// Every one.
-    Any,
-    /// Above 0.
-    Positive,
-    /// 0 or above.
-    NotNegative,
-    /// A Celsius temperature above absolute zero.
-    Celsius,
-    /// From the first to the second, both included.
-    Within(f64, f64),
-    /// Whole numbers from the first to the second, both included.
-    Whole(f64, f64),
-}
-
-impl Real {
-    /// True if `x`, which is finite, is one of them.
-    pub fn accepts(self, x: f64) -> bool {
-        match self {
-            Real::Any => true,
-            Real::Positive => x > 0.0,
-            Real::NotNegative => x >= 0.0,
-            Real::Celsius => x > -273.15,
-            Real::Within(low, high) => x >= low && x <= high,
-            Real::Whole(low, high) => x >= low && x <= high && x.fract() == 0.0,
-        }
-    }
-
-    /// What they are, in words: "it has to be {rule}".
-    pub fn rule(self) -> String {
-        match self {
-            Real::Any => "finite".to_owned(),
-            Real::Positive => "positive".to_owned(),
-            Real::NotNegative => "zero or positive".to_owned(),
-            Real::Celsius => "above absolute zero, -273.15 degC".to_owned(),
-            Real::Within(low, high) => format!("{low} to {high}"),
-            Real::Whole(low, high) => format!("a whole number from {low} to {high}"),
-        }
     }
 }
 

@@ -17,13 +17,16 @@ pub mod formats;
 pub mod from_record;
 pub mod outcome;
 pub mod own_run;
+mod points;
+mod reading;
 
 use crate::compensation::certainty;
-use crate::design::{Compensation, CompensationInput, Design};
+use crate::design::Design;
 use crate::error::Result;
-use crate::record::{self, Warning};
-use crate::thermal::BaselineFit;
-use outcome::{Outcome, Point};
+use crate::record::{self};
+use outcome::Outcome;
+pub use points::{Point, drift_pp, rms};
+use reading::{clamped_bias, compensation, no_compensation, thermometer_raw, warning};
 use std::path::Path;
 
 /// What a job says while it runs: a step's name.
@@ -100,91 +103,4 @@ pub fn run(
         compared,
         points,
     }))
-}
-
-/// The compensation of a design that has been filled in.
-fn compensation(design: &Design) -> Result<&Compensation> {
-    design.compensation.as_ref().ok_or_else(no_compensation)
-}
-
-fn no_compensation() -> crate::error::Error {
-    crate::error::InputError::new("the design has no [compensation]")
-        .help("add one, or leave [circuit] out to use the default's")
-        .into()
-}
-
-/// Raw input of the compensation for a reading of the thermometer, rounded and limited as a driver
-/// of the firmware would: phase in rad, or the channel's own unit.
-fn thermometer_raw(design: &Design, compensation: &Compensation, reading: f64) -> i128 {
-    let to_raw =
-        |value: f64, low: i128, high: i128| ((value + 0.5).floor() as i128).clamp(low, high);
-    match &compensation.input {
-        CompensationInput::Phase => {
-            let bits = design.circuit.cordic.angle_bits;
-            let half = 1i128 << (bits - 1);
-            let turns = reading / std::f64::consts::TAU;
-            to_raw(
-                turns * crate::numeric::format::pow2(bits as i32),
-                -half,
-                half - 1,
-            )
-        }
-        CompensationInput::TuningWord(_) => {
-            let steps = reading / coefficients::tuning_step_hz(&design.circuit);
-            let half = 1i128 << (design.circuit.nco.phase_bits - 1);
-            let given = design.circuit.nco.tuning_word as f64;
-            to_raw(steps - given, -half, half - 1)
-        }
-        CompensationInput::Channel(channel) => {
-            let format = channel.format;
-            to_raw(reading / format.lsb(), format.min_raw(), format.max_raw())
-        }
-    }
-}
-
-/// Points' drift: greatest minus least of the means over bins of the thermometer.
-pub fn drift_pp(points: &[Point], of: impl Fn(&Point) -> f64) -> f64 {
-    /// Bins over the thermometer's range.
-    const BINS: usize = 24;
-    let readings = || points.iter().map(|p| p.thermometer);
-    let low = readings().fold(f64::INFINITY, f64::min);
-    let high = readings().fold(f64::NEG_INFINITY, f64::max);
-    let width = (high - low).max(f64::MIN_POSITIVE) / BINS as f64;
-    let mut sums = [(0.0, 0usize); BINS];
-    for point in points {
-        let bin = (((point.thermometer - low) / width) as usize).min(BINS - 1);
-        sums[bin].0 += of(point);
-        sums[bin].1 += 1;
-    }
-    // Bins with a third of the usual number of points and more: the others are noise.
-    let filled = sums.iter().filter(|b| b.1 > 0).count().max(1);
-    let least = (points.len() / filled / 3).max(1);
-    let means: Vec<f64> = sums
-        .iter()
-        .filter(|b| b.1 >= least)
-        .map(|b| b.0 / b.1 as f64)
-        .collect();
-    let greatest = means.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let smallest = means.iter().copied().fold(f64::INFINITY, f64::min);
-    if means.is_empty() {
-        0.0
-    } else {
-        greatest - smallest
-    }
-}
-
-/// Root mean square.
-pub fn rms(points: &[Point], of: impl Fn(&Point) -> f64) -> f64 {
-    let sum: f64 = points.iter().map(|p| of(p).powi(2)).sum();
-    (sum / points.len().max(1) as f64).sqrt()
-}
-
-/// A warning that is not about one column.
-fn warning(code: &'static str, message: String) -> Warning {
-    Warning::general(code, message)
-}
-
-/// The fit's bias at a reading limited to the calibrated range, deg/s.
-fn clamped_bias(fit: &BaselineFit, reading: f64) -> f64 {
-    fit.bias_dps(reading.clamp(fit.range.0, fit.range.1))
 }

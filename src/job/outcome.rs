@@ -3,6 +3,7 @@
 use super::bound::Kept;
 use super::budget::Budget;
 use super::coefficients::Rounded;
+pub use super::points::Point;
 use super::{drift_pp, rms};
 use crate::compensation::certainty;
 use crate::compensation::certainty::Certainty;
@@ -15,29 +16,6 @@ use crate::verify::compare::Compared;
 use crate::verify::firmware::Firmware;
 use serde::Serialize;
 use std::path::PathBuf;
-
-/// One reading: the same rate through every path, deg/s. The applied rate is subtracted.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Point {
-    /// s.
-    pub time_s: f64,
-    /// In the thermometer's unit.
-    pub thermometer: f64,
-    /// Chamber or die, degC; NaN where nobody knows.
-    pub temperature_degc: f64,
-    /// True while the thermometer's trend is that of heating.
-    pub heating: bool,
-    /// Not compensated.
-    pub before_dps: f64,
-    /// Compensated in `f64` with the fit's own coefficients.
-    pub float_dps: f64,
-    /// Compensated by the bit-accurate model.
-    pub fixed_dps: f64,
-    /// Compensated by the emitted C.
-    pub c_dps: f64,
-    /// Compensated by the emitted Rust.
-    pub rust_dps: f64,
-}
 
 /// What an outcome is made of.
 #[derive(Debug)]

@@ -1,6 +1,6 @@
 //! What a request of `gyrogen approx` must be like.
 
-use super::job::{Asked, Request};
+use super::request::{Asked, Request};
 use crate::approx::form::coefficient_formats::CoefficientFormats;
 use crate::approx::form::measure::Reference;
 use crate::approx::form::polynomial;

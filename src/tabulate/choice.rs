@@ -1,9 +1,10 @@
 //! Forms that meet a bound, and the cheapest of them.
 
+use super::coefficients;
 use super::cost::Cost;
 use super::describe;
-use super::job::{self, Request};
 use super::outcome::Alternative;
+use super::request::Request;
 use crate::approx::form::generate;
 use crate::approx::form::generate::{MOST_BIPARTITE_CODES, MOST_SEGMENTS};
 use crate::approx::form::measure::{Effort, Measured, Reference, measure};
@@ -210,7 +211,7 @@ fn polynomials(search: &Search, request: &Request) -> Vec<Candidate> {
             if kind != Monomials::All && degree % 2 != usize::from(kind == Monomials::Odd) {
                 return None;
             }
-            let form = job::polynomial_within(
+            let form = coefficients::polynomial_within(
                 search.function,
                 search.codes,
                 request,

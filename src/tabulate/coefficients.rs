@@ -1,8 +1,8 @@
 //! A polynomial's coefficients: from the search, with the bit-accurate evaluation in its loop.
 
 use super::datapath::Evaluation;
-use super::job::{self, Request, Weight};
 use super::outcome::{Compared, Search};
+use super::request::{Request, Weight};
 use super::selection::{self, Errors, Reason};
 use crate::approx::form::coefficient_formats::CoefficientFormats;
 use crate::approx::form::measure::Reference;
@@ -14,6 +14,7 @@ use crate::approx::minimax::search::{Effort, Found, Judged};
 use crate::approx::minimax::{Basis, Budget, CoefficientFormat, Datapath, Problem, Samples};
 use crate::approx::reference::Function;
 use crate::error::Result;
+use crate::numeric::cast::Target as Quantised;
 use crate::numeric::format::Format;
 use crate::numeric::trace::ir::Interval;
 
@@ -97,7 +98,7 @@ pub fn choose(
     let best_real = minimax::minimax(&samples)?;
     let problem = Problem::new(&samples, &best_real, &each)?;
     let rounded = spread(&problem.rounded.raw, kind, degree);
-    let first = job::compiled(codes, request, kind, coefficients, rounded.clone())?;
+    let first = compiled(codes, request, kind, coefficients, rounded.clone())?;
     let mut formats = first.formats;
     if request.intermediate.is_none() {
         // Words a little shorter than the widest, for coefficients a little larger.
@@ -289,6 +290,48 @@ pub fn within(
         let format = given.unwrap_or(Format::q(integer_bits, fraction_bits));
         (format.bits() <= 64).then(|| (format, spread(&best.raw, kind, degree)))
     })
+}
+
+/// A polynomial for a bound: the best coefficients under ideal evaluation, in the format that is given or
+/// in the shortest that meets the bound.
+pub(super) fn polynomial_within(
+    function: &Function,
+    codes: Codes,
+    request: &Request,
+    kind: Monomials,
+    degree: usize,
+    bound: f64,
+) -> Option<Form> {
+    let room = bound - 0.5 * request.output.lsb();
+    let (format, raw) = within(function, request, kind, degree, room)?;
+    Some(Form::Polynomial(Box::new(
+        compiled(codes, request, kind, format.into(), raw).ok()?,
+    )))
+}
+
+/// The evaluation in the request's formats.
+pub(super) fn compiled(
+    codes: Codes,
+    request: &Request,
+    kind: Monomials,
+    coefficients: CoefficientFormats,
+    raw: Vec<i128>,
+) -> Result<Polynomial> {
+    let intermediate = match request.intermediate {
+        Some(format) => format,
+        None => {
+            let to = (request.output, request.evaluation);
+            polynomial::choose_intermediate(codes, coefficients, to, kind, &raw)?
+        }
+    };
+    let formats = polynomial::Formats {
+        codes,
+        coefficients,
+        intermediate: Quantised::from(intermediate),
+        output: request.output,
+        scheme: request.evaluation,
+    };
+    Polynomial::new(formats, kind, raw)
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The bit-accurate evaluation of a polynomial as the search of its coefficients sees it.
 
-use super::job::Weight;
+use super::request::Weight;
 use crate::approx::form::measure::Reference;
 use crate::approx::form::polynomial::{Formats, Monomials, Polynomial};
 use crate::approx::form::{Codes, Form, Settled, run_in};

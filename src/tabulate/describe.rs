@@ -1,7 +1,7 @@
 //! A form for the report: in words, and its data.
 
-use super::job::Request;
 use super::outcome::{Formats, TableData, Word};
+use super::request::Request;
 use crate::approx::form::Form;
 use crate::approx::form::polynomial::{Monomials, Scheme};
 use crate::approx::form::split::{Spacing, Split};

@@ -4,27 +4,12 @@
 //! others may be better by themselves. Nobody is to take the emitted ones' own error for the least that the formats allow.
 
 use super::coefficients::BEST_NAME;
+pub use super::outcome::Ideal;
 use super::outcome::{Search, Word};
 use crate::approx::form::Form;
 use crate::approx::form::measure;
 use crate::approx::form::measure::Reference;
 use crate::approx::form::polynomial::Polynomial;
-use serde::Serialize;
-
-/// Coefficients with the least error under ideal evaluation, in the formats of the emitted ones.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Ideal {
-    /// From order 0 to the degree; zeros where the monomials have none.
-    pub coefficients: Vec<Word>,
-    /// sup |f - p| over the real domain, proved; the emitted ones' is `error.coefficients_only_max_abs`.
-    pub coefficients_only_max_abs: f64,
-    /// Error of the whole evaluation with them, over the codes of the search; null if the datapath cannot take them.
-    pub total_max_abs: Option<f64>,
-    /// No coefficients in these formats have a smaller error under ideal evaluation.
-    pub proved_best: bool,
-    /// They are the emitted ones.
-    pub emitted: bool,
-}
 
 /// The ideal coefficients of a search whose result was emitted as `polynomial`; `None` if they are not known.
 /// `emitted_only` is the proved error of the emitted coefficients alone.

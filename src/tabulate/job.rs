@@ -7,118 +7,15 @@ use super::cost::Cost;
 use super::describe;
 use super::ideal;
 use super::outcome::{ErrorBounds, Outcome};
+pub use super::request::{Asked, EXHAUSTIVE_CODES, MOST_CODES, Request, Weight};
 use crate::approx::form::coefficient_formats::CoefficientFormats;
 use crate::approx::form::measure::{Effort, Measured, SAMPLE, measure};
-use crate::approx::form::polynomial;
-use crate::approx::form::polynomial::{Monomials, Polynomial, Scheme};
+use crate::approx::form::polynomial::Monomials;
 use crate::approx::form::{Codes, Form, Settled, overflow};
 use crate::approx::reference::Function;
-use crate::design::target::Target;
 use crate::digest::sha256;
 use crate::error::{Error, InputError, Result};
-use crate::numeric::cast::Target as Quantised;
 use crate::numeric::format::Format;
-use std::collections::BTreeMap;
-
-/// Codes that are all run if nobody says `--exhaustive`.
-pub const EXHAUSTIVE_CODES: u128 = 1 << 24;
-/// Codes that are all run if somebody does.
-pub const MOST_CODES: u128 = 1 << 32;
-
-/// Which form is asked for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Asked {
-    /// One polynomial.
-    #[default]
-    Polynomial,
-    /// A table.
-    Table,
-    /// A polynomial for each segment.
-    Piecewise,
-    /// The cheapest that meets the bound.
-    Auto,
-}
-
-/// What the error is weighed with when coefficients are chosen.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Weight {
-    /// The function's own unit.
-    #[default]
-    Absolute,
-    /// Parts of the function's magnitude.
-    Relative,
-}
-
-/// A request.
-#[derive(Debug, Clone)]
-pub struct Request {
-    /// The expression.
-    pub function: String,
-    /// Named values in it.
-    pub parameters: BTreeMap<String, f64>,
-    /// Both ends, constant expressions.
-    pub domain: [String; 2],
-    /// Highest order.
-    pub degree: Option<usize>,
-    /// Which monomials; all, or with a bound whatever is cheapest, if not given.
-    pub monomials: Option<Monomials>,
-    /// Of the input.
-    pub input: Format,
-    /// Of the output.
-    pub output: Format,
-    /// Of coefficients or entries; of a polynomial one for all or one a monomial, lowest order first; none = chosen.
-    pub coefficients: Vec<Format>,
-    /// Of the cast after each step.
-    pub intermediate: Option<Format>,
-    /// The order of a polynomial's steps.
-    pub evaluation: Scheme,
-    /// Which form.
-    pub form: Asked,
-    /// The most that the certified error may be.
-    pub bound: Option<f64>,
-    /// For the choice of coefficients.
-    pub weight: Weight,
-    /// Run up to 2^32 codes.
-    pub exhaustive: bool,
-    /// For the estimate of cycles.
-    pub target: Target,
-    /// Prefix of the emitted names.
-    pub name: String,
-}
-
-impl Request {
-    /// One line for each thing asked, in a fixed order: what the result depends on.
-    pub fn canonical(&self) -> String {
-        let mut text = format!("function = {}\n", self.function);
-        for (name, value) in &self.parameters {
-            text += &format!("parameter {name} = {value:e}\n");
-        }
-        let some = |f: Option<Format>| f.map_or("chosen".to_owned(), |f| f.to_string());
-        text += &format!(
-            "domain = {}, {}\ndegree = {:?}\nmonomials = {:?}\ninput = {}\noutput = {}\n",
-            self.domain[0], self.domain[1], self.degree, self.monomials, self.input, self.output
-        );
-        let formats: Vec<String> = self.coefficients.iter().map(Format::to_string).collect();
-        let list = match formats.as_slice() {
-            [] => "chosen".to_owned(),
-            some => some.join(","),
-        };
-        if self.evaluation != Scheme::default() {
-            text += &format!("evaluation = {:?}\n", self.evaluation);
-        }
-        text += &format!(
-            "coefficients = {}\nintermediate = {}\nform = {:?}\nbound = {:?}\nweight = {:?}\ntarget = {:?}\nname = {}\n",
-            list,
-            some(self.intermediate),
-            self.form,
-            self.bound,
-            self.weight,
-            self.target,
-            self.name
-        );
-        text
-    }
-}
 
 /// The result: what is reported, and what is emitted.
 #[derive(Debug, Clone)]
@@ -298,46 +195,4 @@ fn polynomial_as_asked(
     let chosen = coefficients::choose(function, codes, request, kind, degree, formats)?;
     let Chosen { form, search } = chosen;
     Ok((Form::Polynomial(Box::new(form)), search))
-}
-
-/// A polynomial for a bound: the best coefficients under ideal evaluation, in the format that is given or
-/// in the shortest that meets the bound.
-pub(super) fn polynomial_within(
-    function: &Function,
-    codes: Codes,
-    request: &Request,
-    kind: Monomials,
-    degree: usize,
-    bound: f64,
-) -> Option<Form> {
-    let room = bound - 0.5 * request.output.lsb();
-    let (format, raw) = coefficients::within(function, request, kind, degree, room)?;
-    Some(Form::Polynomial(Box::new(
-        compiled(codes, request, kind, format.into(), raw).ok()?,
-    )))
-}
-
-/// The evaluation in the request's formats.
-pub(super) fn compiled(
-    codes: Codes,
-    request: &Request,
-    kind: Monomials,
-    coefficients: CoefficientFormats,
-    raw: Vec<i128>,
-) -> Result<Polynomial> {
-    let intermediate = match request.intermediate {
-        Some(format) => format,
-        None => {
-            let to = (request.output, request.evaluation);
-            polynomial::choose_intermediate(codes, coefficients, to, kind, &raw)?
-        }
-    };
-    let formats = polynomial::Formats {
-        codes,
-        coefficients,
-        intermediate: Quantised::from(intermediate),
-        output: request.output,
-        scheme: request.evaluation,
-    };
-    Polynomial::new(formats, kind, raw)
 }

@@ -12,4 +12,5 @@ pub(crate) mod describe;
 pub mod ideal;
 pub mod job;
 pub mod outcome;
+pub mod request;
 pub mod selection;

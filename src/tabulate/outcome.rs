@@ -184,3 +184,18 @@ pub struct Alternative {
     /// This one was taken.
     pub chosen: bool,
 }
+
+/// Coefficients with the least error under ideal evaluation, in the formats of the emitted ones.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Ideal {
+    /// From order 0 to the degree; zeros where the monomials have none.
+    pub coefficients: Vec<Word>,
+    /// sup |f - p| over the real domain, proved; the emitted ones' is `error.coefficients_only_max_abs`.
+    pub coefficients_only_max_abs: f64,
+    /// Error of the whole evaluation with them, over the codes of the search; null if the datapath cannot take them.
+    pub total_max_abs: Option<f64>,
+    /// No coefficients in these formats have a smaller error under ideal evaluation.
+    pub proved_best: bool,
+    /// They are the emitted ones.
+    pub emitted: bool,
+}

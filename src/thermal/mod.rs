@@ -15,6 +15,7 @@ pub mod baseline;
 pub mod channels;
 pub mod checks;
 pub mod close;
+mod declared_bias;
 pub mod effects;
 pub mod firmware;
 mod heats;

@@ -7,6 +7,8 @@
 mod csv;
 mod merge;
 mod npy;
+mod signal;
+mod sink;
 mod vcd;
 
 #[cfg(test)]
@@ -15,75 +17,9 @@ mod tests;
 mod vcd_tests;
 
 use crate::error::{InputError, Result};
-use crate::output::OutputFile;
+pub use signal::{Signal, Trace, Values};
+use sink::Sink;
 use std::path::Path;
-
-/// Bytes gathered before they are written.
-const BUFFER_BYTES: usize = 1 << 18;
-
-/// Signals on one clock.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Trace {
-    /// ADC samples per second, Hz; above 0.
-    pub sample_rate_hz: f64,
-    /// 0-based ADC sample at which the trace begins; sample n is at n / sample_rate_hz seconds.
-    pub first_sample: u64,
-    /// In the order of the file's columns.
-    pub signals: Vec<Signal>,
-}
-
-/// The values of one node at its own rate.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Signal {
-    /// Dotted key and channel, such as `circuit.decimator.output drive_i`.
-    pub name: String,
-    /// Unit of a value, such as `deg/s` or `2^-15`; empty = none is written.
-    pub unit: String,
-    /// Samples between values: 1 = each ADC sample, R = each row. Value k (from 0) belongs to
-    /// sample `first_sample + (k + 1) * every - 1`.
-    pub every: u32,
-    /// The values.
-    pub values: Values,
-}
-
-/// What a signal's values are.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Values {
-    /// Raw words of `bits` bits, 1 to 64, signed or unsigned: -2^(bits-1) ..= 2^bits - 1.
-    Integer {
-        /// Width of the word.
-        bits: u32,
-        /// Raw.
-        values: Vec<i64>,
-    },
-    /// Reals, in the signal's unit.
-    Real(Vec<f64>),
-}
-
-impl Values {
-    /// How many there are.
-    pub fn len(&self) -> usize {
-        match self {
-            Values::Integer { values, .. } => values.len(),
-            Values::Real(values) => values.len(),
-        }
-    }
-
-    /// True if there is none.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-}
-
-impl Signal {
-    /// `name [unit]`, or the name alone.
-    pub(crate) fn title(&self) -> String {
-        match self.unit.as_str() {
-            "" => self.name.clone(),
-            unit => format!("{} [{unit}]", self.name),
-        }
-    }
-}
 
 impl Trace {
     /// Writes the trace to a file that appears whole or not at all, in the format of its extension:
@@ -150,48 +86,5 @@ impl Trace {
             }
         }
         Ok(())
-    }
-}
-
-/// Text on its way to a file.
-struct Sink {
-    file: OutputFile,
-    buffer: Vec<u8>,
-}
-
-impl Sink {
-    fn open(path: &Path) -> Result<Self> {
-        Ok(Sink {
-            file: OutputFile::open(path)?,
-            buffer: Vec::with_capacity(BUFFER_BYTES + 4096),
-        })
-    }
-
-    fn text(&mut self, text: &str) {
-        self.buffer.extend_from_slice(text.as_bytes());
-    }
-
-    fn integer(&mut self, value: impl itoa::Integer) {
-        self.text(itoa::Buffer::new().format(value));
-    }
-
-    /// The shortest decimal that reads back as the same f64, with an exponent if very small or
-    /// large; `NaN`, `inf`, `-inf`.
-    fn real(&mut self, value: f64) {
-        self.text(&format!("{value:?}"));
-    }
-
-    /// Called now and then: writes what has gathered, if it is much.
-    fn pass_on(&mut self) -> Result<()> {
-        if self.buffer.len() >= BUFFER_BYTES {
-            self.file.write_all(&self.buffer)?;
-            self.buffer.clear();
-        }
-        Ok(())
-    }
-
-    fn finish(mut self) -> Result<()> {
-        self.file.write_all(&self.buffer)?;
-        self.file.finish(None)
     }
 }

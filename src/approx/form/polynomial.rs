@@ -14,6 +14,7 @@
 //! aligned to the finer one by appending zeros.
 
 use super::coefficient_formats::CoefficientFormats;
+pub use super::monomials::{HIGHEST_DEGREE, Monomials};
 use super::plan::{Plan, half};
 use super::{Codes, Number, Piece, integer_bits_of};
 use crate::error::{InputError, Result};
@@ -23,37 +24,10 @@ use crate::numeric::format::{Format, Overflow, Quantizer, Rounding};
 use crate::numeric::trace::ir::Interval;
 
 pub use super::plan::Scheme;
-
-/// The highest degree.
-pub const HIGHEST_DEGREE: usize = 24;
 /// Sub-intervals on which bounds are taken.
 const PIECES: i128 = 128;
 /// Covers the rounding of bounds that are computed in `f64`.
 pub(super) const SLACK: f64 = 1.0 + 1e-9;
-
-/// Which monomials a polynomial has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Monomials {
-    /// 1, x, x^2, ..
-    #[default]
-    All,
-    /// x, x^3, x^5, ..
-    Odd,
-    /// 1, x^2, x^4, ..
-    Even,
-}
-
-impl Monomials {
-    /// The exponents up to `degree`, lowest first.
-    pub fn exponents(self, degree: usize) -> Vec<usize> {
-        match self {
-            Monomials::All => (0..=degree).collect(),
-            Monomials::Odd => (1..=degree).step_by(2).collect(),
-            Monomials::Even => (0..=degree).step_by(2).collect(),
-        }
-    }
-}
 
 /// The formats of a polynomial's evaluation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -46,6 +46,7 @@ mod undone;
 pub mod validate;
 
 use super::channels::Channels;
+pub use super::declared_bias::{declared, declared_by, powers, weighted};
 use super::effects::{self, Bias, Candidate, Missing, Point};
 use super::rails::{self, Rails};
 use crate::statistics::Unusable;
@@ -57,7 +58,6 @@ use crate::statistics::robust::ACCIDENT;
 use crate::statistics::tail::Tail;
 use acting::Settling;
 use clip::{Kind, clip};
-pub use declared::{declared, declared_by, powers, weighted};
 use judge::Judged;
 use memo::Memo;
 pub use model::Model;

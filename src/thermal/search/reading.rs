@@ -10,11 +10,11 @@
 //! temperature alone and read it with less noise: a curve in such a channel would else explain what the
 //! thermometer's noise makes of any bias.
 
-use super::declared::declared_by;
 use crate::statistics::linear::Basis;
 use crate::statistics::smooth::{averaged, reading_noise};
 use crate::statistics::stats;
 use crate::thermal::channels::{Channels, range};
+use crate::thermal::declared_bias::declared_by;
 use crate::thermal::effects::map;
 
 /// Powers of a channel that make the temperature of it.

@@ -4,7 +4,6 @@
 //! noise explains less than it does, and of two forms that are both off a little one is better in one part of the record, the other
 //! in the next.
 
-use super::declared::declared;
 use super::judge::{EQUAL, Judged, price};
 use super::reading::reads_temperature;
 use super::sweep::BETTER;
@@ -12,6 +11,7 @@ use super::{Found, LEVEL, MOST_RIVALS, Model, Search, Term};
 use crate::statistics::Unusable;
 use crate::statistics::linear::{Basis, dot};
 use crate::statistics::smooth::reading_noise;
+use crate::thermal::declared_bias::declared;
 use crate::thermal::effects::{Candidate, tone};
 use std::sync::Arc;
 

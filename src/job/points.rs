@@ -1,0 +1,63 @@
+//! Readings through every path, and figures over them.
+
+use serde::Serialize;
+
+/// One reading: the same rate through every path, deg/s. The applied rate is subtracted.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Point {
+    /// s.
+    pub time_s: f64,
+    /// In the thermometer's unit.
+    pub thermometer: f64,
+    /// Chamber or die, degC; NaN where nobody knows.
+    pub temperature_degc: f64,
+    /// True while the thermometer's trend is that of heating.
+    pub heating: bool,
+    /// Not compensated.
+    pub before_dps: f64,
+    /// Compensated in `f64` with the fit's own coefficients.
+    pub float_dps: f64,
+    /// Compensated by the bit-accurate model.
+    pub fixed_dps: f64,
+    /// Compensated by the emitted C.
+    pub c_dps: f64,
+    /// Compensated by the emitted Rust.
+    pub rust_dps: f64,
+}
+
+/// Points' drift: greatest minus least of the means over bins of the thermometer.
+pub fn drift_pp(points: &[Point], of: impl Fn(&Point) -> f64) -> f64 {
+    /// Bins over the thermometer's range.
+    const BINS: usize = 24;
+    let readings = || points.iter().map(|p| p.thermometer);
+    let low = readings().fold(f64::INFINITY, f64::min);
+    let high = readings().fold(f64::NEG_INFINITY, f64::max);
+    let width = (high - low).max(f64::MIN_POSITIVE) / BINS as f64;
+    let mut sums = [(0.0, 0usize); BINS];
+    for point in points {
+        let bin = (((point.thermometer - low) / width) as usize).min(BINS - 1);
+        sums[bin].0 += of(point);
+        sums[bin].1 += 1;
+    }
+    // Bins with a third of the usual number of points and more: the others are noise.
+    let filled = sums.iter().filter(|b| b.1 > 0).count().max(1);
+    let least = (points.len() / filled / 3).max(1);
+    let means: Vec<f64> = sums
+        .iter()
+        .filter(|b| b.1 >= least)
+        .map(|b| b.0 / b.1 as f64)
+        .collect();
+    let greatest = means.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let smallest = means.iter().copied().fold(f64::INFINITY, f64::min);
+    if means.is_empty() {
+        0.0
+    } else {
+        greatest - smallest
+    }
+}
+
+/// Root mean square.
+pub fn rms(points: &[Point], of: impl Fn(&Point) -> f64) -> f64 {
+    let sum: f64 = points.iter().map(|p| of(p).powi(2)).sum();
+    (sum / points.len().max(1) as f64).sqrt()
+}

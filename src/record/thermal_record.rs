@@ -1,0 +1,62 @@
+//! A thermal record: rows of averaged readings.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// A thermal record, read and checked. All columns have [`ThermalRecord::len`] rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ThermalRecord {
+    /// The file as the user named it.
+    pub source: PathBuf,
+    /// s; always measured, never decreasing, and strictly increasing unless a warning
+    /// `repeated_times` says that rows were kept.
+    pub time_s: Vec<f64>,
+    /// All other columns by contract name (auxiliary ones by the file's name), in the unit that
+    /// the name carries; NaN = not measured.
+    pub columns: BTreeMap<String, Vec<f64>>,
+    /// 1-based line of the file for each row (of the first where rows were averaged).
+    pub lines: Vec<usize>,
+    /// Contract name -> column of the file, where they differ.
+    pub renamed: BTreeMap<String, String>,
+}
+
+impl ThermalRecord {
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.time_s.len()
+    }
+
+    /// True without rows; [`read`] gives no such record.
+    pub fn is_empty(&self) -> bool {
+        self.time_s.is_empty()
+    }
+
+    /// A column by contract name, `time_s` included; `None` if the file lacks it.
+    pub fn column(&self, name: &str) -> Option<&[f64]> {
+        if name == "time_s" {
+            return Some(&self.time_s);
+        }
+        self.columns.get(name).map(Vec::as_slice)
+    }
+
+    /// How many rows of a column are measured; 0 if there is none of that name.
+    pub fn measured(&self, name: &str) -> usize {
+        self.column(name)
+            .map_or(0, |c| c.iter().filter(|v| !v.is_nan()).count())
+    }
+
+    /// The error signal, deg/s: `rate_out_dps - rate_dps`, an absent column or cell of applied
+    /// rate counting as 0 (at rest). NaN where the output was not measured.
+    pub fn error_dps(&self) -> Vec<f64> {
+        let applied = self.column("rate_dps").unwrap_or(&[]);
+        self.column("rate_out_dps")
+            .unwrap_or(&[])
+            .iter()
+            .enumerate()
+            .map(|(i, out)| match applied.get(i) {
+                Some(rate) if !rate.is_nan() => out - rate,
+                _ => *out,
+            })
+            .collect()
+    }
+}
