@@ -298,6 +298,7 @@ impl Default for Rows {
 
 #[cfg(test)]
 mod tests {
+    use super::super::signal::Truncation;
     use super::super::synthetic::{AMPLITUDE, Made, model};
     use super::*;
 

@@ -17,9 +17,9 @@ use crate::design::Design;
 use crate::error::Result;
 use crate::record::{ThermalRecord, condensed};
 use crate::thermal::close;
-use crate::thermal::close::{Closed, Named, channels_of, own_candidates};
+use crate::thermal::close::{Closed, Named, Taken};
 use crate::thermal::intake::refused;
-use crate::thermal::search::{Effort, Search};
+use crate::thermal::search::Effort;
 use crate::verdict::Fate;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -172,12 +172,9 @@ pub fn run(
 /// # Errors
 /// As there.
 pub fn look(record: &ThermalRecord, design: &Design, effort: Effort) -> Result<Seen> {
-    let mut warnings = Vec::new();
-    let channels = channels_of(record, design, &mut warnings)?;
+    let taken = Taken::of(record, design, Vec::new())?;
     let unusable = |e: crate::statistics::Unusable| refused(record, e.to_string());
-    let split = channels.split().map_err(unusable)?;
-    let own = own_candidates(design, &channels, &mut warnings);
-    let search = Search::new(&channels, &split, effort, own);
+    let search = taken.search(effort);
     let found = search.run().map_err(unusable)?;
     let model = search.model(&found.terms).map_err(unusable)?;
     let last = search.judge(&model, effort.surrogates);

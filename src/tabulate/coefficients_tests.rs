@@ -113,7 +113,7 @@ fn a_proved_least_error_is_that_of_trying_everything_nearby() {
                 coefficients: vec![Format::q(3, own)],
                 evaluation: Default::default(),
                 intermediate: None,
-                form: job::Asked::Polynomial,
+                form: crate::tabulate::request::Asked::Polynomial,
                 bound: None,
                 weight: Weight::Absolute,
                 exhaustive: false,

@@ -6,13 +6,12 @@ mod remarks;
 
 use super::channels::Channels;
 use super::effects::{Candidate, user};
-pub use super::intake::channels_of;
-use super::intake::{refused, without_glitches};
+use super::intake::{Intake, refused};
 use super::search::{Effort, Found, Model, Search};
 use crate::correction::Correction;
 use crate::design::Design;
 use crate::error::Result;
-use crate::record::{ThermalRecord, Warning, condensed};
+use crate::record::{ThermalRecord, Warning};
 use crate::statistics::blocks::Split;
 use crate::statistics::stats;
 use crate::verdict::{Closure, Errors, FirmwareErrors, SCHEMA, Step, Structure, Verdict};
@@ -39,7 +38,7 @@ pub struct Closed {
 }
 
 /// The effects that the design's user suspects, for a record.
-pub(crate) fn own_candidates(
+fn own_candidates(
     design: &Design,
     channels: &Channels,
     warnings: &mut Vec<Warning>,
@@ -67,23 +66,44 @@ pub struct Named {
 /// # Errors
 /// As there.
 pub fn names(record: &ThermalRecord, design: &Design, effort: Effort) -> Result<Vec<Named>> {
-    let mut warnings = Vec::new();
-    let condensed = condensed(record);
-    let record = condensed.as_ref().map_or(record, |(short, _)| short);
-    let cleaned = without_glitches(record);
-    let record = cleaned.as_ref().map_or(record, |(cleaned, _)| cleaned);
-    let channels = channels_of(record, design, &mut warnings)?;
-    let unusable = |e: crate::statistics::Unusable| refused(record, e.to_string());
-    let split = channels.split().map_err(unusable)?;
-    let own = own_candidates(design, &channels, &mut warnings);
-    let found = Search::new(&channels, &split, effort, own)
-        .run()
-        .map_err(unusable)?;
+    let taken = Taken::of(record, design, Vec::new())?;
+    let found = taken.search(effort).run();
+    let found = found.map_err(|e| refused(record, e.to_string()))?;
     let named = |term: super::search::Term| Named {
         effect: term.id(),
         rivals: term.rivals,
     };
     Ok(found.terms.into_iter().map(named).collect())
+}
+
+/// A record on its way to a search, the one way of every answer: taken in, its rows split, with the candidates of its design's user.
+pub(crate) struct Taken<'a> {
+    pub(crate) intake: Intake<'a>,
+    split: Split,
+    own: Vec<Arc<dyn Candidate>>,
+}
+
+impl<'a> Taken<'a> {
+    /// `warnings` are what was said of the record before.
+    ///
+    /// # Errors
+    /// As [`close`].
+    pub(crate) fn of(
+        record: &'a ThermalRecord,
+        design: &Design,
+        warnings: Vec<Warning>,
+    ) -> Result<Self> {
+        let mut intake = Intake::of(record, design, warnings)?;
+        let split = intake.channels.split();
+        let split = split.map_err(|e| refused(&intake.record, e.to_string()))?;
+        let own = own_candidates(design, &intake.channels, &mut intake.warnings);
+        Ok(Taken { intake, split, own })
+    }
+
+    /// The search of its causes.
+    pub(crate) fn search(&self, effort: Effort) -> Search<'_> {
+        Search::new(&self.intake.channels, &self.split, effort, self.own.clone())
+    }
 }
 
 /// Closes a record.
@@ -92,27 +112,17 @@ pub fn names(record: &ThermalRecord, design: &Design, effort: Effort) -> Result<
 /// A record that cannot be fitted: too few rows, no thermometer of the name that the design gives.
 pub fn close(
     record: &ThermalRecord,
-    mut warnings: Vec<Warning>,
+    warnings: Vec<Warning>,
     design: &Design,
     command: &str,
     effort: Effort,
 ) -> Result<Closed> {
-    let condensed = condensed(record);
-    let record = condensed.as_ref().map_or(record, |(short, warning)| {
-        warnings.push(warning.clone());
-        short
-    });
-    let cleaned = without_glitches(record);
-    let record = cleaned.as_ref().map_or(record, |(cleaned, said)| {
-        warnings.extend(said.iter().cloned());
-        cleaned
-    });
-    let channels = channels_of(record, design, &mut warnings)?;
+    let taken = Taken::of(record, design, warnings)?;
+    let record: &ThermalRecord = &taken.intake.record;
     let refuse = |why: String| refused(record, why);
-    let split = channels.split().map_err(|e| refuse(e.to_string()))?;
+    let mut warnings = taken.intake.warnings.clone();
     let (closure, before, after, accidents, firmware) = {
-        let own = own_candidates(design, &channels, &mut warnings);
-        let search = Search::new(&channels, &split, effort, own);
+        let search = taken.search(effort);
         if !search.heldout.contains(&true) {
             let rows = record.len();
             return Err(refuse(format!(
@@ -145,8 +155,8 @@ pub fn close(
     let (correction, firmware_dps) = firmware.map(|f| (f.correction, f.residual_dps)).unzip();
     Ok(Closed {
         closure,
-        channels,
-        split,
+        channels: taken.intake.channels,
+        split: taken.split,
         accidents,
         before,
         after,

@@ -10,9 +10,10 @@ use super::repeated;
 use crate::design::{Design, Gyro, RecordMapping};
 use crate::error::{InputError, Result};
 use crate::record::columns::THERMOMETERS;
-use crate::record::{ThermalRecord, Warning};
+use crate::record::{ThermalRecord, Warning, condensed};
 use crate::statistics::stats;
 use crate::statistics::weights;
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 /// The bias model's thermometer in a record, if it has one: the first in the contract's order that has at least half as many
@@ -90,7 +91,7 @@ pub fn refused(record: &ThermalRecord, why: String) -> crate::error::Error {
 
 /// The record without readings of a thermometer that are glitches, with what is said of them; `None`: it has none. One such
 /// reading sets the range that the declared bias is scaled to, and looks like whatever is narrow in temperature.
-pub fn without_glitches(record: &ThermalRecord) -> Option<(ThermalRecord, Vec<Warning>)> {
+fn without_glitches(record: &ThermalRecord) -> Option<(ThermalRecord, Vec<Warning>)> {
     let mut out: Option<(ThermalRecord, Vec<Warning>)> = None;
     for name in THERMOMETERS {
         let Some(column) = record.column(name) else {
@@ -115,11 +116,49 @@ pub fn without_glitches(record: &ThermalRecord) -> Option<(ThermalRecord, Vec<Wa
     out
 }
 
+/// A record taken in: shortened where it is long, without glitches of its thermometer, as channels.
+pub struct Intake<'a> {
+    /// The rows that are closed.
+    pub record: Cow<'a, ThermalRecord>,
+    /// As candidates see them.
+    pub channels: Channels,
+    /// What is said of the record, in order.
+    pub warnings: Vec<Warning>,
+}
+
+impl<'a> Intake<'a> {
+    /// Takes a record in; `warnings` are what its reader said of it.
+    ///
+    /// # Errors
+    /// As [`channels_of`].
+    pub fn of(
+        record: &'a ThermalRecord,
+        design: &Design,
+        mut warnings: Vec<Warning>,
+    ) -> Result<Self> {
+        let mut record = Cow::Borrowed(record);
+        if let Some((short, said)) = condensed(&record) {
+            warnings.push(said);
+            record = Cow::Owned(short);
+        }
+        if let Some((cleaned, said)) = without_glitches(&record) {
+            warnings.extend(said);
+            record = Cow::Owned(cleaned);
+        }
+        let channels = channels_of(&record, design, &mut warnings)?;
+        Ok(Intake {
+            record,
+            channels,
+            warnings,
+        })
+    }
+}
+
 /// A record as candidates see it.
 ///
 /// # Errors
 /// No thermometer of the name that the design gives; a column that is needed and holds no value.
-pub fn channels_of(
+pub(crate) fn channels_of(
     record: &ThermalRecord,
     design: &Design,
     warnings: &mut Vec<Warning>,
