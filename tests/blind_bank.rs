@@ -1,6 +1,6 @@
 //! The bank of blind records and its scorer, checked by themselves: `tests/blind`.
 //!
-//! `GYROGEN_BLIND_DUMP=DIR cargo test --release --test blind_bank dump` writes `GYROGEN_BLIND_COUNT` (20) records of each
+//! `GYROGEN_BLIND_DUMP=DIR cargo test --release --test blind_bank dump -- --ignored` writes `GYROGEN_BLIND_COUNT` (20) records of each
 //! class as CSV, with the truth beside them; `GYROGEN_SEED` (1) is the first seed.
 
 mod blind;
@@ -47,11 +47,11 @@ fn declared(p: &[f64]) -> Vec<Vec<f64>> {
 }
 
 #[test]
+#[ignore = "writes the bank into the folder GYROGEN_BLIND_DUMP"]
 fn dump() {
-    if let Ok(folder) = std::env::var("GYROGEN_BLIND_DUMP") {
-        let (count, seed) = (number("GYROGEN_BLIND_COUNT", 20), number("GYROGEN_SEED", 1));
-        dump::write(Path::new(&folder), count, seed).expect("the folder can be written");
-    }
+    let folder = std::env::var("GYROGEN_BLIND_DUMP").expect("GYROGEN_BLIND_DUMP names a folder");
+    let (count, seed) = (number("GYROGEN_BLIND_COUNT", 20), number("GYROGEN_SEED", 1));
+    dump::write(Path::new(&folder), count, seed).expect("the folder can be written");
 }
 
 #[test]

@@ -121,15 +121,12 @@ fn the_same_run_gives_the_same_bytes() {
     assert_eq!(of("one"), of("two"));
 }
 
-/// Records of real chips, where the shared data is beside the project: the held-out error is no worse
-/// than the table in its README (polynomials of degree 1 to 5, both autopilots' cubics).
+/// Records of real chips: the held-out error is no worse than the table beside them (polynomials of degree 1 to 5, both
+/// autopilots' cubics).
 #[test]
-fn real_chips_records_become_firmware() {
+#[ignore = "measured records stand outside of the repository"]
+fn measured_records_become_firmware() {
     let data = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
-    if !data.is_dir() {
-        println!("no shared data here: nothing compared");
-        return;
-    }
     let folder = tempfile::tempdir().expect("a folder");
     for (file, axis, best) in [
         ("lego_hub_rb.csv", "x", 0.02655),

@@ -46,7 +46,7 @@ mod intake_tests;
 #[cfg(test)]
 mod lag_tests;
 #[cfg(test)]
-mod lego_tests;
+mod measured_tests;
 #[cfg(test)]
 pub(crate) mod synthetic;
 
