@@ -16,6 +16,9 @@ pub enum Error {
     /// Everything was done and a check does not hold: exit status 1. The text says which.
     #[error("{0}")]
     Check(String),
+    /// Nobody reads the output any more (`| head`), which is no failure: exit status 0.
+    #[error("nobody reads the output any more")]
+    ReaderGone,
 }
 
 impl Error {
@@ -25,6 +28,7 @@ impl Error {
         match self {
             Error::Check(_) => 1,
             Error::Input(_) => 2,
+            Error::ReaderGone => 0,
         }
     }
 
@@ -32,6 +36,7 @@ impl Error {
     pub fn placeless(&self) -> String {
         match self {
             Error::Check(text) => text.clone(),
+            Error::ReaderGone => self.to_string(),
             Error::Input(e) => InputError {
                 file: e
                     .file

@@ -1,14 +1,26 @@
-//! Files that appear whole or not at all.
+//! Files that appear whole or not at all, and never over an input.
+//!
+//! [`OutputFile`] is one file, [`Results`] all those of a command; [`refuse_inputs`] keeps what a command reads, and
+//! [`standard`] is the standard output, whose failures are found at the end.
+
+mod results;
+mod same;
+pub mod standard;
+
+pub use results::Results;
+pub use same::refuse as refuse_inputs;
 
 pub use crate::base_name::{base_name, name_of};
 use crate::error::{Error, InputError, Result, io_error};
+use crate::leftovers::TemporaryFile;
+use std::fmt;
 use std::fs::{self, File, OpenOptions, Permissions};
 use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
-use tempfile::NamedTempFile;
 
 /// A file that appears under its name only by [`OutputFile::finish`]; dropped before, it leaves
 /// nothing, and an existing file as it was. What is no regular file is written straight.
+#[derive(Debug)]
 pub struct OutputFile {
     named: PathBuf,
     target: Target,
@@ -17,12 +29,21 @@ pub struct OutputFile {
 enum Target {
     /// A temporary file beside `path`, the permissions of the file it replaces.
     Replace {
-        temporary: NamedTempFile,
+        temporary: TemporaryFile,
         path: PathBuf,
         permissions: Option<Permissions>,
     },
     /// The file itself, which is no regular one.
     Straight(Box<dyn Write + Send>),
+}
+
+impl fmt::Debug for Target {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Target::Replace { path, .. } => write!(f, "beside {}", path.display()),
+            Target::Straight(_) => write!(f, "straight"),
+        }
+    }
 }
 
 impl OutputFile {
@@ -46,10 +67,10 @@ impl OutputFile {
     /// Appends bytes.
     ///
     /// # Errors
-    /// A failed write.
+    /// A failed write; [`Error::ReaderGone`] for a pipe that nobody reads any more.
     pub fn write_all(&mut self, bytes: &[u8]) -> Result<()> {
         match &mut self.target {
-            Target::Replace { temporary, .. } => temporary.as_file_mut().write_all(bytes),
+            Target::Replace { temporary, .. } => temporary.file.as_file_mut().write_all(bytes),
             Target::Straight(output) => output.write_all(bytes),
         }
         .map_err(|e| write_failed(&self.named, &e))
@@ -69,7 +90,7 @@ impl OutputFile {
                 path,
                 permissions,
             } => {
-                let file = temporary.as_file_mut();
+                let file = temporary.file.as_file_mut();
                 if let Some(start) = start {
                     file.rewind().map_err(|e| failed(&e))?;
                     file.write_all(start).map_err(|e| failed(&e))?;
@@ -77,8 +98,7 @@ impl OutputFile {
                 if let Some(permissions) = permissions {
                     file.set_permissions(permissions).map_err(|e| failed(&e))?;
                 }
-                temporary.persist(path).map_err(|e| failed(&e.error))?;
-                Ok(())
+                temporary.persist(&path).map_err(|e| failed(&e))
             }
         }
     }
@@ -107,28 +127,13 @@ impl Target {
                 }));
             }
         }
-        let existing = match fs::metadata(path) {
-            Ok(existing) => Some(existing),
-            Err(e) if e.kind() == io::ErrorKind::NotFound => None,
-            Err(e) => return Err(write_failed(path, &e)),
+        let real = target(path).map_err(|e| write_failed(path, &e))?;
+        let Some((file, existing)) = existing(path)? else {
+            return Target::replace(real, path, None);
         };
-        let Some(existing) = existing else {
-            return Target::replace(path.to_path_buf(), path, None);
-        };
-        if existing.is_dir() {
-            return Err(InputError::new("this is a folder, not a file to write")
-                .in_file(path)
-                .help("name a file in it, such as `rows.csv`")
-                .into());
-        }
-        // Opened without a change to it: may it be written at all?
-        let file = OpenOptions::new().write(true).open(path);
-        let file: File = file.map_err(|e| write_failed(path, &e))?;
         if !existing.is_file() {
             return Ok(Target::Straight(Box::new(file)));
         }
-        // A link stays a link: the file that it names is replaced.
-        let real = fs::canonicalize(path).map_err(|e| write_failed(path, &e))?;
         Target::replace(real, path, Some(existing.permissions()))
     }
 
@@ -151,17 +156,7 @@ impl Target {
                 .help(format!("make it first: `mkdir -p {}`", folder.display()))
                 .into());
         }
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".gyrogen-").suffix(".tmp");
-        #[cfg(unix)]
-        {
-            // As for any new file: what the umask leaves of 0666.
-            use std::os::unix::fs::PermissionsExt;
-            builder.permissions(Permissions::from_mode(0o666));
-        }
-        let temporary = builder
-            .tempfile_in(folder)
-            .map_err(|e| write_failed(named, &e))?;
+        let temporary = TemporaryFile::new(folder).map_err(|e| write_failed(named, &e))?;
         Ok(Target::Replace {
             temporary,
             path: real,
@@ -170,7 +165,54 @@ impl Target {
     }
 }
 
+/// What stands at a path already, opened for writing without a change to it.
+fn existing(path: &Path) -> Result<Option<(File, fs::Metadata)>> {
+    let found = match fs::metadata(path) {
+        Ok(found) => found,
+        Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
+        Err(e) => return Err(write_failed(path, &e)),
+    };
+    if found.is_dir() {
+        return Err(InputError::new("this is a folder, not a file to write")
+            .in_file(path)
+            .help("name a file in it, such as `rows.csv`")
+            .into());
+    }
+    let file = OpenOptions::new().write(true).open(path);
+    Ok(Some((file.map_err(|e| write_failed(path, &e))?, found)))
+}
+
+/// Finds before the work that a regular file of this name cannot be replaced.
+///
+/// # Errors
+/// An existing file that cannot be written, a folder of that name.
+fn check_writable(path: &Path) -> Result<()> {
+    // Opening a pipe would wait for its reader.
+    if fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
+        return Ok(());
+    }
+    existing(path).map(drop)
+}
+
+/// The file that a path names: a link stays a link, also one to a file that does not exist yet.
+fn target(path: &Path) -> io::Result<PathBuf> {
+    /// As Linux has it.
+    const MOST_LINKS: usize = 40;
+    let mut here = path.to_path_buf();
+    for _ in 0..MOST_LINKS {
+        match fs::read_link(&here) {
+            // A relative one is meant from where the link lies; an absolute one replaces the whole path.
+            Ok(next) => here = here.parent().unwrap_or(Path::new("")).join(next),
+            Err(_) => return Ok(here),
+        }
+    }
+    Err(io::Error::other("too many links, one to another"))
+}
+
 /// The error of a failed write.
 pub(crate) fn write_failed(path: &Path, e: &io::Error) -> Error {
+    if e.kind() == io::ErrorKind::BrokenPipe {
+        return Error::ReaderGone;
+    }
     io_error(path, "write the file", e)
 }

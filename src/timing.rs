@@ -1,8 +1,8 @@
 //! Wall times, which stand in `timing.json` alone: every other file has the same bytes for the same input.
 
 use crate::error::Result;
+use crate::output::Results;
 use serde::Serialize;
-use std::path::Path;
 use std::sync::Mutex;
 use std::time::Instant;
 
@@ -94,15 +94,15 @@ impl Stopwatch {
         }
     }
 
-    /// Writes `timing.json` into a folder.
+    /// Adds `timing.json` to the results.
     ///
     /// # Errors
-    /// A folder that cannot be written.
-    pub fn write(&self, folder: &Path, design_sha256: &str, command: &str) -> Result<()> {
+    /// A failed write.
+    pub fn write(&self, results: &mut Results, design_sha256: &str, command: &str) -> Result<()> {
         // A structure of strings and finite numbers always has a JSON form.
         let timing = self.timing(design_sha256, command);
         let text = serde_json::to_string_pretty(&timing).unwrap_or_default() + "\n";
-        crate::output::write_whole(&folder.join(NAME), text.as_bytes())
+        results.write(NAME, text.as_bytes())
     }
 }
 

@@ -7,13 +7,13 @@ use crate::design::target::Target;
 use crate::emit::views::Language;
 use crate::error::{Error, InputError, Result};
 use crate::firmware::approximation;
-use crate::firmware::files;
 use crate::numeric::format::Format;
+use crate::output::Results;
 use crate::tabulate::job;
 use crate::tabulate::job::{Asked, Request, Weight};
 use crate::tabulate::outcome::{Alternative, Outcome, Search};
 use crate::tabulate::selection::Reason;
-use crate::timing::Stopwatch;
+use crate::timing::{self, Stopwatch};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Mutex;
@@ -94,6 +94,8 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let watch = Stopwatch::start("approximating");
     let request = request(arguments)?;
+    let planned = ["approx.json", timing::NAME];
+    let mut results = Results::claim(&arguments.out, &planned, &recorded.inputs)?;
     let bar = Progress::new();
     let threads = super::threads(arguments.threads);
     let made = job::approximate(&request, &recorded.command, threads, &|total, count| {
@@ -117,15 +119,12 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let (c, rust) = (emit(Language::C)?, emit(Language::Rust)?);
     let json = super::json(&made.outcome);
     watch.stage("writing");
-    super::make_folder(&arguments.out)?;
-    files::write(&c, &arguments.out.join("c"))?;
-    files::write(&rust, &arguments.out.join("rust"))?;
-    crate::output::write_whole(&arguments.out.join("approx.json"), json.as_bytes())?;
-    watch.write(
-        &arguments.out,
-        &made.outcome.design_sha256,
-        &recorded.command,
-    )?;
+    for (files, folder) in [(&c, "c"), (&rust, "rust")] {
+        super::collect(files, folder, &mut results)?;
+    }
+    results.write("approx.json", json.as_bytes())?;
+    watch.write(&mut results, &made.outcome.design_sha256, &recorded.command)?;
+    results.finish()?;
     match arguments.format {
         OutputFormat::Json => say!("{}", json.trim_end()),
         OutputFormat::Text => print(&made.outcome, &arguments.out),

@@ -6,11 +6,11 @@ use crate::capture;
 use crate::correction::Planned;
 use crate::design::Design;
 use crate::emit::views::Language;
-use crate::error::{Error, InputError, Result};
+use crate::error::{Error, Result};
 use crate::firmware::correction;
 use crate::firmware::correction::Origin;
 use crate::firmware::files::EmittedFile;
-use crate::output::name_of;
+use crate::output::{Results, name_of};
 use crate::record::{ThermalRecord, Warning};
 use crate::report::closure::Beside;
 use crate::report::design_diff::DesignDiff;
@@ -20,7 +20,7 @@ use crate::thermal::close::Closed;
 use crate::thermal::firmware::emitted;
 use crate::thermal::firmware::emitted::{Emitted, Told};
 use crate::thermal::search::Effort;
-use crate::timing::Stopwatch;
+use crate::timing::{self, Stopwatch};
 use crate::verdict::{Closure, Verdict};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -63,6 +63,16 @@ pub struct Arguments {
 /// Where results go.
 const FOLDER: &str = "gyrogen-close";
 
+/// What is written beside the firmware.
+const PLANNED: [&str; 6] = [
+    "closure.json",
+    "design.toml",
+    "design.diff",
+    "residuals.csv",
+    "report.html",
+    timing::NAME,
+];
+
 /// Runs the command.
 ///
 /// # Errors
@@ -77,21 +87,18 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let loud = std::io::stderr().is_terminal();
     let closing = |path: &Path| {
         if loud {
-            eprintln!("closing {} ...", path.display());
+            talk!("closing {} ...", path.display());
         }
         watch.stage("closing");
     };
     let out = arguments.out.as_deref().unwrap_or(Path::new(FOLDER));
-    for given in [&arguments.record, &arguments.capture, &arguments.design] {
-        kept(given.as_deref(), out)?;
-    }
+    let mut results = Results::claim(out, &PLANNED, &recorded.inputs)?;
     let (closure, compared, controls) = if let Some(path) = &arguments.capture {
         closing(path);
         let closed = capture::close(path, &design, &recorded.command)?;
         watch.stage("writing");
         let page = crate::report::capture::html(&closed, &name_of(path))?;
-        super::make_folder(out)?;
-        crate::output::write_whole(&out.join("report.html"), page.as_bytes())?;
+        results.write("report.html", page.as_bytes())?;
         (closed.closure, None, None)
     } else if let Some(path) = &arguments.record {
         let (record, warnings) = crate::record::read_any(path, &design.record)?;
@@ -122,7 +129,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
             controls: controls.as_ref(),
             diff: None,
         };
-        write(&closed, path, &design, &sources, beside, out)?;
+        write(&closed, path, &design, &sources, beside, &mut results)?;
         (closed.closure, compared, controls)
     } else {
         return Ok(());
@@ -134,14 +141,15 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         },
         controls: controls.as_ref(),
     });
-    crate::output::write_whole(&out.join("closure.json"), json.as_bytes())?;
-    watch.write(out, &closure.design_sha256, &recorded.command)?;
+    results.write("closure.json", json.as_bytes())?;
+    watch.write(&mut results, &closure.design_sha256, &recorded.command)?;
+    results.finish()?;
     match arguments.format {
         OutputFormat::Json => say!("{}", json.trim_end()),
         OutputFormat::Text => print(&closure, compared.as_ref(), controls.as_ref(), out),
     }
     for warning in &closure.warnings {
-        eprintln!("warning: {} [{}]", warning.message, warning.code);
+        talk!("warning: {} [{}]", warning.message, warning.code);
     }
     let differences = compared.map_or(Vec::new(), |c| c.differences());
     let mut failures = Vec::new();
@@ -156,31 +164,6 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         return Ok(());
     }
     Err(Error::Check(failures.join("; ")))
-}
-
-/// Refuses an input that has the name of a result in the folder of the results.
-fn kept(given: Option<&Path>, out: &Path) -> Result<()> {
-    const RESULTS: [&str; 5] = [
-        "closure.json",
-        "design.toml",
-        "design.diff",
-        "residuals.csv",
-        "report.html",
-    ];
-    let Some(own) = given.and_then(|given| std::fs::canonicalize(given).ok()) else {
-        return Ok(());
-    };
-    for name in RESULTS {
-        if std::fs::canonicalize(out.join(name)).is_ok_and(|result| result == own) {
-            return Err(
-                InputError::new(format!("{name} would be written over this input"))
-                    .in_file(&own)
-                    .help("give another folder with --out")
-                    .into(),
-            );
-        }
-    }
-    Ok(())
 }
 
 /// `closure.json` with what was asked for beside it.
@@ -230,7 +213,7 @@ fn write(
     design: &Design,
     sources: &Option<[Vec<EmittedFile>; 2]>,
     beside: Beside<'_>,
-    out: &Path,
+    results: &mut Results,
 ) -> Result<()> {
     let augmented = closed.correction.as_ref().map(|correction| {
         let planned = Planned {
@@ -245,30 +228,32 @@ fn write(
         ..beside
     };
     let page = crate::report::closure::html_beside(closed, &beside, &name_of(path))?;
-    super::make_folder(out)?;
+    let out = results.folder();
     if augmented.is_none() && out.join("firmware").exists() {
-        eprintln!(
+        talk!(
             "warning: design.toml, design.diff and firmware/ in {} are of an earlier record: this one has no firmware",
             out.display()
         );
     }
     if let Some((diff, text)) = &augmented {
-        crate::output::write_whole(&out.join("design.toml"), text.as_bytes())?;
-        crate::output::write_whole(&out.join("design.diff"), diff.unified.as_bytes())?;
+        results.write("design.toml", text.as_bytes())?;
+        results.write("design.diff", diff.unified.as_bytes())?;
     }
     for (files, folder) in sources
         .iter()
         .flatten()
         .zip(["firmware/c", "firmware/rust"])
     {
-        crate::firmware::files::write(files, &out.join(folder))?;
+        super::collect(files, folder, results)?;
     }
-    crate::thermal::residuals::write(closed, &out.join("residuals.csv"))?;
-    crate::output::write_whole(&out.join("report.html"), page.as_bytes())?;
+    results.write_with("residuals.csv", |path| {
+        crate::thermal::residuals::write(closed, path)
+    })?;
+    results.write("report.html", page.as_bytes())?;
     if let Some((diff, _)) = &augmented
         && std::io::stderr().is_terminal()
     {
-        eprintln!("{}", diff.sentence());
+        talk!("{}", diff.sentence());
     }
     Ok(())
 }

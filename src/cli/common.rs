@@ -1,18 +1,26 @@
 //! What the subcommands share: lines and tables on the terminal, progress, JSON, the design that was named.
 
 use crate::error::Result;
+use crate::firmware::files::EmittedFile;
+use crate::output::Results;
 use crate::verify::compare::Compared;
 use clap::ValueEnum;
 use std::io::IsTerminal;
+use std::path::Path;
 use std::sync::Mutex;
 
-/// A line on stdout. A reader that has gone away (`| head`) is no reason to stop: what is written to files
-/// is.
+/// A line on stdout; what cannot be written is an error at the end, for what is written to files is.
 macro_rules! say {
-    ($($words:tt)*) => {{
-        use std::io::Write as _;
-        _ = writeln!(std::io::stdout(), $($words)*);
-    }};
+    ($($words:tt)*) => {
+        crate::output::standard::line(format_args!($($words)*))
+    };
+}
+
+/// A line on stderr.
+macro_rules! talk {
+    ($($words:tt)*) => {
+        crate::output::standard::talk(format_args!($($words)*))
+    };
 }
 
 /// How results are printed.
@@ -26,7 +34,7 @@ pub(super) enum OutputFormat {
 }
 
 /// Reads the design named on the command line, or the embedded default.
-pub(super) fn design(path: Option<&std::path::Path>) -> Result<crate::design::Design> {
+pub(super) fn design(path: Option<&Path>) -> Result<crate::design::Design> {
     let design = crate::design::reader::read(path)?;
     crate::correction::refuse_unbuildable(&design)?;
     Ok(design)
@@ -65,10 +73,12 @@ pub(super) fn json<T: serde::Serialize>(value: &T) -> String {
     serde_json::to_string_pretty(value).unwrap_or_default() + "\n"
 }
 
-/// Makes a folder for results.
-pub(super) fn make_folder(folder: &std::path::Path) -> Result<()> {
-    std::fs::create_dir_all(folder)
-        .map_err(|e| crate::error::io_error(folder, "make the folder", &e))
+/// Emitted code among the results, below a folder.
+pub(super) fn collect(files: &[EmittedFile], folder: &str, results: &mut Results) -> Result<()> {
+    let files = files
+        .iter()
+        .map(|file| (Path::new(folder).join(&file.path), file.text.as_bytes()));
+    results.write_all(files)
 }
 
 /// A table of numbers for the terminal.

@@ -12,6 +12,8 @@ use crate::firmware::correction;
 use crate::firmware::correction::Origin;
 use crate::firmware::files;
 use crate::firmware::files::EmittedFile;
+use crate::firmware::manifest;
+use crate::output::Results;
 use std::path::PathBuf;
 
 /// Write a firmware bundle: sources, self-test, test vectors and a manifest of its files.
@@ -40,15 +42,17 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         Some(_) => Part::Correction,
         None => Part::Chain,
     });
+    let mut results = Results::claim(&arguments.out, &[manifest::NAME], &recorded.inputs)?;
     let bundle = match part {
         Part::Correction => correction(&design, arguments.lang, &recorded.command)?,
         part => files::emit(&design, part, arguments.lang, &recorded.command)?,
     };
-    files::write(&bundle, &arguments.out)?;
+    super::collect(&bundle, "", &mut results)?;
+    results.finish()?;
     for remark in remarks(&design, part, arguments.part.is_some()) {
-        eprintln!("{remark}");
+        talk!("{remark}");
     }
-    eprintln!(
+    talk!(
         "wrote {} files to {}",
         bundle.len(),
         arguments.out.display()

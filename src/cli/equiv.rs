@@ -8,9 +8,9 @@ use crate::equivalence::job::{self, Request, Stimulus};
 use crate::equivalence::outcome::{Equivalence, NodeReport};
 use crate::equivalence::shrink;
 use crate::error::{Error, Result};
-use crate::output::name_of;
+use crate::output::{Results, name_of};
 use crate::record::capture::CaptureReader;
-use crate::timing::Stopwatch;
+use crate::timing::{self, Stopwatch};
 use std::path::{Path, PathBuf};
 
 /// Compare the fixed-point circuit with its float twin, every word within a bound, and the emitted code with the model.
@@ -60,6 +60,8 @@ const SAMPLES: usize = 10_000_000;
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let watch = Stopwatch::start("making the stimulus");
     let design = super::design(arguments.design.as_deref())?;
+    let planned = ["equiv.json", job::COUNTEREXAMPLE, timing::NAME];
+    let mut results = Results::claim(&arguments.out, &planned, &recorded.inputs)?;
     let (drive, sense, origin) = codes(&design, arguments)?;
     let stimulus = Stimulus {
         drive: &drive,
@@ -77,18 +79,16 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let (result, counterexample) = job::equivalence(&design, stimulus, request)?;
     watch.stage("writing");
     let json = super::json(&result);
-    super::make_folder(&arguments.out)?;
-    crate::output::write_whole(&arguments.out.join("equiv.json"), json.as_bytes())?;
-    let shrunk = arguments.out.join(job::COUNTEREXAMPLE);
+    results.write("equiv.json", json.as_bytes())?;
     if let Some((drive, sense)) = counterexample {
         let text = shrink::capture_text(&design, &drive, &sense);
-        crate::output::write_whole(&shrunk, text.as_bytes())?;
-    } else if shrunk.exists() {
-        // Of an earlier run: it would contradict this one.
-        let failed = |e: std::io::Error| crate::error::io_error(&shrunk, "remove", &e);
-        std::fs::remove_file(&shrunk).map_err(failed)?;
+        results.write(job::COUNTEREXAMPLE, text.as_bytes())?;
+    } else {
+        // That of an earlier run would contradict this one.
+        results.remove(job::COUNTEREXAMPLE);
     }
-    watch.write(&arguments.out, &result.design_sha256, &recorded.command)?;
+    watch.write(&mut results, &result.design_sha256, &recorded.command)?;
+    results.finish()?;
     match arguments.format {
         OutputFormat::Json => say!("{}", json.trim_end()),
         OutputFormat::Text => print(&result),

@@ -27,6 +27,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             .into());
     }
     crate::output::write_whole(path, text.as_bytes())?;
-    eprintln!("wrote {}", path.display());
+    talk!("wrote {}", path.display());
     Ok(())
 }

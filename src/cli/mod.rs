@@ -23,7 +23,7 @@ mod verify;
 
 use crate::error::{Error, Result};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use common::{OutputFormat, comparison_table, design, json, make_folder, table, threads, with_bar};
+use common::{OutputFormat, collect, comparison_table, design, json, table, threads, with_bar};
 use recorded::Recorded;
 use std::process::ExitCode;
 
@@ -50,16 +50,31 @@ enum Command {
 
 /// Runs the command that the process was started with.
 pub fn main() -> ExitCode {
+    crate::leftovers::on_signals();
     let parser = Cli::command();
-    let matches = parser.clone().get_matches();
-    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
-    let result = run(&cli.command, &recorded::recorded(&parser, &matches));
+    let result = match parser.clone().try_get_matches() {
+        Ok(matches) => {
+            let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
+            run(&cli.command, &recorded::recorded(&parser, &matches))
+        }
+        Err(e) if e.use_stderr() => e.exit(),
+        // Help, the version.
+        Err(e) => {
+            crate::output::standard::keep(e.print());
+            Ok(())
+        }
+    };
+    // What could not be printed does not hide why a command failed.
+    let result = result.and_then(|()| crate::output::standard::check());
+    // Nothing ends before a signal that has come has removed what is left.
+    let _held = crate::leftovers::undisturbed();
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(e) => {
             match &e {
-                Error::Check(text) => eprintln!("check failed: {text}"),
-                Error::Input(_) => eprintln!("{e}"),
+                Error::Check(text) => talk!("check failed: {text}"),
+                Error::Input(_) => talk!("{e}"),
+                Error::ReaderGone => {}
             }
             ExitCode::from(e.exit_status())
         }
@@ -69,7 +84,7 @@ pub fn main() -> ExitCode {
 /// Runs a subcommand; `recorded` is what its files say of how they were made.
 fn run(command: &Command, recorded: &Recorded) -> Result<()> {
     if let Some(name) = &recorded.ambiguous {
-        eprintln!(
+        talk!(
             "warning: two inputs are called {name}, and the files written here name both by that name alone: rename one \
              to be able to make them again [same_base_name]"
         );

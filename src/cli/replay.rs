@@ -51,9 +51,10 @@ const BLOCK: usize = 1 << 16;
 /// # Errors
 /// An unusable design or capture (exit 2), or an overflow where the design says `error` (exit 1);
 /// no file is written then.
-pub fn run(arguments: &Arguments, _recorded: &Recorded) -> Result<()> {
+pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let design = super::design(arguments.design.as_deref())?;
     let kind = ArithmeticKind::from(arguments.arith);
+    crate::output::refuse_inputs(&arguments.out, &recorded.inputs)?;
     let mut capture = CaptureReader::open(&arguments.capture, design.circuit.adc.format)?;
     warn_of_mismatches(&design, &capture);
 
@@ -88,7 +89,7 @@ pub fn run(arguments: &Arguments, _recorded: &Recorded) -> Result<()> {
     }
     progress.done();
     writer.finish()?;
-    eprintln!(
+    talk!(
         "replayed {samples} samples into {index} rows: {:.1} M samples/s in the circuit, \
          {:.1} M/s with reading and writing, one thread",
         rate(samples, busy),
@@ -141,7 +142,7 @@ pub(super) fn warn_of_mismatches(design: &Design, capture: &CaptureReader) {
         (word, nco.phase_bits),
         design.circuit.adc.format.bits(),
     ) {
-        eprintln!("warning: {warning}");
+        talk!("warning: {warning}");
     }
 }
 

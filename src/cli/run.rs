@@ -6,7 +6,8 @@ use crate::error::{Error, Result};
 use crate::job;
 use crate::job::bound::Line;
 use crate::job::outcome::{Drift, Outcome};
-use crate::timing::Stopwatch;
+use crate::output::Results;
+use crate::timing::{self, Stopwatch};
 use std::io::IsTerminal;
 use std::path::PathBuf;
 
@@ -27,6 +28,15 @@ pub struct Arguments {
     format: OutputFormat,
 }
 
+/// What is written beside the firmware.
+const PLANNED: [&str; 5] = [
+    "record.csv",
+    "design.toml",
+    "report.html",
+    "summary.json",
+    timing::NAME,
+];
+
 /// Runs the command.
 ///
 /// # Errors
@@ -34,11 +44,12 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let watch = Stopwatch::start("reading the design");
     let design = super::design(arguments.design.as_deref())?;
+    let mut results = Results::claim(&arguments.out, &PLANNED, &recorded.inputs)?;
     let loud = std::io::stderr().is_terminal();
     let say = |step: &str| {
         watch.stage(step);
         if loud {
-            eprintln!("{step} ...");
+            talk!("{step} ...");
         }
     };
     let outcome = job::run(
@@ -50,26 +61,30 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     watch.stage("writing");
     let html = crate::report::html(&outcome)?;
     let json = super::json(&outcome.summary);
-    let out = &arguments.out;
-    super::make_folder(out)?;
-    outcome.parts.firmware.write(out)?;
+    let files = outcome.parts.firmware.files();
+    results.write_all(files.map(|(path, text)| (path, text.as_bytes())))?;
     if let Some(record) = &outcome.parts.record_csv {
-        crate::output::write_whole(&out.join("record.csv"), record.as_bytes())?;
+        results.write("record.csv", record.as_bytes())?;
     }
     let fitted = job::fitted_design::text(&outcome.parts.design);
-    crate::output::write_whole(&out.join("design.toml"), fitted.as_bytes())?;
-    crate::output::write_whole(&out.join("report.html"), html.as_bytes())?;
-    crate::output::write_whole(&out.join("summary.json"), json.as_bytes())?;
-    watch.write(out, &outcome.summary.design_sha256, &recorded.command)?;
+    results.write("design.toml", fitted.as_bytes())?;
+    results.write("report.html", html.as_bytes())?;
+    results.write("summary.json", json.as_bytes())?;
+    watch.write(
+        &mut results,
+        &outcome.summary.design_sha256,
+        &recorded.command,
+    )?;
+    results.finish()?;
     match arguments.format {
         OutputFormat::Json => say!("{}", json.trim_end()),
-        OutputFormat::Text => print(&outcome, out),
+        OutputFormat::Text => print(&outcome, &arguments.out),
     }
     for warning in &outcome.summary.warnings {
-        eprintln!("warning: {} [{}]", warning.message, warning.code);
+        talk!("warning: {} [{}]", warning.message, warning.code);
     }
     if design.correction.is_some() {
-        eprintln!("{}", super::emit::lacks_correction("compensation"));
+        talk!("{}", super::emit::lacks_correction("compensation"));
     }
     if outcome.holds() {
         return Ok(());

@@ -5,10 +5,12 @@ use super::close::Arguments;
 use super::recorded::Recorded;
 use crate::design::Design;
 use crate::error::{Error, Result};
+use crate::output::Results;
 use crate::report::text::significant;
 use crate::selftest::outcome::{EffectScore, Minimum, Outcome};
 use crate::selftest::{self, Request};
-use crate::timing::Stopwatch;
+use crate::timing::{self, Stopwatch};
+use std::path::PathBuf;
 
 /// Of a self-test.
 #[derive(Debug, clap::Args)]
@@ -45,6 +47,9 @@ pub fn run(
     watch: &Stopwatch,
 ) -> Result<()> {
     let options = &arguments.test;
+    let planned = ["selftest.json", "selftest.html", timing::NAME];
+    let claim = |out: &PathBuf| Results::claim(out, &planned, &recorded.inputs);
+    let results = arguments.out.as_ref().map(claim).transpose()?;
     let read = match &arguments.record {
         Some(path) => Some(crate::record::read_any(path, &design.record)?),
         None => None,
@@ -63,12 +68,12 @@ pub fn run(
     let outcome = super::with_bar(|progress| selftest::run(design, record, &request, progress))?;
     watch.stage("writing");
     let json = super::json(&outcome);
-    if let Some(out) = &arguments.out {
+    if let Some(mut results) = results {
         let page = crate::report::selftest::html(&outcome)?;
-        super::make_folder(out)?;
-        crate::output::write_whole(&out.join("selftest.json"), json.as_bytes())?;
-        crate::output::write_whole(&out.join("selftest.html"), page.as_bytes())?;
-        watch.write(out, &outcome.design_sha256, &recorded.command)?;
+        results.write("selftest.json", json.as_bytes())?;
+        results.write("selftest.html", page.as_bytes())?;
+        watch.write(&mut results, &outcome.design_sha256, &recorded.command)?;
+        results.finish()?;
     }
     match arguments.format {
         OutputFormat::Json => say!("{}", json.trim_end()),

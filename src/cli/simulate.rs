@@ -4,11 +4,12 @@ use super::OutputFormat;
 use super::recorded::Recorded;
 use super::replay::Arith;
 use crate::error::{Error, Result};
+use crate::output::Results;
 use crate::simulation::hunting::Hunting;
 use crate::simulation::outcome::{Both, Outcome};
 use crate::simulation::trace::Wanted;
 use crate::simulation::{self, Course, Request, record_csv};
-use crate::timing::Stopwatch;
+use crate::timing::{self, Stopwatch};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
@@ -80,6 +81,17 @@ impl TraceFormat {
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let watch = Stopwatch::start("reading the design");
     let design = super::design(arguments.design.as_deref())?;
+    let trace = arguments.trace_format.file_name();
+    let planned = [
+        "record.csv",
+        "readings.csv",
+        "design.toml",
+        trace,
+        "report.html",
+        "simulate.json",
+        timing::NAME,
+    ];
+    let mut results = Results::claim(&arguments.out, &planned, &recorded.inputs)?;
     let request = Request {
         course: match (&arguments.duration, &arguments.profile) {
             (Some(seconds), _) => Course::Continuous(*seconds),
@@ -105,19 +117,19 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     watch.stage("writing");
     let json = super::json(&outcome.summary);
     let html = crate::report::simulation::html(&outcome)?;
-    let trace = arguments.trace_format.file_name();
-    write(&outcome, &arguments.out, trace, &json, &html)?;
+    write(&outcome, &mut results, trace, &json, &html)?;
     watch.write(
-        &arguments.out,
+        &mut results,
         &outcome.summary.design_sha256,
         &recorded.command,
     )?;
+    results.finish()?;
     match arguments.format {
         OutputFormat::Json => say!("{}", json.trim_end()),
         OutputFormat::Text => print(&outcome, &arguments.out),
     }
     for warning in &outcome.summary.warnings {
-        eprintln!("warning: {} [{}]", warning.message, warning.code);
+        talk!("warning: {} [{}]", warning.message, warning.code);
     }
     let failures = outcome.failures();
     if failures.is_empty() {
@@ -126,22 +138,24 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     Err(Error::Check(failures.join("; ")))
 }
 
-fn write(outcome: &Outcome, out: &Path, trace: &str, json: &str, html: &str) -> Result<()> {
-    super::make_folder(out)?;
+fn write(
+    outcome: &Outcome,
+    results: &mut Results,
+    trace: &str,
+    json: &str,
+    html: &str,
+) -> Result<()> {
     let parts = &outcome.parts;
-    let whole =
-        |name: &str, text: &str| crate::output::write_whole(&out.join(name), text.as_bytes());
-    whole("record.csv", &parts.record_csv)?;
-    whole(
-        "readings.csv",
-        &record_csv::both_paths(&parts.run.taken, parts.after.as_deref()),
-    )?;
+    results.write("record.csv", parts.record_csv.as_bytes())?;
+    let readings = record_csv::both_paths(&parts.run.taken, parts.after.as_deref());
+    results.write("readings.csv", readings.as_bytes())?;
     if let Some((fitted, _)) = &parts.calibrated {
-        whole("design.toml", &crate::job::fitted_design::text(fitted))?;
+        let text = crate::job::fitted_design::text(fitted);
+        results.write("design.toml", text.as_bytes())?;
     }
-    parts.trace.write(&out.join(trace))?;
-    whole("report.html", html)?;
-    whole("simulate.json", json)
+    results.write_with(trace, |path| parts.trace.write(path))?;
+    results.write("report.html", html.as_bytes())?;
+    results.write("simulate.json", json.as_bytes())
 }
 
 fn print(outcome: &Outcome, out: &Path) {

@@ -3,7 +3,8 @@
 use super::OutputFormat;
 use super::recorded::Recorded;
 use crate::error::{Error, Result};
-use crate::timing::Stopwatch;
+use crate::output::Results;
+use crate::timing::{self, Stopwatch};
 use crate::verify::bundle::{self, Verification};
 use crate::verify::target::Target;
 use std::path::PathBuf;
@@ -30,13 +31,15 @@ pub struct Arguments {
 /// A folder that holds no bundle, no compiler for the target (exit 2); a difference (exit 1).
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let watch = Stopwatch::start("building and running");
+    let folder = arguments.out.as_ref().unwrap_or(&arguments.bundle);
+    let planned = ["verify.json", timing::NAME];
+    let mut results = Results::claim(folder, &planned, &recorded.inputs)?;
     let verification = bundle::verify(&arguments.bundle, arguments.target, &recorded.command)?;
     watch.stage("writing");
     let json = super::json(&verification);
-    let folder = arguments.out.as_ref().unwrap_or(&arguments.bundle);
-    super::make_folder(folder)?;
-    crate::output::write_whole(&folder.join("verify.json"), json.as_bytes())?;
-    watch.write(folder, &verification.design_sha256, &recorded.command)?;
+    results.write("verify.json", json.as_bytes())?;
+    watch.write(&mut results, &verification.design_sha256, &recorded.command)?;
+    results.finish()?;
     match arguments.format {
         OutputFormat::Json => say!("{}", json.trim_end()),
         OutputFormat::Text => print(&verification),

@@ -6,7 +6,8 @@ use super::{
 };
 use crate::design::schema::*;
 use crate::digest::sha256;
-use crate::error::{Error, InputError, Result, io_error};
+use crate::error::{Error, InputError, Result};
+use crate::input;
 use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -16,7 +17,12 @@ pub fn read(path: Option<&Path>) -> Result<Design> {
     let Some(path) = path else {
         return template::default_design();
     };
-    let bytes = std::fs::read(path).map_err(|e| io_error(path, "read the design", &e))?;
+    let bytes = input::text_bytes(
+        input::open(path, "design")?,
+        path,
+        "design",
+        input::MOST_OF_A_DESIGN,
+    )?;
     match String::from_utf8(bytes) {
         Ok(text) => parse(&text, Some(path)),
         Err(e) => {

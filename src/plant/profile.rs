@@ -1,7 +1,8 @@
 //! What surrounds the device over time: chamber, table, supply, acceleration, piecewise linear.
 
 use crate::design::ThermalRun;
-use crate::error::{Error, InputError, Result, io_error};
+use crate::error::{Error, InputError, Result};
+use crate::input;
 use std::path::Path;
 
 /// A corner of a profile.
@@ -85,7 +86,12 @@ impl Profile {
     /// # Errors
     /// A file that cannot be read; a missing column, a cell that is no number, a time that decreases.
     pub fn read(path: &Path) -> Result<Profile> {
-        let bytes = std::fs::read(path).map_err(|e| io_error(path, "read", &e))?;
+        let bytes = input::text_bytes(
+            input::open(path, "profile")?,
+            path,
+            "profile",
+            input::MOST_OF_A_RECORD,
+        )?;
         parse(&bytes, path)
     }
 

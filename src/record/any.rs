@@ -5,7 +5,7 @@ use super::warning::Warning;
 use super::{dataflash, ulog};
 use crate::design::RecordMapping;
 use crate::error::{InputError, Result, io_error};
-use std::fs::File;
+use crate::input;
 use std::io::{BufReader, Cursor, Read};
 use std::path::Path;
 
@@ -20,13 +20,7 @@ const BUFFER_BYTES: usize = 1 << 18;
 /// is none.
 pub fn read_any(path: &Path, mapping: &RecordMapping) -> Result<(ThermalRecord, Vec<Warning>)> {
     let failed = |e: std::io::Error| io_error(path, "read the record", &e);
-    let mut file = File::open(path).map_err(failed)?;
-    if file.metadata().map_err(failed)?.is_dir() {
-        return Err(InputError::new("this is a folder, not a record")
-            .in_file(path)
-            .help("name the record's file (CSV, ULog or DataFlash)")
-            .into());
-    }
+    let mut file = input::open(path, "record")?;
     let mut start = Vec::new();
     file.by_ref()
         .take(ulog::MAGIC.len() as u64)
@@ -37,15 +31,14 @@ pub fn read_any(path: &Path, mapping: &RecordMapping) -> Result<(ThermalRecord, 
     if !is_ulog && !is_dataflash {
         refuse_by_name(path, &start)?;
     }
-    let mut input = Cursor::new(start).chain(file);
+    let input = Cursor::new(start).chain(file);
     if is_ulog {
         return ulog::read(BufReader::with_capacity(BUFFER_BYTES, input), path, mapping);
     }
     if is_dataflash {
         return dataflash::read(BufReader::with_capacity(BUFFER_BYTES, input), path, mapping);
     }
-    let mut bytes = Vec::new();
-    input.read_to_end(&mut bytes).map_err(failed)?;
+    let bytes = input::text_bytes(input, path, "record", input::MOST_OF_A_RECORD)?;
     thermal::parse(&bytes, path, mapping)
 }
 

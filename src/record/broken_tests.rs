@@ -48,7 +48,7 @@ pub(super) fn try_parse(
 ) -> Result<(ThermalRecord, Vec<Warning>), Box<InputError>> {
     parse(bytes, Path::new("r.csv"), mapping).map_err(|e| match e {
         Error::Input(e) => e,
-        Error::Check(text) => panic!("not an input error: {text}"),
+        other => panic!("not an input error: {other}"),
     })
 }
 

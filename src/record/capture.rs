@@ -11,8 +11,8 @@ use super::capture_npy::NpySource;
 use super::capture_places::Places;
 use super::npy_header;
 use crate::error::{Error, InputError, Result, io_error};
+use crate::input;
 use crate::numeric::format::Format;
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
@@ -45,14 +45,8 @@ impl CaptureReader {
     /// A file that cannot be read, is empty or has no usable header; a broken side-car or comment.
     pub fn open(path: &Path, adc: Format) -> Result<Self> {
         let failed = |e: std::io::Error| io_error(path, "read the capture", &e);
-        let mut file = File::open(path).map_err(failed)?;
+        let mut file = input::open(path, "capture")?;
         let kind = file.metadata().map_err(failed)?;
-        if kind.is_dir() {
-            return Err(InputError::new("this is a folder, not a capture")
-                .in_file(path)
-                .help("name the capture's file (CSV or NPY)")
-                .into());
-        }
         let mut start = Vec::new();
         file.by_ref()
             .take(npy_header::MAGIC.len() as u64)

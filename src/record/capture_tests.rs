@@ -63,7 +63,7 @@ impl Capture {
 fn input(e: Error) -> Box<InputError> {
     match e {
         Error::Input(e) => e,
-        Error::Check(text) => panic!("no input error: {text}"),
+        other => panic!("no input error: {other}"),
     }
 }
 

@@ -65,11 +65,18 @@ fn unquote(text: &str) -> Option<(String, &str)> {
     }
 }
 
+/// No reading of an instrument is larger; its square and the sum of many squares are finite.
+const LARGEST: f64 = 1e100;
+/// What is smaller is 0 as far as any instrument tells; ratios to what is not are finite.
+const SMALLEST: f64 = 1e-100;
+
 /// Why a cell cannot be used as a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum BadNumber {
     /// Infinite, or too large for a double.
     Infinite,
+    /// No instrument reads that much.
+    TooLarge,
     /// `1,5`.
     DecimalComma,
     /// A minus sign that is not ASCII.
@@ -85,6 +92,9 @@ impl BadNumber {
     pub(super) fn help(self) -> &'static str {
         match self {
             BadNumber::Infinite => "leave the cell empty, or write nan, if it was not measured",
+            BadNumber::TooLarge => {
+                "write the reading in the column's unit, or leave the cell empty"
+            }
             BadNumber::DecimalComma => {
                 "the decimal mark is '.': export the record with decimal points"
             }
@@ -95,16 +105,25 @@ impl BadNumber {
     }
 }
 
+/// What needs no second look: not measured, 0, or of a size that an instrument can tell.
+pub(super) fn is_a_reading(value: f64) -> bool {
+    value.is_nan() || value == 0.0 || (SMALLEST..=LARGEST).contains(&value.abs())
+}
+
 /// The number in a cell; NaN = not measured (empty or `nan`).
 pub(super) fn number(text: &str) -> Result<f64, BadNumber> {
     if text.is_empty() {
         return Ok(f64::NAN);
     }
     if let Ok(value) = text.parse::<f64>() {
-        return if value.is_infinite() {
+        return if is_a_reading(value) {
+            Ok(value)
+        } else if value.abs() < SMALLEST {
+            Ok(0.0)
+        } else if value.is_infinite() {
             Err(BadNumber::Infinite)
         } else {
-            Ok(value)
+            Err(BadNumber::TooLarge)
         };
     }
     let plain = |t: &str| t.parse::<f64>().is_ok();
@@ -141,12 +160,16 @@ mod tests {
     #[test]
     fn numbers_and_what_is_none() {
         assert_eq!(number("-1.5e-3"), Ok(-1.5e-3));
+        for tiny in ["5e-324", "-1e-101"] {
+            assert_eq!(number(tiny), Ok(0.0));
+        }
         for missing in ["", "nan", "NaN", "-nan"] {
             assert!(number(missing).unwrap().is_nan(), "{missing}");
         }
         for (text, why) in [
             ("inf", BadNumber::Infinite),
             ("1e999", BadNumber::Infinite),
+            ("-2e100", BadNumber::TooLarge),
             ("1,5", BadNumber::DecimalComma),
             ("\u{2212}2", BadNumber::Minus),
             ("25 degC", BadNumber::Unit),

@@ -5,6 +5,7 @@ use super::warning::Warning;
 use crate::design::RecordMapping;
 pub use crate::design::record_columns::{KNOWN, THERMOMETERS, is_known, unit_of};
 use crate::error::{InputError, Result};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// A line of the file, for messages.
@@ -59,11 +60,12 @@ impl Roles {
 pub(super) fn resolve(line: Line<'_>, mapping: &RecordMapping) -> Result<Roles> {
     let header = header_cells(line)?;
     let names: Vec<&str> = header.iter().map(|c| &*c.text).collect();
+    let mut seen: BTreeMap<&str, usize> = BTreeMap::new();
     for (i, cell) in header.iter().enumerate() {
-        if let Some(first) = names[..i].iter().position(|n| *n == cell.text) {
-            if cell.text.is_empty() {
-                continue;
-            }
+        if cell.text.is_empty() {
+            continue;
+        }
+        if let Some(first) = seen.insert(&cell.text, i) {
             return Err(line
                 .error(
                     cell.column,

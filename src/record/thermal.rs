@@ -7,7 +7,8 @@ pub use super::thermal_record::ThermalRecord;
 use super::warning::Warning;
 use super::{applied, clock, frozen, plausibility, shorten};
 use crate::design::RecordMapping;
-use crate::error::{InputError, Result, io_error};
+use crate::error::{InputError, Result};
+use crate::input;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -20,7 +21,12 @@ pub const LEAST_ROWS: usize = 10;
 /// What `docs/manual.md` calls unusable, with line, column and remedy; see the table in the
 /// tests. What is usable but implausible comes back as warnings.
 pub fn read(path: &Path, mapping: &RecordMapping) -> Result<(ThermalRecord, Vec<Warning>)> {
-    let bytes = std::fs::read(path).map_err(|e| io_error(path, "read the record", &e))?;
+    let bytes = input::text_bytes(
+        input::open(path, "record")?,
+        path,
+        "record",
+        input::MOST_OF_A_RECORD,
+    )?;
     parse(&bytes, path, mapping)
 }
 
@@ -165,7 +171,7 @@ fn plain_numbers(text: &str, columns: &mut [ReadColumn], rows: usize) -> bool {
             false => cell.parse().unwrap_or(f64::INFINITY),
         };
         column.values.push(value);
-        !value.is_infinite()
+        cells::is_a_reading(value)
     });
     let whole = whole && cells.next().is_none();
     if !whole {
@@ -197,10 +203,10 @@ fn any_cells(line: Line<'_>, roles: &Roles, columns: &mut [ReadColumn]) -> Resul
     for ((cell, column), (name, names)) in cells.iter().zip(columns).zip(&roles.columns) {
         let value = cells::number(&cell.text).unwrap_or_else(|why| {
             if column.bad.is_none() {
-                let what = if why == BadNumber::Infinite {
-                    "is not finite"
-                } else {
-                    "is no number"
+                let what = match why {
+                    BadNumber::Infinite => "is not finite",
+                    BadNumber::TooLarge => "is larger than any reading",
+                    _ => "is no number",
                 };
                 let shown: String = cell.text.chars().take(40).collect();
                 column.bad = Some(line.error(

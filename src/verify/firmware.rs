@@ -6,11 +6,10 @@ use crate::emit::views::Language;
 use crate::error::{Result, io_error};
 use crate::firmware::files;
 use crate::firmware::files::EmittedFile;
+use crate::leftovers::TemporaryFolder;
 use crate::parallel::both;
 use crate::verify::compare::{self, Compared};
 use crate::verify::toolchain::{self, Harness};
-use std::path::Path;
-use tempfile::TempDir;
 
 /// Both bundles, with their built test drivers.
 #[derive(Debug)]
@@ -33,7 +32,7 @@ pub struct Built {
     /// The built driver.
     pub harness: Harness,
     // Holds the sources while the driver is built.
-    _folder: TempDir,
+    _folder: TemporaryFolder,
 }
 
 impl Firmware {
@@ -91,15 +90,6 @@ impl Firmware {
             .into_iter()
             .map(|(path, k)| (path, self.rust.files[k].text.as_str()));
         c.chain(rust)
-    }
-
-    /// Writes `firmware/c` and `firmware/rust` under `folder`.
-    ///
-    /// # Errors
-    /// A folder that cannot be written.
-    pub fn write(&self, folder: &Path) -> Result<()> {
-        files::write(&self.c.files, &folder.join("firmware/c"))?;
-        files::write(&self.rust.files, &folder.join("firmware/rust"))
     }
 }
 
@@ -161,9 +151,7 @@ fn build(design: &Design, part: Part, language: Language, command: &str) -> Resu
 }
 
 fn built(files: Vec<EmittedFile>, language: Language, prefix: &str) -> Result<Built> {
-    let folder = tempfile::Builder::new()
-        .prefix("gyrogen-firmware-")
-        .tempdir()
+    let folder = TemporaryFolder::of_the_system()
         .map_err(|e| io_error(std::env::temp_dir(), "make a folder for the firmware", &e))?;
     files::write(&files, folder.path())?;
     let sources: Vec<String> = files.iter().map(|f| f.path.clone()).collect();

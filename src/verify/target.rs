@@ -6,8 +6,9 @@
 
 use super::toolchain::{self, C_FLAGS, Harness};
 use crate::error::{InputError, Result, io_error};
+use crate::leftovers::{self, TemporaryFolder};
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 /// Files of the test driver's runtime where there is no C library.
 const RUNTIME: [(&str, &str); 5] = [
@@ -79,9 +80,7 @@ pub(super) fn build(target: Target, folder: &Path, sources: &[String]) -> Result
     };
     let compiler = first(cross.compilers, "compiler", target, cross.packages)?;
     let emulator = first(cross.emulators, "emulator", target, cross.packages)?;
-    let made = tempfile::Builder::new()
-        .prefix("gyrogen-build-")
-        .tempdir()
+    let made = TemporaryFolder::of_the_system()
         .map_err(|e| io_error(std::env::temp_dir(), "make a folder for the build", &e))?;
     for (name, text) in RUNTIME {
         crate::output::write_whole(&made.path().join(name), text.as_bytes())?;
@@ -115,10 +114,8 @@ fn first(
     packages: &str,
 ) -> Result<&'static str> {
     let answers = |name: &&&str| {
-        let mut command = Command::new(name);
-        command.arg("--version");
-        command.stdout(Stdio::null()).stderr(Stdio::null());
-        command.status().is_ok_and(|status| status.success())
+        let answer = leftovers::output(Command::new(name).arg("--version"));
+        answer.is_ok_and(|answer| answer.status.success())
     };
     names.iter().find(answers).copied().ok_or_else(|| {
         InputError::new(format!(

@@ -2,10 +2,10 @@
 
 use crate::emit::views::Language;
 use crate::error::{Error, InputError, Result, io_error};
+use crate::leftovers::{self, TemporaryFolder};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use tempfile::TempDir;
 
 /// What the C is compiled with, apart from paths.
 pub const C_FLAGS: [&str; 8] = [
@@ -31,7 +31,7 @@ pub struct Harness {
     /// First line of the compiler's version and the flags.
     pub toolchain: String,
     // Removed with the harness.
-    _folder: TempDir,
+    _folder: TemporaryFolder,
 }
 
 /// Builds the driver of the bundle in `folder`. `sources` are the bundle's paths.
@@ -44,9 +44,7 @@ pub fn build(
     folder: &Path,
     sources: &[String],
 ) -> Result<Harness> {
-    let made = tempfile::Builder::new()
-        .prefix("gyrogen-build-")
-        .tempdir()
+    let made = TemporaryFolder::of_the_system()
         .map_err(|e| io_error(std::env::temp_dir(), "make a folder for the build", &e))?;
     let program = made.path().join("harness");
     let compiler = compiler(language)?;
@@ -106,12 +104,8 @@ fn compiler(language: Language) -> Result<String> {
         None => names.iter().map(|&name| name.to_owned()).collect(),
     };
     let answers = |name: &&String| {
-        let mut command = Command::new(name);
-        command
-            .arg("--version")
-            .stdout(Stdio::null())
-            .stderr(Stdio::null());
-        command.status().is_ok_and(|status| status.success())
+        let answer = leftovers::output(Command::new(name).arg("--version"));
+        answer.is_ok_and(|answer| answer.status.success())
     };
     match candidates.iter().find(answers) {
         Some(name) => Ok(name.clone()),
@@ -127,7 +121,7 @@ fn compiler(language: Language) -> Result<String> {
 }
 
 pub(super) fn version(compiler: &str) -> String {
-    let output = Command::new(compiler).arg("--version").output();
+    let output = leftovers::output(Command::new(compiler).arg("--version"));
     let text = output.map(|o| String::from_utf8_lossy(&o.stdout).into_owned());
     let line = text
         .unwrap_or_default()
@@ -143,9 +137,7 @@ pub(super) fn version(compiler: &str) -> String {
 }
 
 pub(super) fn compile(mut command: Command, what: &str) -> Result<()> {
-    let output = command
-        .stdin(Stdio::null())
-        .output()
+    let output = leftovers::output(&mut command)
         .map_err(|e| InputError::new(format!("cannot run the compiler: {e}")))?;
     if output.status.success() {
         return Ok(());
@@ -164,7 +156,7 @@ impl Harness {
         emulator: &'static str,
         program: PathBuf,
         toolchain: String,
-        folder: TempDir,
+        folder: TemporaryFolder,
     ) -> Harness {
         Harness {
             program,
@@ -195,21 +187,20 @@ impl Harness {
             }
             None => Command::new(&self.program),
         };
-        let mut child = command
+        command
             .args(arguments)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .map_err(failed)?;
-        let stdin = child.stdin.take();
+            .stderr(Stdio::null());
+        let mut child = leftovers::spawn(&mut command).map_err(failed)?;
+        let stdin = child.process.stdin.take();
         let feeder = std::thread::spawn(move || {
             if let Some(mut stdin) = stdin {
                 // A driver that stops reading shows in its output.
                 let _ = stdin.write_all(&input);
             }
         });
-        if let Some(mut stdout) = child.stdout.take() {
+        if let Some(mut stdout) = child.process.stdout.take() {
             let mut bytes = vec![0u8; 1 << 16];
             let mut held = Vec::new();
             let mut words = Vec::new();

@@ -1,0 +1,135 @@
+//! Files that are read whole: nothing without an end is, and nothing beyond a stated size.
+
+use crate::error::{InputError, Result, io_error};
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+
+/// Most bytes of a design.
+pub const MOST_OF_A_DESIGN: u64 = 1 << 24;
+
+/// Most bytes of a record or a profile in text.
+pub const MOST_OF_A_RECORD: u64 = 1 << 30;
+
+/// Bytes that are looked at before more is read.
+const CHUNK_BYTES: u64 = 1 << 20;
+
+/// Opens a file or a pipe to read `what` from it.
+///
+/// # Errors
+/// A path that cannot be opened; a folder; a device, which has no end.
+pub fn open(path: &Path, what: &str) -> Result<File> {
+    let failed = |e: &io::Error| io_error(path, &format!("read the {what}"), e);
+    let file = File::open(path).map_err(|e| failed(&e))?;
+    let found = file.metadata().map_err(|e| failed(&e))?;
+    let refused = |kind: &str| {
+        InputError::new(format!("this is a {kind}, not a {what}"))
+            .in_file(path)
+            .help("name a file")
+    };
+    if found.is_dir() {
+        return Err(refused("folder").into());
+    }
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::FileTypeExt;
+        let kind = found.file_type();
+        if kind.is_char_device() || kind.is_block_device() {
+            return Err(refused("device").into());
+        }
+    }
+    Ok(file)
+}
+
+/// All bytes of a text, or as many as it takes to see that it is none (a byte 0, or what is not UTF-8).
+///
+/// # Errors
+/// A failed read; more than `most` bytes.
+pub fn text_bytes(mut input: impl Read, path: &Path, what: &str, most: u64) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let mut looked_at = 0;
+    loop {
+        let count = input
+            .by_ref()
+            .take(CHUNK_BYTES)
+            .read_to_end(&mut bytes)
+            .map_err(|e| io_error(path, &format!("read the {what}"), &e))?;
+        if count == 0 || is_no_text(&bytes, &mut looked_at) {
+            return Ok(bytes);
+        }
+        if bytes.len() as u64 > most {
+            let message = format!("the {what} is larger than {} MiB", most >> 20);
+            return Err(InputError::new(message)
+                .in_file(path)
+                .help("give a part of it, or averages of its rows")
+                .into());
+        }
+    }
+}
+
+/// True if the bytes from `looked_at` on cannot be text; moves it to the last whole character.
+fn is_no_text(bytes: &[u8], looked_at: &mut usize) -> bool {
+    let new = &bytes[*looked_at..];
+    match std::str::from_utf8(new) {
+        Ok(_) => *looked_at = bytes.len(),
+        Err(e) if e.error_len().is_some() => return true,
+        Err(e) => *looked_at += e.valid_up_to(),
+    }
+    new.contains(&0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Counts what is asked of it.
+    struct Endless<'a>(&'a [u8], usize);
+
+    impl Read for Endless<'_> {
+        fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+            for b in buffer.iter_mut() {
+                *b = self.0[self.1 % self.0.len()];
+                self.1 += 1;
+            }
+            Ok(buffer.len())
+        }
+    }
+
+    #[test]
+    fn what_is_no_text_is_not_read_to_its_end() {
+        for what in [&b"\0"[..], b"1,2\n\xff", b"caf\xc3\xa9\n\xc3\n"] {
+            let mut endless = Endless(what, 0);
+            let read =
+                text_bytes(&mut endless, Path::new("x"), "record", MOST_OF_A_RECORD).unwrap();
+            assert!(read.len() as u64 <= 2 * CHUNK_BYTES);
+        }
+        // A character that is cut by the end of a chunk is whole in the next one.
+        let long = "é".repeat(CHUNK_BYTES as usize) + "x";
+        let read = text_bytes(
+            &mut long[..].as_bytes(),
+            Path::new("x"),
+            "record",
+            MOST_OF_A_RECORD,
+        )
+        .unwrap();
+        assert_eq!(read, long.as_bytes());
+    }
+
+    #[test]
+    fn what_has_no_end_is_refused_at_its_limit() {
+        let error = text_bytes(Endless(b"1,2\n", 0), Path::new("x"), "design", 1 << 22);
+        let error = error.unwrap_err().to_string();
+        assert!(error.contains("larger than 4 MiB"), "{error}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_device_is_no_file() {
+        let error = open(Path::new("/dev/zero"), "record").unwrap_err();
+        assert!(
+            error.to_string().contains("a device, not a record"),
+            "{error}"
+        );
+        assert!(open(&std::env::temp_dir(), "record").is_err());
+    }
+}

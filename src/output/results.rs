@@ -1,0 +1,226 @@
+//! The files of a command: all of them appear in their folder, or none.
+//!
+//! [`Results::claim`] is called before the work: it refuses what would be written over an input, and finds a folder that
+//! cannot be written. Files are collected in a temporary folder on the same disk; [`Results::finish`] moves them to their
+//! names. Until then nothing has changed, whatever fails or ends the process.
+
+use super::{OutputFile, same, target, write_failed};
+use crate::error::{Error, InputError, Result, io_error};
+use crate::leftovers::{TemporaryFolder, undisturbed};
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Results on the way to their folder.
+#[derive(Debug)]
+pub struct Results {
+    /// The folder as the user named it.
+    out: PathBuf,
+    inputs: Vec<PathBuf>,
+    _staged: TemporaryFolder,
+    /// Where the files are collected, inside the temporary folder.
+    collected: PathBuf,
+    /// For a folder that does not exist yet: what is moved (in the temporary folder), and where to.
+    new: Option<(PathBuf, PathBuf)>,
+    /// Names below the folder, in the order in which they came.
+    names: Vec<PathBuf>,
+    /// Names of an earlier run's files that would contradict this one's.
+    removed: Vec<PathBuf>,
+}
+
+impl Results {
+    /// Claims `out` for results, of which `planned` are known by name. `inputs` are the files that the command reads.
+    ///
+    /// # Errors
+    /// An input that would be written over; a folder or a file in it that cannot be written.
+    pub fn claim(out: &Path, planned: &[&str], inputs: &[PathBuf]) -> Result<Self> {
+        for name in planned {
+            let path = out.join(name);
+            same::refuse(&path, inputs)?;
+            super::check_writable(&path)?;
+        }
+        let failed = |e: &io::Error| io_error(out, "make the folder", e);
+        let (existing, missing) = existing(out).map_err(|e| failed(&e))?;
+        if !existing.is_dir() {
+            let error = InputError::new("this is a file, and a folder is wanted for the results");
+            return Err(error
+                .in_file(existing)
+                .help("name another folder with --out")
+                .into());
+        }
+        let staged = TemporaryFolder::new(&existing).map_err(|e| {
+            let error = InputError::new(format!("cannot write into this folder: {e}"));
+            error
+                .in_file(&existing)
+                .help("check its permissions and the disk, or name another folder with --out")
+        })?;
+        let collected = staged.path().join(&missing);
+        fs::create_dir_all(&collected).map_err(|e| failed(&e))?;
+        let new = missing.components().next().map(|first| {
+            let first = Path::new(first.as_os_str());
+            (staged.path().join(first), existing.join(first))
+        });
+        Ok(Results {
+            out: out.to_path_buf(),
+            inputs: inputs.to_vec(),
+            _staged: staged,
+            collected,
+            new,
+            names: Vec::new(),
+            removed: Vec::new(),
+        })
+    }
+
+    /// The folder as the user named it.
+    pub fn folder(&self) -> &Path {
+        &self.out
+    }
+
+    /// Adds a file.
+    ///
+    /// # Errors
+    /// A failed write; a name that would be written over an input.
+    pub fn write(&mut self, name: impl AsRef<Path>, bytes: &[u8]) -> Result<()> {
+        self.write_with(name, |path| {
+            fs::write(path, bytes).map_err(|e| write_failed(path, &e))
+        })
+    }
+
+    /// Adds a file that `write` makes where it is told.
+    ///
+    /// # Errors
+    /// As [`Results::write`], and those of `write`.
+    pub fn write_with(
+        &mut self,
+        name: impl AsRef<Path>,
+        write: impl FnOnce(&Path) -> Result<()>,
+    ) -> Result<()> {
+        let name = name.as_ref();
+        let path = self.out.join(name);
+        same::refuse(&path, &self.inputs)?;
+        super::check_writable(&path)?;
+        let collected = self.collected.join(name);
+        if let Some(parent) = collected.parent() {
+            fs::create_dir_all(parent).map_err(|e| write_failed(&path, &e))?;
+        }
+        write(&collected).map_err(|e| match e {
+            // Told of where it will be.
+            Error::Input(e) if e.file.as_ref() == Some(&collected) => (*e).in_file(&path).into(),
+            other => other,
+        })?;
+        self.names.push(name.to_path_buf());
+        Ok(())
+    }
+
+    /// Adds several.
+    ///
+    /// # Errors
+    /// As [`Results::write`].
+    pub fn write_all<'a, P: AsRef<Path>>(
+        &mut self,
+        files: impl IntoIterator<Item = (P, &'a [u8])>,
+    ) -> Result<()> {
+        files
+            .into_iter()
+            .try_for_each(|(name, bytes)| self.write(name, bytes))
+    }
+
+    /// Takes away a file of an earlier run that would contradict this one's, if there is one.
+    pub fn remove(&mut self, name: impl AsRef<Path>) {
+        self.removed.push(name.as_ref().to_path_buf());
+    }
+
+    /// Puts all files under their names.
+    ///
+    /// # Errors
+    /// A file that cannot be put there; then none is, but for a name that became unusable at this very moment.
+    pub fn finish(self) -> Result<()> {
+        if let Some((from, to)) = &self.new
+            && to.symlink_metadata().is_err()
+        {
+            // The whole folder in one step.
+            let _held = undisturbed();
+            return fs::rename(from, to).map_err(|e| io_error(&self.out, "make the folder", &e));
+        }
+        let mut moved = Vec::new();
+        let mut others = Vec::new();
+        for name in &self.names {
+            let (from, named) = (self.collected.join(name), self.out.join(name));
+            let failed = |e: io::Error| write_failed(&named, &e);
+            if let Some(parent) = named.parent() {
+                fs::create_dir_all(parent).map_err(failed)?;
+            }
+            let to = target(&named).map_err(failed)?;
+            match fs::metadata(&to) {
+                Ok(found) if found.is_file() => {
+                    fs::set_permissions(&from, found.permissions()).map_err(failed)?;
+                }
+                // A pipe or a device is written, not replaced.
+                Ok(_) => {
+                    copy(&from, &to, &mut others)?;
+                    continue;
+                }
+                Err(_) => {}
+            }
+            if same::device(&from) == to.parent().and_then(same::device) {
+                moved.push((from, to, named));
+            } else {
+                copy(&from, &to, &mut others)?;
+            }
+        }
+        for file in others {
+            file.finish(None)?;
+        }
+        let _held = undisturbed();
+        for (from, to, named) in &moved {
+            fs::rename(from, to).map_err(|e| write_failed(named, &e))?;
+        }
+        for name in &self.removed {
+            let path = self.out.join(name);
+            if path.symlink_metadata().is_ok() {
+                fs::remove_file(&path).map_err(|e| io_error(&path, "remove", &e))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The bytes of a file into another that lies on another disk or is no regular one.
+fn copy(from: &Path, to: &Path, others: &mut Vec<OutputFile>) -> Result<()> {
+    let mut file = OutputFile::open(to)?;
+    file.write_all(&fs::read(from).map_err(|e| write_failed(to, &e))?)?;
+    others.push(file);
+    Ok(())
+}
+
+/// The deepest folder on the way to `out` that exists, and what is missing below it.
+fn existing(out: &Path) -> io::Result<(PathBuf, PathBuf)> {
+    let mut missing = PathBuf::new();
+    let mut folder = out;
+    loop {
+        let here = if folder == Path::new("") {
+            Path::new(".")
+        } else {
+            folder
+        };
+        match here.metadata() {
+            Ok(_) => return Ok((here.to_path_buf(), missing)),
+            Err(e) if e.kind() == io::ErrorKind::NotFound && here.symlink_metadata().is_err() => {}
+            // A link to nothing, a file in the middle, a folder that may not be entered.
+            Err(e) => return Err(e),
+        }
+        let (Some(parent), Some(name)) = (folder.parent(), folder.file_name()) else {
+            return Err(io::ErrorKind::InvalidInput.into());
+        };
+        missing = if missing == Path::new("") {
+            PathBuf::from(name)
+        } else {
+            Path::new(name).join(missing)
+        };
+        folder = parent;
+    }
+}
+
+#[cfg(test)]
+#[path = "results_tests.rs"]
+mod tests;

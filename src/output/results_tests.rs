@@ -1,0 +1,127 @@
+use super::*;
+
+fn listed(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).unwrap().flatten();
+    let mut names: Vec<String> = entries
+        .map(|e| e.file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
+}
+
+fn two(out: &Path) -> Results {
+    let mut results = Results::claim(out, &["a.json"], &[]).unwrap();
+    results.write("a.json", b"a").unwrap();
+    results.write("deep/er/b.txt", b"b").unwrap();
+    results
+}
+
+#[test]
+fn nothing_appears_before_the_end_and_all_of_it_then() {
+    let top = tempfile::tempdir().unwrap();
+    let new = top.path().join("new/folder");
+    let results = two(&new);
+    assert!(!top.path().join("new").exists());
+    drop(results);
+    assert!(listed(top.path()).is_empty());
+    // A new folder, and again over its own files.
+    for _ in 0..2 {
+        two(&new).finish().unwrap();
+        assert_eq!(listed(top.path()), ["new"]);
+        assert_eq!(listed(&new), ["a.json", "deep"]);
+        assert_eq!(fs::read(new.join("deep/er/b.txt")).unwrap(), b"b");
+    }
+    // A folder that somebody else makes in between.
+    let other = top.path().join("other");
+    let results = two(&other);
+    fs::create_dir(&other).unwrap();
+    fs::write(other.join("kept"), "").unwrap();
+    results.finish().unwrap();
+    assert_eq!(listed(&other), ["a.json", "deep", "kept"]);
+}
+
+#[test]
+fn a_result_of_an_earlier_run_is_taken_away_at_the_end() {
+    let top = tempfile::tempdir().unwrap();
+    fs::write(top.path().join("old.csv"), "x").unwrap();
+    let mut results = two(top.path());
+    results.remove("old.csv");
+    results.remove("never.csv");
+    assert!(top.path().join("old.csv").exists());
+    results.finish().unwrap();
+    assert_eq!(listed(top.path()), ["a.json", "deep"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn an_input_is_never_written_over_by_any_name() {
+    let top = tempfile::tempdir().unwrap();
+    let input = top.path().join("input.toml");
+    fs::write(&input, "mine").unwrap();
+    let out = top.path().join("out");
+    fs::create_dir(&out).unwrap();
+    let inputs = [input.clone()];
+    let refused = |name: &str| {
+        let error = Results::claim(&out, &[name], &inputs).unwrap_err();
+        assert_eq!(error.exit_status(), 2);
+        // A name that is known late is refused as well.
+        let mut results = Results::claim(&out, &[], &inputs).unwrap();
+        results.write(name, b"").unwrap_err();
+    };
+    refused("../input.toml");
+    fs::hard_link(&input, out.join("hard")).unwrap();
+    refused("hard");
+    std::os::unix::fs::symlink(&input, out.join("soft")).unwrap();
+    refused("soft");
+    std::os::unix::fs::symlink(top.path(), out.join("up")).unwrap();
+    refused("up/input.toml");
+    // The side-car of a capture is read as well.
+    let capture = top.path().join("input.npy");
+    fs::write(&capture, "").unwrap();
+    assert!(Results::claim(top.path(), &["input.toml"], &[capture]).is_err());
+    assert!(Results::claim(top.path(), &["input.toml"], &[]).is_ok());
+    assert_eq!(fs::read(&input).unwrap(), b"mine");
+}
+
+#[cfg(unix)]
+#[test]
+fn links_stay_links_and_permissions_stay() {
+    use std::os::unix::fs::{PermissionsExt, symlink};
+    let top = tempfile::tempdir().unwrap();
+    let (out, far) = (top.path().join("out"), top.path().join("far"));
+    for folder in [&out, &far] {
+        fs::create_dir(folder).unwrap();
+    }
+    fs::write(far.join("real"), "old").unwrap();
+    fs::set_permissions(far.join("real"), fs::Permissions::from_mode(0o640)).unwrap();
+    symlink(far.join("real"), out.join("a.json")).unwrap();
+    symlink("../far", out.join("deep")).unwrap();
+    symlink("../far/missing", out.join("dangling")).unwrap();
+    let mut results = two(&out);
+    results.write("dangling", b"d").unwrap();
+    results.finish().unwrap();
+    for name in ["a.json", "deep", "dangling"] {
+        let found = out.join(name).symlink_metadata().unwrap();
+        assert!(found.is_symlink(), "{name}");
+    }
+    assert_eq!(fs::read(far.join("real")).unwrap(), b"a");
+    let mode = far.join("real").metadata().unwrap().permissions().mode();
+    assert_eq!(mode & 0o777, 0o640);
+    assert_eq!(fs::read(far.join("er/b.txt")).unwrap(), b"b");
+    assert_eq!(fs::read(far.join("missing")).unwrap(), b"d");
+}
+
+#[test]
+fn what_cannot_be_a_folder_is_refused_before_the_work() {
+    let top = tempfile::tempdir().unwrap();
+    let file = top.path().join("file");
+    fs::write(&file, "kept").unwrap();
+    for out in [file.clone(), file.join("below")] {
+        let error = Results::claim(&out, &["a.json"], &[]).unwrap_err();
+        assert_eq!(error.exit_status(), 2, "{error}");
+    }
+    fs::create_dir(top.path().join("a.json")).unwrap();
+    assert!(Results::claim(top.path(), &["a.json"], &[]).is_err());
+    assert_eq!(listed(top.path()), ["a.json", "file"]);
+    assert_eq!(fs::read(&file).unwrap(), b"kept");
+}
