@@ -149,7 +149,7 @@ impl Averager {
             return Err(refused(
                 format!(
                     "the log has no samples of gyro {}: {found}",
-                    mapping.instance
+                    mapping.instance.unwrap_or(0)
                 ),
                 "choose another `instance` in [record], or log the gyro (PX4: sensor_gyro; \
                  ArduPilot: IMU)",

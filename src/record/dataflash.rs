@@ -84,7 +84,7 @@ pub(super) fn read<R: Read>(
         damage: Damage::default(),
         averager: Averager::new(channels, mapping),
         axis,
-        instance: mapping.instance,
+        instance: mapping.instance.unwrap_or(0),
     };
     reader.run()?;
     let found = match reader.seen.is_empty() {

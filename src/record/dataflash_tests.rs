@@ -107,7 +107,7 @@ fn axis_instance_units_and_rows_are_what_was_written() {
     for (axis, instance) in [(LogAxis::Z, 0), (LogAxis::X, 1), (LogAxis::Y, 1)] {
         let mapping = RecordMapping {
             axis,
-            instance: u32::from(instance),
+            instance: Some(u32::from(instance)),
             ..RecordMapping::default()
         };
         let (r, warnings) = of(&bytes, &mapping).unwrap();
@@ -153,7 +153,7 @@ fn logs_of_older_versions_name_the_gyro_in_the_message() {
     }
     for (instance, rate) in [(0, 0.01f64), (1, -0.02)] {
         let mapping = RecordMapping {
-            instance,
+            instance: Some(instance),
             ..RecordMapping::default()
         };
         let (r, _) = of(&log, &mapping).unwrap();
@@ -169,7 +169,7 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
     let plain = RecordMapping::default();
     let sound = sound();
     let instance = RecordMapping {
-        instance: 2,
+        instance: Some(2),
         ..RecordMapping::default()
     };
     let mut disagrees = Vec::new();

@@ -22,6 +22,7 @@ mod cells;
 mod clock;
 pub mod columns;
 mod dataflash;
+mod error_values;
 mod frozen;
 mod lines;
 mod log_bytes;

@@ -270,14 +270,14 @@ mod tests {
     fn each_mistake_has_its_warning() {
         // (column, values, warning)
         type Case = (&'static str, fn(f64) -> f64, Option<&'static str>);
-        let cases: [Case; 32] = [
+        let cases: [Case; 33] = [
             ("phase_rad", |k| -90.0 + k * 0.1, Some("phase_in_degrees")),
             ("phase_rad", |k| -2.0 + k * 0.13, Some("phase_in_degrees")),
             ("phase_rad", |k| -1.6 + k * 0.002, None),
             (
                 "phase_rad",
                 |k| if k == 7.0 { 99.0 } else { -1.6 + k * 0.002 },
-                Some("phase_out_of_range"),
+                Some("error_values"),
             ),
             (
                 "phase_rad",
@@ -307,7 +307,7 @@ mod tests {
             (
                 "die_degc",
                 |k| if k == 3.0 { -273.15 } else { 20.0 + k },
-                Some("temperature_out_of_range"),
+                Some("error_values"),
             ),
             ("rate_out_dps", |k| 30_000.0 + k, Some("rate_out_of_range")),
             ("rate_out_dps", |k| 1900.0 + k, None),
@@ -317,7 +317,8 @@ mod tests {
                 Some("frequency_in_kilohertz"),
             ),
             ("freq_hz", |k| 17_500.0 + k * 0.1, None),
-            ("freq_hz", |k| k * 100.0, Some("frequency_out_of_range")),
+            ("freq_hz", |k| k * 100.0, Some("error_values")),
+            ("freq_hz", |k| -k * 100.0 - 1.0, Some("frequency_out_of_range")),
             ("agc", |k| 20_000.0 + k, Some("agc_not_relative")),
             ("agc", |k| 98.0 + k * 0.1, Some("agc_not_relative")),
             ("agc", |k| 45.0 + k * 0.01, Some("agc_not_relative")),

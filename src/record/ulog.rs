@@ -166,7 +166,7 @@ pub(super) fn read<R: Read>(
         damage: Damage::default(),
         averager: Averager::new(channels, mapping),
         fields,
-        instance: mapping.instance,
+        instance: mapping.instance.unwrap_or(0),
     };
     reader.run()?;
     let found = match reader.seen.is_empty() {

@@ -144,7 +144,7 @@ fn axis_instance_units_and_rows_are_what_was_written() {
     for (axis, instance) in [(LogAxis::Z, 0usize), (LogAxis::X, 1), (LogAxis::Y, 0)] {
         let mapping = RecordMapping {
             axis,
-            instance: instance as u32,
+            instance: Some(instance as u32),
             ..RecordMapping::default()
         };
         let (r, warnings) = of(&bytes, &mapping).unwrap();
@@ -254,7 +254,7 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
     none.message(b'F', b"attitude:uint64_t timestamp;float q;");
     none.subscribe(0, 0, "attitude");
     let instance = RecordMapping {
-        instance: 3,
+        instance: Some(3),
         ..RecordMapping::default()
     };
     type Case<'a> = (&'a [u8], &'a RecordMapping, &'a [&'a str]);
