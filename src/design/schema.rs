@@ -5,6 +5,7 @@ use super::bound::BiasBound;
 use super::correction::Planned;
 use super::effects::Effects;
 pub use super::log_axis::LogAxis;
+pub use super::record_mapping::RecordMapping;
 use super::user_effects::UserEffect;
 use crate::approx::form::Codes;
 use crate::approx::form::stored::Stored;

@@ -10,9 +10,9 @@
 //! - so is a single cell of a thermometer, for a die has a heat capacity.
 
 use super::columns::{THERMOMETERS, unit_of};
-use super::stats;
 use super::thermal::ThermalRecord;
 use super::warning::Warning;
+use crate::statistics::stats;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -153,15 +153,17 @@ pub(super) fn marks(time_s: &[f64], values: &[f64], kind: Kind) -> Vec<bool> {
             *mark = v.is_finite() && !possible(*v);
         }
     }
+    // Cells of an error value that their neighbours do not contradict: kept, and no witnesses of others.
+    let mut aside = marks.clone();
     // A value that is most of the cells hides how the others move: those are looked at without it first.
     for value in frequent(values, &marks) {
-        let others = |i: usize| values[i].is_finite() && !marks[i] && values[i] != value;
+        let others = |i: usize| values[i].is_finite() && !aside[i] && values[i] != value;
         let rest: Vec<usize> = (0..values.len()).filter(|i| others(*i)).collect();
         let Some(scale) = Scale::of(time_s, values, &rest) else {
             continue;
         };
         let cells: Vec<usize> = (0..values.len())
-            .filter(|i| values[*i].is_finite() && !marks[*i])
+            .filter(|i| values[*i].is_finite() && !aside[*i])
             .collect();
         let visits = visits(time_s, values, &cells);
         let of_value: Vec<&Visit> = visits.iter().filter(|v| v.value == value).collect();
@@ -169,17 +171,31 @@ pub(super) fn marks(time_s: &[f64], values: &[f64], kind: Kind) -> Vec<bool> {
         if 2 * far >= of_value.len() && far > 0 {
             let far = of_value.into_iter().filter(|v| scale.is_far(v));
             far.for_each(|v| v.cells.clone().for_each(|k| marks[cells[k]] = true));
+            put_aside(values, value, &mut aside);
         }
     }
     // A reading between two errors stands apart as they do: the plainest error goes first, then all are seen anew.
     for _ in 0..MOST_ROUNDS {
-        let more = apart(time_s, values, &marks, kind.inert);
+        let more = apart(time_s, values, &aside, kind.inert);
         if more.is_empty() {
             break;
         }
-        more.into_iter().for_each(|i| marks[i] = true);
+        let mut last = f64::NAN;
+        for i in more {
+            marks[i] = true;
+            if !aside[i] && values[i] != last {
+                last = values[i];
+                put_aside(values, last, &mut aside);
+            }
+        }
     }
     marks
+}
+
+/// Sets all cells of a value aside.
+fn put_aside(values: &[f64], value: f64, aside: &mut [bool]) {
+    let cells = aside.iter_mut().zip(values);
+    cells.for_each(|(aside, v)| *aside |= *v == value);
 }
 
 /// Values that many cells have to the last digit, the most frequent first.
@@ -226,7 +242,11 @@ fn visits(time_s: &[f64], values: &[f64], cells: &[usize]) -> Vec<Visit> {
         let rows = (time_s[cells[b]] - time_s[cells[a]]) / usual_s;
         (
             distance,
-            distance / if rows > 1.0 { rows.sqrt() } else { 1.0 },
+            if rows > 1.0 {
+                distance / rows
+            } else {
+                distance
+            },
         )
     };
     let mut out = Vec::new();
@@ -297,10 +317,10 @@ impl Scale {
     }
 }
 
-/// Cells without a mark that stand apart from those beside them.
-fn apart(time_s: &[f64], values: &[f64], marks: &[bool], inert: bool) -> Vec<usize> {
+/// Cells that are not set aside and stand apart from those beside them.
+fn apart(time_s: &[f64], values: &[f64], aside: &[bool], inert: bool) -> Vec<usize> {
     let cells: Vec<usize> = (0..values.len())
-        .filter(|i| values[*i].is_finite() && !marks[*i])
+        .filter(|i| values[*i].is_finite() && !aside[*i])
         .collect();
     let visits = visits(time_s, values, &cells);
     let Some(scale) = Scale::of_visits(&visits) else {
@@ -319,13 +339,21 @@ fn apart(time_s: &[f64], values: &[f64], marks: &[bool], inert: bool) -> Vec<usi
         let visits = visits.iter().filter(|v| v.value.to_bits() == value);
         visits.map(|v| v.distance).fold(0.0, f64::max)
     };
-    let repeated = counts.iter().filter(|(_, c)| c.0 >= 2 && c.2 > 0 && 2 * c.2 >= c.1);
+    let repeated = counts
+        .iter()
+        .filter(|(_, c)| c.0 >= 2 && c.2 > 0 && 2 * c.2 >= c.1);
     let repeated = repeated.max_by(|a, b| {
         let often = a.1.2.cmp(&b.1.2);
         often.then_with(|| farthest(*a.0).total_cmp(&farthest(*b.0)))
     });
-    let single = |v: &&Visit| inert && scale.is_far(v) && counts.get(&v.value.to_bits()).is_some_and(|c| c.0 == 1);
-    let most = visits.iter().filter(single).map(|v| v.distance).fold(0.0, f64::max);
+    let single = |v: &&Visit| {
+        inert && scale.is_far(v) && counts.get(&v.value.to_bits()).is_some_and(|c| c.0 == 1)
+    };
+    let most = visits
+        .iter()
+        .filter(single)
+        .map(|v| v.distance)
+        .fold(0.0, f64::max);
     let found = visits.iter().filter(|v| match repeated {
         Some((value, _)) => v.value.to_bits() == *value && scale.is_far(v),
         None => single(v) && 2.0 * v.distance >= most,

@@ -200,7 +200,7 @@ fn integrals_and_the_gyro_in_use_serve_where_the_driver_was_not_logged() {
     w.subscribe(1, 0, "vehicle_imu_status");
     for k in 0..15u64 {
         let time = k * 1_000_000 + 300;
-        let rate = 0.5f32.to_radians() * 0.005;
+        let rate = (0.5 + 0.01 * (k % 3) as f32 - 0.02).to_radians() * 0.005;
         let mut body = floats(&[0.0, 0.0, rate, 0.0, 0.0, -9.80665 * 0.004]);
         body.extend(5000u32.to_le_bytes());
         body.extend(4000u16.to_le_bytes());
@@ -241,8 +241,21 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
     };
     let mut back = Writer::new();
     second(&mut back);
-    for time in [10_000_000u64, 11_000_000, 500_000] {
-        back.data(0, time, &floats(&[0.0; 3]));
+    for (k, time) in [
+        9_000_000u64,
+        10_000_000,
+        11_000_000,
+        12_000_000,
+        13_000_000,
+        500_000,
+        600_000,
+        700_000,
+        800_000,
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        back.data(0, time, &floats(&[k as f32; 3]));
     }
     let mut future = Writer::new();
     future.0[16 + 3 + 8] = 2;
@@ -307,7 +320,10 @@ fn a_lost_battery_and_a_bad_sector_cost_only_what_they_hit() {
     let bytes = sound().0;
     let whole = of(&bytes, &plain).unwrap().0;
     let (cut, warnings) = of(&bytes[..bytes.len() - 20], &plain).unwrap();
-    assert_eq!(codes(&warnings), ["log_cut_off", "log_averaged"]);
+    assert_eq!(
+        codes(&warnings),
+        ["log_cut_off", "gyros_in_log", "log_averaged"]
+    );
     assert_eq!(cut.time_s[..19], whole.time_s[..19]);
 
     let mut bad = bytes.clone();
@@ -344,7 +360,10 @@ fn appended_data_are_read_behind_a_message_that_was_cut() {
     log.extend(more.0);
     let (r, warnings) = of(&log, &RecordMapping::default()).unwrap();
     assert_eq!(r.len(), 20);
-    assert_eq!(codes(&warnings), ["log_damaged", "log_averaged"]);
+    assert_eq!(
+        codes(&warnings),
+        ["log_damaged", "gyros_in_log", "log_averaged"]
+    );
 }
 
 #[test]

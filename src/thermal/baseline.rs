@@ -164,11 +164,7 @@ pub fn thermometer<'a>(
                         "the record has no thermometer: none of {}",
                         THERMOMETERS.join(", ")
                     ),
-                    format!(
-                        "the file has: {}\n  say in the design which one it is:\n    \
-                         [record.columns]\n    die_degc = \"NAME_IN_THE_FILE\"",
-                        has.join(", ")
-                    ),
+                    without_thermometer(record, &has),
                 )
             })?,
     };
@@ -193,6 +189,26 @@ pub fn thermometer<'a>(
         ));
     }
     Ok((name, column))
+}
+
+/// What helps a record without a thermometer; `has` are its columns.
+fn without_thermometer(record: &ThermalRecord, has: &[&str]) -> String {
+    let columns = has.join(", ");
+    // The columns of a log are named by their topics, with a dot.
+    if record
+        .renamed
+        .get("rate_out_dps")
+        .is_some_and(|s| s.contains('.'))
+    {
+        return format!(
+            "the log gives: {columns}. Log the gyro's temperature beside it (PX4: sensor_gyro or vehicle_imu_status; ArduPilot: \
+             IMU with its T), or `gyrogen close --record` it, which does without"
+        );
+    }
+    format!(
+        "the file has: {columns}\n  say in the design which one it is:\n    [record.columns]\n    die_degc = \
+         \"NAME_IN_THE_FILE\""
+    )
 }
 
 /// Fits the bias model.
