@@ -11,7 +11,6 @@ use crate::approx::form::Codes;
 use crate::approx::form::stored::Stored;
 use crate::numeric::format::{Format, Overflow, Quantizer, Rounding, pow2};
 use crate::numeric::trace::ir::Interval;
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// A design, checked: every value is inside its range and every exact intermediate fits.
