@@ -10,24 +10,31 @@ use proptest::prelude::*;
 use std::path::Path;
 
 /// A message: head, type, body.
-fn message(log: &mut Vec<u8>, kind: u8, body: &[&[u8]]) {
+pub(super) fn message(log: &mut Vec<u8>, kind: u8, body: &[&[u8]]) {
     log.extend([0xA3, 0x95, kind]);
     log.extend(body.concat());
 }
 
-fn text<const N: usize>(value: &str) -> [u8; N] {
+pub(super) fn text<const N: usize>(value: &str) -> [u8; N] {
     let mut out = [0; N];
     out[..value.len()].copy_from_slice(value.as_bytes());
     out
 }
 
 /// An FMT message, which says what type `kind` holds.
-fn define(log: &mut Vec<u8>, kind: u8, length: u8, name: &str, format: &str, labels: &str) {
+pub(super) fn define(
+    log: &mut Vec<u8>,
+    kind: u8,
+    length: u8,
+    name: &str,
+    format: &str,
+    labels: &str,
+) {
     let (name, format, labels) = (text::<4>(name), text::<16>(format), text::<64>(labels));
     message(log, 128, &[&[kind, length], &name, &format, &labels]);
 }
 
-fn floats(values: &[f32]) -> Vec<u8> {
+pub(super) fn floats(values: &[f32]) -> Vec<u8> {
     values.iter().flat_map(|v| v.to_le_bytes()).collect()
 }
 
@@ -36,7 +43,7 @@ fn rate_dps(instance: u8, axis: usize, k: u64) -> f64 {
 }
 
 /// Twenty seconds at 10 Hz as a present ArduPilot writes them.
-fn sound() -> Vec<u8> {
+pub(super) fn sound() -> Vec<u8> {
     let mut log = Vec::new();
     define(
         &mut log,

@@ -90,7 +90,14 @@ pub(super) fn choose(
         None => gyros.iter().find(|g| has_samples(averager, g)),
     };
     let Some(gyro) = wanted else {
-        return Err(not_there(sources, &listed, asked, path, (nothing, damage)));
+        return Err(not_there(
+            averager,
+            sources,
+            &listed,
+            asked,
+            path,
+            (nothing, damage),
+        ));
     };
     let lead = sources.get(gyro.lead);
     let mut choice = Choice {
@@ -185,12 +192,13 @@ fn gyros(sources: &[Source]) -> Vec<Gyro> {
 }
 
 fn gyro(sources: &[Source], number: u8, lead: usize) -> Gyro {
-    // A source that says no id is taken by its number: `numbered` says whose.
+    // What the topics of that number say joins them, though the gyro in use may be another.
     let numbered = sources
         .iter()
         .filter(|s| s.numbers && s.instance == number)
         .find_map(Source::id);
-    let id = sources.get(lead).and_then(Source::id).or(numbered);
+    let first = sources.get(lead);
+    let id = first.and_then(Source::id).or(numbered);
     let belongs = |s: &Source| match (id, s.id()) {
         (Some(a), Some(b)) => a == b,
         _ if s.numbers => s.instance == number,
@@ -212,7 +220,7 @@ fn gyro(sources: &[Source], number: u8, lead: usize) -> Gyro {
     let of_gyro = all().filter(|s| s.topic != "sensor_accel");
     Gyro {
         number,
-        id,
+        id: id.filter(|_| first.is_some_and(|s| s.numbers || !s.ids.is_empty())),
         rate: of("rate_out_dps"),
         heat: of("die_degc"),
         accel: own
@@ -277,6 +285,7 @@ fn thermometers(averager: &Averager, sources: &[Source]) -> String {
 }
 
 fn not_there(
+    averager: &Averager,
     sources: &[Source],
     listed: &[String],
     asked: Option<u32>,
@@ -294,7 +303,11 @@ fn not_there(
     };
     let there = match listed.is_empty() {
         true => String::new(),
-        false => format!("; the gyros that are there: {}", listed.join("; ")),
+        false => format!(
+            "; the gyros that are there: {}. Of thermometers {}",
+            listed.join("; "),
+            thermometers(averager, sources)
+        ),
     };
     let noticed = log_rows::damage_warnings(damage);
     let noticed = noticed

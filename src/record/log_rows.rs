@@ -56,12 +56,11 @@ pub(super) fn record(
         ));
     };
     if let Some(channel) = averager.channels.get(rate).filter(|c| c.is_dead()) {
-        return Err(refused(
-            path,
-            &warnings,
-            dead::samples(&channel.source, channel.seen()),
-            dead::HELP,
-        ));
+        let mut said = dead::samples(&channel.source, channel.seen());
+        if heat.is_none() {
+            said += &format!("; and {}", no_thermometer(&choice).message);
+        }
+        return Err(refused(path, &warnings, said, dead::HELP));
     }
     let supply = chosen(averager, &choice, "supply_v", &mut Vec::new());
     for channel in [heat, supply].into_iter().flatten() {
@@ -91,8 +90,9 @@ pub(super) fn record(
     ];
     let mut record = made(averager, path, &columns, &rows);
     let sums = rows.iter().filter_map(|r| averager.rows.get(r)?.get(rate));
-    let samples = sums.map(|s| u64::from(s.count)).sum();
-    warnings.push(averaged(averager, &record, samples));
+    let samples: u64 = sums.map(|s| u64::from(s.count)).sum();
+    let all = averager.channels.get(rate).map_or(samples, |c| c.samples);
+    warnings.push(averaged(averager, &record, samples, all));
     if let Some(undo) = &choice.undo {
         warnings.push(undo.take_off(&mut record, path)?);
     }
@@ -167,9 +167,13 @@ fn clocks(averager: &Averager, path: &Path, needed: [Option<usize>; 2]) -> Resul
             warnings.push(Warning::general(
                 "wrong_times",
                 format!(
-                    "{} messages of {} have a time that later ones do not agree with (the first {time:.3} s, byte {at}): \
-                     damage; they were left out",
-                    topic.wrong, topic.name
+                    "the time of {} in {} is one that later ones do not agree with (the first {time:.3} s, byte {at}): \
+                     damage; left out",
+                    match topic.wrong {
+                        1 => "one message".to_owned(),
+                        n => format!("{n} messages"),
+                    },
+                    topic.name
                 ),
             ));
         }
@@ -366,7 +370,11 @@ fn made(
 }
 
 /// What was averaged, and where each column is from.
-fn averaged(averager: &Averager, record: &ThermalRecord, samples: u64) -> Warning {
+fn averaged(averager: &Averager, record: &ThermalRecord, samples: u64, all: u64) -> Warning {
+    let of = match all > samples {
+        true => format!("{samples} of {all}"),
+        false => samples.to_string(),
+    };
     let from: Vec<String> = record
         .renamed
         .iter()
@@ -376,7 +384,7 @@ fn averaged(averager: &Averager, record: &ThermalRecord, samples: u64) -> Warnin
         "log_averaged",
         "rate_out_dps",
         format!(
-            "{samples} gyro samples were averaged into {} rows of {} s: {}",
+            "{of} gyro samples were averaged into {} rows of {} s: {}",
             record.len(),
             averager.period_us as f64 * 1e-6,
             from.join(", ")

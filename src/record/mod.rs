@@ -53,6 +53,10 @@ mod capture_tests;
 #[cfg(test)]
 mod dataflash_tests;
 #[cfg(test)]
+mod log_cases_tests;
+#[cfg(test)]
+mod mutation_tests;
+#[cfg(test)]
 mod reading_tests;
 #[cfg(test)]
 mod rows_tests;

@@ -14,7 +14,7 @@ use std::path::Path;
 pub(super) struct Writer(pub Vec<u8>);
 
 impl Writer {
-    fn new() -> Self {
+    pub(super) fn new() -> Self {
         let mut bytes = b"ULog\x01\x12\x35\x01".to_vec();
         bytes.extend(5_000_000u64.to_le_bytes());
         let mut w = Writer(bytes);
@@ -22,33 +22,33 @@ impl Writer {
         w
     }
 
-    fn message(&mut self, kind: u8, body: &[u8]) {
+    pub(super) fn message(&mut self, kind: u8, body: &[u8]) {
         self.0
             .extend(u16::try_from(body.len()).unwrap().to_le_bytes());
         self.0.push(kind);
         self.0.extend(body);
     }
 
-    fn subscribe(&mut self, number: u16, instance: u8, name: &str) {
+    pub(super) fn subscribe(&mut self, number: u16, instance: u8, name: &str) {
         let mut body = vec![instance];
         body.extend(number.to_le_bytes());
         body.extend(name.bytes());
         self.message(b'A', &body);
     }
 
-    fn data(&mut self, number: u16, time_us: u64, rest: &[u8]) {
+    pub(super) fn data(&mut self, number: u16, time_us: u64, rest: &[u8]) {
         let mut body = number.to_le_bytes().to_vec();
         body.extend(time_us.to_le_bytes());
         body.extend(rest);
         self.message(b'D', &body);
     }
 
-    fn sync(&mut self) {
+    pub(super) fn sync(&mut self) {
         self.message(b'S', &[0x2F, 0x73, 0x13, 0x20, 0x25, 0x0C, 0xBB, 0x12]);
     }
 }
 
-fn floats(values: &[f32]) -> Vec<u8> {
+pub(super) fn floats(values: &[f32]) -> Vec<u8> {
     values.iter().flat_map(|v| v.to_le_bytes()).collect()
 }
 
@@ -61,7 +61,7 @@ fn rate_dps(instance: usize, axis: usize, k: u64) -> f64 {
 }
 
 /// Twenty seconds at 10 Hz: two gyros with accelerometers, a battery every second.
-fn sound() -> Writer {
+pub(super) fn sound() -> Writer {
     let mut w = Writer::new();
     w.message(b'F', b"sensor_gyro:uint64_t timestamp;uint64_t timestamp_sample;uint32_t device_id;float x;float y;float z;float temperature;uint32_t error_count;uint8_t samples;uint8_t[3] _padding0;");
     w.message(
