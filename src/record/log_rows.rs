@@ -5,7 +5,7 @@ use super::corrections::Undo;
 use super::log_bytes::Damage;
 use super::thermal::{LEAST_ROWS, ThermalRecord};
 use super::warning::Warning;
-use super::{dead, error_values, frozen, plausibility};
+use super::{dead, error_values, frozen, plausibility, stopped};
 use crate::design::RecordMapping;
 use crate::error::{Error, InputError, Result};
 use crate::statistics::stats;
@@ -101,6 +101,7 @@ pub(super) fn record(
     }
     warnings.extend(at_rest(&record));
     error_values::take(&mut record, &mut warnings);
+    stopped::take(&mut record, &mut warnings);
     dead::refuse(&record, path, None)?;
     plausibility::check(&record, &mut warnings);
     frozen::check(&record, &mut warnings);

@@ -36,6 +36,7 @@ mod plausibility;
 pub mod rows;
 mod scale;
 mod shorten;
+mod stopped;
 pub mod thermal;
 mod thermal_record;
 mod timing;

@@ -5,7 +5,7 @@ use super::columns::{self, Line, Roles};
 use super::lines::Lines;
 pub use super::thermal_record::ThermalRecord;
 use super::warning::Warning;
-use super::{applied, clock, dead, error_values, frozen, plausibility, shorten};
+use super::{applied, clock, dead, error_values, frozen, plausibility, shorten, stopped};
 use crate::design::RecordMapping;
 use crate::error::{Error, InputError, Result, io_error};
 use std::collections::BTreeMap;
@@ -101,6 +101,7 @@ pub fn parse(
     clock::take(&mut record, &source, &roles, mapping, &mut warnings)?;
     applied::take(&mut record, &mut warnings);
     error_values::take(&mut record, &mut warnings);
+    stopped::take(&mut record, &mut warnings);
     clock::merge_repeated(&mut record, &mut warnings);
     shorten::rows(&mut record, mapping.average_s, &mut warnings);
     enough(&record, last, &mut warnings)?;
