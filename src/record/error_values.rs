@@ -22,6 +22,12 @@ const APART: f64 = 8.0;
 /// Least distance, as a share of the range of the other readings.
 const LEAST_OF_RANGE: f64 = 0.05;
 
+/// Share of the range that is far without any comparison.
+const HALF: f64 = 0.5;
+
+/// No die moves faster, K/s.
+const FASTEST_K_PER_S: f64 = 1.5;
+
 /// Different readings that a channel needs beside the error values, so that its own movement is known.
 const READINGS: usize = 10;
 
@@ -167,9 +173,11 @@ pub(super) fn marks(time_s: &[f64], values: &[f64], kind: Kind) -> Vec<bool> {
             .collect();
         let visits = visits(time_s, values, &cells);
         let of_value: Vec<&Visit> = visits.iter().filter(|v| v.value == value).collect();
-        let far = of_value.iter().filter(|v| scale.is_far(v)).count();
-        if 2 * far >= of_value.len() && far > 0 {
-            let far = of_value.into_iter().filter(|v| scale.is_far(v));
+        let known = of_value.iter().any(|v| v.inner && scale.is_far(v, true));
+        let far = |v: &&&Visit| scale.is_far(v, known);
+        let count = of_value.iter().filter(far).count();
+        if 2 * count >= of_value.len() && count > 0 {
+            let far = of_value.iter().filter(far);
             far.for_each(|v| v.cells.clone().for_each(|k| marks[cells[k]] = true));
             put_aside(values, value, &mut aside);
         }
@@ -227,6 +235,10 @@ struct Visit {
     distance: f64,
     /// The same for a step of usual length in time.
     per_row: f64,
+    /// Time of the shorter way there, s.
+    way_s: f64,
+    /// Whether there are neighbours on both sides.
+    inner: bool,
 }
 
 /// The visits of the given cells, in order of time.
@@ -257,6 +269,10 @@ fn visits(time_s: &[f64], values: &[f64], cells: &[usize]) -> Vec<Visit> {
         let end = start + same.count().max(1);
         let before = start.checked_sub(1).map(|a| step(a, start));
         let after = (end < cells.len()).then(|| step(end - 1, end));
+        let between = |a: usize, b: usize| time_s[cells[b]] - time_s[cells[a]];
+        let before_s = start.checked_sub(1).map(|a| between(a, start));
+        let after_s = (end < cells.len()).then(|| between(end - 1, end));
+        let way = |s: Option<f64>| s.unwrap_or(f64::INFINITY);
         let sides = || before.iter().chain(&after);
         let least = |f: fn(&(f64, f64)) -> f64| sides().map(f).fold(f64::INFINITY, f64::min);
         out.push(Visit {
@@ -264,6 +280,8 @@ fn visits(time_s: &[f64], values: &[f64], cells: &[usize]) -> Vec<Visit> {
             cells: start..end,
             distance: least(|s| s.0),
             per_row: least(|s| s.1),
+            way_s: way(before_s).min(way(after_s)),
+            inner: before.is_some() && after.is_some(),
         });
         start = end;
     }
@@ -310,11 +328,51 @@ impl Scale {
         })
     }
 
-    fn is_far(&self, visit: &Visit) -> bool {
+    /// `known`: the value is one of an error elsewhere.
+    fn is_far(&self, visit: &Visit, known: bool) -> bool {
+        // At an end of the record one side alone can tell: a die that is switched off cools fast.
+        let share = match visit.inner || known {
+            true => LEAST_OF_RANGE,
+            false => HALF,
+        };
         visit.distance.is_finite()
             && visit.per_row > APART * self.usual
-            && visit.distance > LEAST_OF_RANGE * self.range
+            && visit.distance > share * self.range
     }
+
+    /// Whether no die gets there and back in the time; half of the range is out of reach in any time.
+    fn is_out_of_reach(&self, visit: &Visit) -> bool {
+        visit.distance > (FASTEST_K_PER_S * visit.way_s).min(HALF * self.range)
+    }
+}
+
+/// How often a value is visited, and how far from its neighbours.
+#[derive(Debug, Clone, Copy, Default)]
+struct Seen {
+    visits: usize,
+    /// Visits that are far, those of them with neighbours on both sides, and their cells.
+    far: usize,
+    inner: usize,
+    far_cells: usize,
+    farthest: f64,
+}
+
+/// The visits by the bits of their value.
+fn seen(visits: &[Visit], scale: &Scale) -> BTreeMap<u64, Seen> {
+    let mut out: BTreeMap<u64, Seen> = BTreeMap::new();
+    for inner in [true, false] {
+        for visit in visits.iter().filter(|v| v.inner == inner) {
+            let seen = out.entry(visit.value.to_bits()).or_default();
+            seen.visits += 1;
+            if scale.is_far(visit, seen.inner > 0) {
+                seen.far += 1;
+                seen.inner += usize::from(inner);
+                seen.far_cells += visit.cells.len();
+                seen.farthest = seen.farthest.max(visit.distance);
+            }
+        }
+    }
+    out
 }
 
 /// Cells that are not set aside and stand apart from those beside them.
@@ -326,28 +384,20 @@ fn apart(time_s: &[f64], values: &[f64], aside: &[bool], inert: bool) -> Vec<usi
     let Some(scale) = Scale::of_visits(&visits) else {
         return few_readings(values, &cells);
     };
-    // By value: cells, visits, visits that are far.
-    let mut counts: BTreeMap<u64, (usize, usize, usize)> = BTreeMap::new();
-    for visit in &visits {
-        let entry = counts.entry(visit.value.to_bits()).or_default();
-        entry.0 += visit.cells.len();
-        entry.1 += 1;
-        entry.2 += usize::from(scale.is_far(visit));
-    }
+    let seen = seen(&visits, &scale);
+    let of = |v: &Visit| seen.get(&v.value.to_bits()).copied().unwrap_or_default();
+    let far = |v: &Visit| scale.is_far(v, of(v).inner > 0);
     // Of the values that are repeated, the one that stands apart most often; single cells when there is none.
-    let farthest = |value: u64| {
-        let visits = visits.iter().filter(|v| v.value.to_bits() == value);
-        visits.map(|v| v.distance).fold(0.0, f64::max)
-    };
-    let repeated = counts
+    let repeated = seen
         .iter()
-        .filter(|(_, c)| c.0 >= 2 && c.2 > 0 && 2 * c.2 >= c.1);
+        .filter(|(_, s)| s.far_cells >= 2 && 2 * s.far >= s.visits);
     let repeated = repeated.max_by(|a, b| {
-        let often = a.1.2.cmp(&b.1.2);
-        often.then_with(|| farthest(*a.0).total_cmp(&farthest(*b.0)))
+        let often = a.1.far.cmp(&b.1.far);
+        often.then(a.1.farthest.total_cmp(&b.1.farthest))
     });
     let single = |v: &&Visit| {
-        inert && scale.is_far(v) && counts.get(&v.value.to_bits()).is_some_and(|c| c.0 == 1)
+        let alone = of(v).far_cells == 1;
+        inert && alone && far(v) && scale.is_out_of_reach(v)
     };
     let most = visits
         .iter()
@@ -355,7 +405,7 @@ fn apart(time_s: &[f64], values: &[f64], aside: &[bool], inert: bool) -> Vec<usi
         .map(|v| v.distance)
         .fold(0.0, f64::max);
     let found = visits.iter().filter(|v| match repeated {
-        Some((value, _)) => v.value.to_bits() == *value && scale.is_far(v),
+        Some((value, _)) => v.value.to_bits() == *value && far(v),
         None => single(v) && 2.0 * v.distance >= most,
     });
     let found: Vec<usize> = found

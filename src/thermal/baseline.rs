@@ -194,12 +194,7 @@ pub fn thermometer<'a>(
 /// What helps a record without a thermometer; `has` are its columns.
 fn without_thermometer(record: &ThermalRecord, has: &[&str]) -> String {
     let columns = has.join(", ");
-    // The columns of a log are named by their topics, with a dot.
-    if record
-        .renamed
-        .get("rate_out_dps")
-        .is_some_and(|s| s.contains('.'))
-    {
+    if record.is_of_log() {
         return format!(
             "the log gives: {columns}. Log the gyro's temperature beside it (PX4: sensor_gyro or vehicle_imu_status; ArduPilot: \
              IMU with its T), or `gyrogen close --record` it, which does without"
