@@ -321,7 +321,7 @@ impl Averager {
         let marks = error_values::marks(&time_s, &values, kind);
         self.leave_out(channel, &rows, &values, &marks, kind);
         let marked = || marks.iter().zip(&time_s).filter(|(m, _)| **m).map(|m| *m.1);
-        let (first, last) = (marked().next()?, marked().last()?);
+        let (first, last) = (marked().next()?, marked().next_back()?);
         let cells = values.iter().zip(&marks).filter(|(_, m)| **m).map(|v| *v.0);
         let (source, unit) = (
             &self.channels.get(channel)?.source,

@@ -171,12 +171,13 @@ fn converted(
     for (name, roles) in columns {
         for role in roles.iter().filter(|r| is_known(r)) {
             let asked = mapping.units.get(role).map(|text| {
-                units::parse(text).ok_or_else(|| {
+                units::parse(text).ok_or_else(|| -> crate::error::Error {
                     line.error(
                         1,
                         format!("\"{text}\" is no unit that is known for {role}"),
                         format!("{role} can be in {}", units::accepted(role)),
                     )
+                    .into()
                 })
             });
             let asked = asked.transpose()?;
