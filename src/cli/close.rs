@@ -6,7 +6,7 @@ use crate::capture;
 use crate::correction::Planned;
 use crate::design::Design;
 use crate::emit::views::Language;
-use crate::error::{Error, Result};
+use crate::error::{Error, InputError, Result};
 use crate::firmware::correction;
 use crate::firmware::correction::Origin;
 use crate::firmware::files::EmittedFile;
@@ -29,7 +29,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// A measured thermal record (CSV, PX4 ULog, ArduPilot DataFlash).
-    #[arg(long, value_name = "FILE", required_unless_present_any = ["capture", "self_test"])]
+    #[arg(long, value_name = "FILE", required_unless_present_any = ["capture", "self_test", "stray"])]
     pub(super) record: Option<PathBuf>,
     /// Captured ADC codes in place of a record: CSV, or NPY with its keys in a TOML file beside it.
     #[arg(long, value_name = "FILE", conflicts_with = "record")]
@@ -46,6 +46,12 @@ pub struct Arguments {
     /// them get a name.
     #[arg(long, conflicts_with_all = ["capture", "self_test"])]
     controls: bool,
+    /// Take a temperature correction off again that an autopilot had applied, where its log has the coefficients.
+    #[arg(long, conflicts_with = "capture")]
+    pub(super) undo_correction: bool,
+    /// Not a way to give a record; says which one is.
+    #[arg(value_name = "FILE", hide = true)]
+    stray: Option<PathBuf>,
     /// Design file (TOML); the embedded default if left out.
     #[arg(long, value_name = "FILE")]
     pub(super) design: Option<PathBuf>,
@@ -80,7 +86,11 @@ const PLANNED: [&str; 6] = [
 /// and with `--controls` a name for a column without meaning (exit 1).
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let watch = Stopwatch::start("reading the input");
-    let design = super::design(arguments.design.as_deref())?;
+    if let Some(stray) = &arguments.stray {
+        return Err(stray_file(stray));
+    }
+    let mut design = super::design(arguments.design.as_deref())?;
+    design.record.undo_correction = arguments.undo_correction;
     if arguments.self_test {
         return super::self_test::run(arguments, &design, recorded, &watch);
     }
@@ -103,6 +113,9 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     } else if let Some(path) = &arguments.record {
         let (record, warnings) = crate::record::read_any(path, &design.record)?;
         closing(path);
+        if arguments.format == OutputFormat::Text {
+            say!("read: {}", record.understood());
+        }
         let mut closed = close::close(
             &record,
             warnings,
@@ -164,6 +177,26 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         return Ok(());
     }
     Err(Error::Check(failures.join("; ")))
+}
+
+/// What is said of a file that no option names.
+fn stray_file(path: &Path) -> Error {
+    let toml = path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("toml"));
+    let file = name_of(path);
+    let help = match toml {
+        true => {
+            format!("a design is given with --design {file}, and the record with --record FILE")
+        }
+        false => format!(
+            "a record is given with --record {file}, a capture of ADC codes with --capture {file}"
+        ),
+    };
+    InputError::new("`close` does not know what this file is")
+        .in_file(path)
+        .help(help)
+        .into()
 }
 
 /// `closure.json` with what was asked for beside it.

@@ -35,9 +35,36 @@ pub(super) enum OutputFormat {
 
 /// Reads the design named on the command line, or the embedded default.
 pub(super) fn design(path: Option<&Path>) -> Result<crate::design::Design> {
+    if let Some(path) = path {
+        refuse_record(path)?;
+    }
     let design = crate::design::reader::read(path)?;
     crate::correction::refuse_unbuildable(&design)?;
     Ok(design)
+}
+
+/// A record in a design's place is named as what it is.
+fn refuse_record(path: &std::path::Path) -> Result<()> {
+    use std::io::Read;
+    // A pipe can be read only once.
+    if !std::fs::metadata(path).is_ok_and(|m| m.is_file()) {
+        return Ok(());
+    }
+    let mut start = Vec::new();
+    let read = std::fs::File::open(path).and_then(|f| f.take(1 << 16).read_to_end(&mut start));
+    match (read, crate::record::is_a_record(&start)) {
+        (Ok(_), Some(what)) => Err(crate::error::InputError::new(format!(
+            "this is no design: it looks like {what}"
+        ))
+        .in_file(path)
+        .help(format!(
+            "give it with --record {}, and a design (TOML, as `gyrogen init` writes one) or none",
+            path.display()
+        ))
+        .into()),
+        // What cannot be read is the reader's to say.
+        _ => Ok(()),
+    }
 }
 
 /// The threads that were asked for, or as many as the machine has.

@@ -20,6 +20,9 @@ pub struct Arguments {
     /// design if left out.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
+    /// Take a temperature correction off again that an autopilot had applied, where its log has the coefficients.
+    #[arg(long, requires = "record")]
+    undo_correction: bool,
     /// Folder for the results; made if it does not exist.
     #[arg(long, value_name = "DIR", default_value = "gyrogen-out")]
     out: PathBuf,
@@ -43,7 +46,8 @@ const PLANNED: [&str; 5] = [
 /// An unusable design or record (exit 2); emitted code that differs from the model (exit 1).
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let watch = Stopwatch::start("reading the design");
-    let design = super::design(arguments.design.as_deref())?;
+    let mut design = super::design(arguments.design.as_deref())?;
+    design.record.undo_correction = arguments.undo_correction;
     let mut results = Results::claim(&arguments.out, &PLANNED, &recorded.inputs)?;
     let loud = std::io::stderr().is_terminal();
     let say = |step: &str| {
@@ -97,6 +101,9 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
 
 fn print(outcome: &Outcome, out: &std::path::Path) {
     let s = &outcome.summary;
+    if let Some(columns) = &outcome.parts.understood {
+        say!("read: {columns}");
+    }
     say!("{}", super::comparison_table(&s.equivalence.functions));
     let mut table = super::table(&[
         "rate output at rest",

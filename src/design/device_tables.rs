@@ -5,6 +5,7 @@ use super::effects;
 use super::keys::THERMOMETERS;
 use super::schema::*;
 use super::table::{Real, Table, Value};
+use super::units;
 use crate::error::Result;
 use std::collections::BTreeMap;
 
@@ -359,30 +360,56 @@ pub(super) fn record(t: &Table, base: Option<&RecordMapping>) -> Result<RecordMa
     let axis = t.take("axis", Some(base.axis), |v| {
         v.choice(&[("x", LogAxis::X), ("y", LogAxis::Y), ("z", LogAxis::Z)])
     })?;
-    let instance = t.take("instance", Some(base.instance), |v| {
-        v.integer(0..=255, "the number of the gyro in a log")
-    })?;
+    let instance = match t.get("instance") {
+        Some(v) => Some(v.integer(0..=255, "the number of the gyro in a log")?),
+        None => base.instance,
+    };
     let average_s = match t.get("average_s") {
         Some(v) => Some(v.real(Real::Within(1e-3, 86_400.0), "s of samples in a row")?),
         None => base.average_s,
     };
     let mut columns = base.columns;
-    columns.extend(record_columns(&t.section("columns")?)?);
+    let mut units = base.units;
+    let (named, stated) = record_columns(&t.section("columns")?)?;
+    for role in named.keys() {
+        units.remove(role);
+    }
+    columns.extend(named);
+    units.extend(stated);
     Ok(RecordMapping {
         columns,
+        units,
         row_period_s,
         thermometer,
         axis,
         instance,
         average_s,
+        undo_correction: base.undo_correction,
     })
 }
 
-fn record_columns(t: &Table) -> Result<BTreeMap<String, String>> {
-    let mut columns = BTreeMap::new();
+/// The columns of the file, and their units where they are stated, by contract column.
+type Named = (BTreeMap<String, String>, BTreeMap<String, String>);
+
+fn record_columns(t: &Table) -> Result<Named> {
+    let (mut columns, mut units) = (BTreeMap::new(), BTreeMap::new());
     let mut taken: BTreeMap<&str, &str> = BTreeMap::new();
     for (role, value) in t.entries() {
-        let column = value.text("the column's name in the file")?;
+        let column = if value.is_table() {
+            let table = value.table()?;
+            table.only(&["column", "unit"])?;
+            if let Some(unit) = table.get("unit") {
+                units.insert(role.to_owned(), unit_of(role, &unit)?);
+            }
+            match table.get("column") {
+                Some(column) => column.text("the column's name in the file")?,
+                None => role,
+            }
+        } else {
+            value.text(
+                "the column's name in the file, or { column = \"gyro_z\", unit = \"rad/s\" },",
+            )?
+        };
         if column.trim().is_empty() {
             return Err(value
                 .error("names no column")
@@ -400,7 +427,27 @@ fn record_columns(t: &Table) -> Result<BTreeMap<String, String>> {
         }
         columns.insert(role.to_owned(), column.to_owned());
     }
-    Ok(columns)
+    Ok((columns, units))
+}
+
+/// The unit in which the file has a contract column.
+fn unit_of(role: &str, value: &Value) -> Result<String> {
+    let text = value.text("the unit")?;
+    let of = super::record_columns::unit_of(role);
+    match units::parse(text) {
+        Some(unit) if unit.of == of => Ok(text.to_owned()),
+        Some(unit) => Err(value
+            .error(format!(
+                "is {}, which is no unit of {role} ({of})",
+                unit.name
+            ))
+            .help(format!("{role} can be in {}", units::accepted(role)))
+            .into()),
+        None => Err(value
+            .error(format!("is {}, a unit that is not known", value.shown()))
+            .help(format!("{role} can be in {}", units::accepted(role)))
+            .into()),
+    }
 }
 
 /// Reads `[fit]`.

@@ -18,11 +18,13 @@ mod log_axis;
 mod ranges;
 pub mod reader;
 pub mod record_columns;
+mod record_mapping;
 pub mod schema;
 pub(crate) mod suggest;
 mod table;
 pub mod target;
 pub mod template;
+pub mod units;
 pub mod user_effects;
 
 pub use bound::BiasBound;

@@ -5,12 +5,12 @@ use super::bound::BiasBound;
 use super::correction::Planned;
 use super::effects::Effects;
 pub use super::log_axis::LogAxis;
+pub use super::record_mapping::RecordMapping;
 use super::user_effects::UserEffect;
 use crate::approx::form::Codes;
 use crate::approx::form::stored::Stored;
 use crate::numeric::format::{Format, Overflow, Quantizer, Rounding, pow2};
 use crate::numeric::trace::ir::Interval;
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// A design, checked: every value is inside its range and every exact intermediate fits.
@@ -471,25 +471,6 @@ pub struct ThermalRun {
     pub scale_rate_dps: f64,
     /// Seed of all noise.
     pub seed: u64,
-}
-
-/// `[record]`: how a measured record is read.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct RecordMapping {
-    /// `[record.columns]`: contract column -> column of the file, e.g. `rate_out_dps = "gyro_x_dps"`.
-    pub columns: BTreeMap<String, String>,
-    /// `row_period_s`: the clock of a record without `time_s`, s per row.
-    pub row_period_s: Option<f64>,
-    /// `thermometer`: the column of the bias model; default: the first of phase_rad, freq_hz,
-    /// die_degc, chamber_degc that the record has.
-    pub thermometer: Option<String>,
-    /// `axis`: the gyro's axis that is read from an autopilot's log. Default z.
-    pub axis: LogAxis,
-    /// `instance`: the number of the gyro in an autopilot's log, from 0.
-    pub instance: u32,
-    /// `average_s`: s of samples that are averaged into a row; default: 1 s for an autopilot's
-    /// log, the rows as they are for CSV.
-    pub average_s: Option<f64>,
 }
 
 /// `[fit]`: how the compensation is fitted.

@@ -268,6 +268,11 @@ impl<'a> Value<'a> {
         self.value.get_ref().is_str()
     }
 
+    /// True if the value is a table.
+    pub fn is_table(&self) -> bool {
+        self.value.get_ref().is_table()
+    }
+
     /// A string.
     pub fn text(&self, meaning: &str) -> Result<&'a str> {
         self.value.get_ref().as_str().ok_or_else(|| {

@@ -99,7 +99,7 @@ fn every_setting_that_is_off_can_be_turned_on() {
     assert_eq!(d.record.columns.len(), 12);
     assert_eq!(d.record.thermometer.as_deref(), Some("die_degc"));
     assert_eq!(d.record.average_s, Some(10.0));
-    assert_eq!((d.record.axis, d.record.instance), (LogAxis::Z, 0));
+    assert_eq!((d.record.axis, d.record.instance), (LogAxis::Z, None));
 
     let text = switched_on(&["input_", "rate_input_format"])
         .replace("input = \"phase\"", "input = \"die_degc\"");

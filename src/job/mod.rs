@@ -91,6 +91,7 @@ pub fn run(
         design,
         command: command.to_owned(),
         record_path: record_path.map(Path::to_path_buf),
+        understood: record_path.map(|_| record.understood()),
         record_csv,
         fit,
         warnings,

@@ -26,6 +26,8 @@ pub struct Parts {
     pub command: String,
     /// The record, if it was measured.
     pub record_path: Option<PathBuf>,
+    /// Its columns with their units, as they were understood.
+    pub understood: Option<String>,
     /// The record, if it was simulated.
     pub record_csv: Option<String>,
     /// The fit.

@@ -1,13 +1,14 @@
 //! Samples of an autopilot's log, averaged into the rows of a thermal record while they are read:
 //! what is kept grows with the rows, not with the samples.
 
+use super::error_values::{self, Kind};
 use super::log_bytes::Damage;
-use super::thermal::{LEAST_ROWS, ThermalRecord};
+use super::log_clock::{Judged, Message, TopicClock};
+use super::log_rows::{self, Choice};
+use super::thermal::ThermalRecord;
 use super::warning::Warning;
-use super::{frozen, plausibility};
 use crate::design::RecordMapping;
-use crate::error::{InputError, Result};
-use crate::statistics::stats;
+use crate::error::Result;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -17,6 +18,9 @@ pub(super) const AVERAGE_S: f64 = 1.0;
 /// m/s^2 in one g, exact (CGPM 1901).
 pub(super) const STANDARD_GRAVITY: f64 = 9.806_65;
 
+/// Kinds of samples that one row can hold apart; more are added to the last.
+const MOST_KINDS: usize = 6;
+
 /// A quantity of the log that can become a column of the record.
 #[derive(Debug, Clone)]
 pub(super) struct Channel {
@@ -24,286 +28,362 @@ pub(super) struct Channel {
     pub column: &'static str,
     /// What the log calls it, such as `sensor_gyro.z`.
     pub source: String,
+    /// The topic that it is from, as [`Averager::topic`] numbered it.
+    pub topic: usize,
+    /// At most three different samples: fewer are no measurement.
+    seen: Vec<f64>,
+    /// Samples that were taken.
+    pub samples: u64,
+}
+
+impl Channel {
+    /// Whether its samples are all alike, or take two values in turn.
+    pub(super) fn is_dead(&self) -> bool {
+        self.samples > 0 && self.seen.len() < 3
+    }
+
+    /// The different samples, at most three.
+    pub(super) fn seen(&self) -> &[f64] {
+        &self.seen
+    }
 }
 
 /// The sum of the samples of one channel in one row.
-#[derive(Debug, Clone, Copy, Default)]
-struct Sum {
-    count: u32,
-    value: f64,
+#[derive(Debug, Clone, Default)]
+pub(super) struct Sum {
+    pub count: u32,
+    pub value: f64,
     /// us since the row's start.
-    time: f64,
+    pub time: f64,
+    first: f64,
+    /// Whether one of its samples differs from the first.
+    differ: bool,
+    /// Samples of another size, which one second of a die does not make.
+    others: Vec<Sum>,
 }
 
-/// Averages samples into rows. Channels of one column are alternatives, the best first.
-pub(super) struct Averager {
-    channels: Vec<Channel>,
-    period_us: u64,
-    /// By number of the row, counted from power-on.
-    rows: BTreeMap<u64, Vec<Sum>>,
-    /// The row that samples go to at the moment.
-    number: u64,
-    row: Vec<Sum>,
-    /// By channel: the latest time, us.
-    latest: Vec<u64>,
-}
+impl Sum {
+    fn add(&mut self, value: f64, time: f64) {
+        if self.count == 0 {
+            self.first = value;
+        }
+        self.differ |= value != self.first;
+        self.count += 1;
+        self.value += value;
+        self.time += time;
+    }
 
-/// A clock that ran backwards: from and to, s.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Backwards(pub f64, pub f64);
-
-impl Averager {
-    /// For these channels and the design's `average_s`.
-    pub(super) fn new(channels: Vec<Channel>, mapping: &RecordMapping) -> Self {
-        let period = mapping.average_s.unwrap_or(AVERAGE_S) * 1e6;
-        let count = channels.len();
-        Averager {
-            channels,
-            period_us: (period.round() as u64).max(1),
-            rows: BTreeMap::new(),
-            number: 0,
-            row: vec![Sum::default(); count],
-            latest: vec![0; count],
+    /// The same, apart from samples that are further off than `within`.
+    fn add_near(&mut self, value: f64, time: f64, within: f64) {
+        let near = |s: &Sum| s.count == 0 || (value - s.mean()).abs() <= within;
+        if near(self) {
+            return self.add(value, time);
+        }
+        let full = self.others.len() >= MOST_KINDS;
+        let found = self.others.iter().position(near);
+        let found = found.or(full.then(|| self.others.len() - 1));
+        match found.and_then(|i| self.others.get_mut(i)) {
+            Some(other) => other.add(value, time),
+            None => {
+                let mut other = Sum::default();
+                other.add(value, time);
+                self.others.push(other);
+            }
         }
     }
 
-    /// Adds a sample of a channel, in the column's unit, at `time_us` since power-on. NaN is none.
-    ///
-    /// # Errors
-    /// A clock that runs backwards by more than a row.
-    pub(super) fn add(
-        &mut self,
-        channel: usize,
-        time_us: u64,
-        value: f64,
-    ) -> std::result::Result<(), Backwards> {
-        let Some(latest) = self.latest.get_mut(channel) else {
-            return Ok(());
+    /// The mean; the value itself where all samples are the same.
+    pub(super) fn mean(&self) -> f64 {
+        match self.differ {
+            true => self.value / f64::from(self.count),
+            false => self.first,
+        }
+    }
+}
+
+/// How far apart two samples of one row can be, and be readings.
+fn within(column: &str) -> Option<f64> {
+    match column {
+        "die_degc" => Some(5.0),
+        "supply_v" => Some(1.0),
+        _ => None,
+    }
+}
+
+/// What became of a topic's clock.
+#[derive(Debug, Default)]
+pub(super) struct Topic {
+    pub name: String,
+    clock: TopicClock,
+    /// Messages with a wrong time, the first of them: s, byte.
+    pub wrong: u64,
+    pub first_wrong: Option<(f64, u64)>,
+    /// A clock that began anew, and was read no further: from, to, s, byte.
+    pub restarted: Option<(f64, f64, u64)>,
+}
+
+/// Averages samples into rows. Channels of one column are alternatives.
+pub(super) struct Averager {
+    pub channels: Vec<Channel>,
+    pub topics: Vec<Topic>,
+    pub period_us: u64,
+    /// By number of the row, counted from power-on.
+    pub rows: BTreeMap<u64, Vec<Sum>>,
+    /// The row that samples go to at the moment.
+    number: u64,
+    row: Vec<Sum>,
+    /// The time of the message that was taken last, us.
+    pub now_us: u64,
+}
+
+impl Averager {
+    /// For the design's `average_s`.
+    pub(super) fn new(mapping: &RecordMapping) -> Self {
+        let period = mapping.average_s.unwrap_or(AVERAGE_S) * 1e6;
+        Averager {
+            channels: Vec::new(),
+            topics: Vec::new(),
+            period_us: (period.round() as u64).max(1),
+            rows: BTreeMap::new(),
+            number: 0,
+            row: Vec::new(),
+            now_us: 0,
+        }
+    }
+
+    /// A topic with a clock of its own.
+    pub(super) fn topic(&mut self, name: String) -> usize {
+        self.topics.push(Topic {
+            name,
+            ..Topic::default()
+        });
+        self.topics.len() - 1
+    }
+
+    /// A channel of a topic.
+    pub(super) fn channel(&mut self, topic: usize, column: &'static str, source: String) -> usize {
+        self.channels.push(Channel {
+            column,
+            source,
+            topic,
+            seen: Vec::new(),
+            samples: 0,
+        });
+        self.channels.len() - 1
+    }
+
+    /// Takes a message of a topic.
+    pub(super) fn take(&mut self, topic: usize, message: Message) {
+        let period_us = self.period_us;
+        let Some(of) = self.topics.get_mut(topic) else {
+            return;
         };
-        if time_us.saturating_add(self.period_us) < *latest {
-            return Err(Backwards(*latest as f64 * 1e-6, time_us as f64 * 1e-6));
+        if of.restarted.is_none()
+            && let Some(judged) = of.clock.push(message, period_us)
+        {
+            self.judged(topic, judged);
         }
-        *latest = time_us.max(*latest);
-        if !value.is_finite() {
-            return Ok(());
+    }
+
+    /// Takes what still waits; nothing is added afterwards.
+    pub(super) fn seal(&mut self) {
+        for topic in 0..self.topics.len() {
+            while let Some(judged) = self.next(topic) {
+                self.judged(topic, judged);
+            }
         }
-        let number = time_us / self.period_us;
-        if number != self.number {
-            self.turn_to(number);
+        self.turn_to(u64::MAX);
+    }
+
+    fn next(&mut self, topic: usize) -> Option<Judged> {
+        let of = self.topics.get_mut(topic)?;
+        match of.restarted {
+            Some(_) => None,
+            None => of.clock.next(self.period_us),
         }
-        if let Some(sum) = self.row.get_mut(channel) {
-            sum.count += 1;
-            sum.value += value;
-            sum.time += (time_us % self.period_us) as f64;
+    }
+
+    fn judged(&mut self, topic: usize, judged: Judged) {
+        match judged {
+            Judged::Sound(message) => self.add(&message),
+            Judged::Wrong(message) => self.wrong(topic, 1, &message),
+            Judged::Back(after_us, message) => {
+                let lost = self.forget(topic, after_us);
+                self.wrong(topic, lost, &message);
+                self.add(&message);
+            }
+            Judged::Restarted(from, to, message) => {
+                if let Some(of) = self.topics.get_mut(topic) {
+                    of.restarted = Some((from as f64 * 1e-6, to as f64 * 1e-6, message.at));
+                }
+            }
         }
-        Ok(())
+    }
+
+    fn wrong(&mut self, topic: usize, count: u64, message: &Message) {
+        if let Some(of) = self.topics.get_mut(topic) {
+            of.wrong += count;
+            let first = (message.time_us as f64 * 1e-6, message.at);
+            of.first_wrong.get_or_insert(first);
+        }
+    }
+
+    /// Takes the samples of a topic after a time out again: how many.
+    fn forget(&mut self, topic: usize, after_us: u64) -> u64 {
+        self.turn_to(0);
+        let mut lost = 0;
+        let first = after_us / self.period_us + 1;
+        for row in self.rows.range_mut(first..).map(|r| r.1) {
+            for (sum, channel) in row.iter_mut().zip(&mut self.channels) {
+                if channel.topic == topic {
+                    lost += u64::from(sum.count);
+                    channel.samples -= u64::from(sum.count).min(channel.samples);
+                    *sum = Sum::default();
+                }
+            }
+        }
+        self.rows.retain(|_, row| row.iter().any(|s| s.count > 0));
+        lost
+    }
+
+    fn add(&mut self, message: &Message) {
+        self.now_us = message.time_us;
+        for sample in &message.samples {
+            if !sample.value.is_finite() {
+                continue;
+            }
+            let time_us = message.time_us.saturating_sub(sample.back_us);
+            let number = time_us / self.period_us;
+            if number != self.number {
+                self.turn_to(number);
+            }
+            if self.row.len() < self.channels.len() {
+                self.row.resize_with(self.channels.len(), Sum::default);
+            }
+            let place = self.row.get_mut(sample.channel);
+            let Some((sum, channel)) = place.zip(self.channels.get_mut(sample.channel)) else {
+                continue;
+            };
+            channel.samples += 1;
+            if channel.seen.len() < 3 && !channel.seen.contains(&sample.value) {
+                channel.seen.push(sample.value);
+            }
+            let inside = (time_us % self.period_us) as f64;
+            match within(channel.column) {
+                Some(limit) => sum.add_near(sample.value, inside, limit),
+                None => sum.add(sample.value, inside),
+            }
+        }
     }
 
     /// Puts the present row away and takes the one of that number up.
     fn turn_to(&mut self, number: u64) {
-        let empty = vec![Sum::default(); self.channels.len()];
-        let next = self.rows.remove(&number).unwrap_or(empty);
+        let next = self.rows.remove(&number).unwrap_or_default();
         let done = std::mem::replace(&mut self.row, next);
         if done.iter().any(|s| s.count > 0) {
-            self.rows.insert(self.number, done);
+            match self.rows.entry(self.number) {
+                std::collections::btree_map::Entry::Vacant(e) => {
+                    e.insert(done);
+                }
+                std::collections::btree_map::Entry::Occupied(_) => {}
+            }
         }
         self.number = number;
     }
 
-    /// The channel that a column is taken from: the first that holds something; a supply of 0 V is
-    /// what an autopilot logs that does not measure it.
-    fn chosen(&self, column: &str) -> Option<usize> {
-        self.channels.iter().enumerate().position(|(i, channel)| {
-            channel.column == column
-                && self
-                    .rows
-                    .values()
-                    .filter_map(|row| row.get(i))
-                    .any(|sum| sum.count > 0 && (column != "supply_v" || sum.value != 0.0))
+    /// The rows in which a channel has samples.
+    pub(super) fn rows_of(&self, channel: usize) -> impl Iterator<Item = (u64, &Sum)> {
+        self.rows.iter().filter_map(move |(number, row)| {
+            let sum = row.get(channel)?;
+            (sum.count > 0).then_some((*number, sum))
         })
     }
 
-    /// The record, checked like any other; `found` says what the log holds, for the message if
-    /// it holds no gyro.
+    /// Takes error values out of the samples of a column.
+    pub(super) fn without_error_values(&mut self, channel: usize) -> Option<Warning> {
+        let column = self.channels.get(channel)?.column;
+        let kind = error_values::kind_of(column)?;
+        within(column)?;
+        let (mut rows, mut time_s, mut values) = (Vec::new(), Vec::new(), Vec::new());
+        for (number, sum) in self.rows_of(channel) {
+            let mut all: Vec<(f64, f64, usize)> = std::iter::once(sum)
+                .chain(&sum.others)
+                .enumerate()
+                .map(|(i, s)| (s.time / f64::from(s.count), s.mean(), i))
+                .collect();
+            all.sort_by(|a, b| a.0.total_cmp(&b.0));
+            for (inside, value, i) in all {
+                rows.push((number, i));
+                time_s.push(((number * self.period_us) as f64 + inside) * 1e-6);
+                values.push(value);
+            }
+        }
+        let marks = error_values::marks(&time_s, &values, kind);
+        self.leave_out(channel, &rows, &values, &marks, kind);
+        let marked = || marks.iter().zip(&time_s).filter(|(m, _)| **m).map(|m| *m.1);
+        let (first, last) = (marked().next()?, marked().next_back()?);
+        let cells = values.iter().zip(&marks).filter(|(_, m)| **m).map(|v| *v.0);
+        let (source, unit) = (
+            &self.channels.get(channel)?.source,
+            super::columns::unit_of(column),
+        );
+        Some(Warning::on(
+            "error_values",
+            column,
+            format!(
+                "{source} holds {} in {} of {} rows ({first:.1} to {last:.1} s since power-on), out of reach of the readings \
+                 before and after: error values, no readings. They were left out",
+                error_values::values_of(cells, unit),
+                marked().count(),
+                self.rows_of(channel).count(),
+            ),
+        ))
+    }
+
+    /// Makes each row's sum that of its parts without a mark.
+    fn leave_out(
+        &mut self,
+        channel: usize,
+        parts: &[(u64, usize)],
+        values: &[f64],
+        marks: &[bool],
+        kind: Kind,
+    ) {
+        let mut at = 0;
+        while let Some((number, _)) = parts.get(at) {
+            let end = at + parts[at..].iter().take_while(|p| p.0 == *number).count();
+            let sum = self.rows.get_mut(number).and_then(|r| r.get_mut(channel));
+            if let Some(sum) = sum {
+                let whole = std::mem::take(sum);
+                let mut all = vec![whole.clone()];
+                all.extend(whole.others);
+                let possible = |v: f64| (kind.possible.0..=kind.possible.1).contains(&v);
+                for k in at..end {
+                    let part = parts.get(k).and_then(|p| all.get(p.1));
+                    if let (Some(part), false, true) = (part, marks[k], possible(values[k])) {
+                        sum.differ |= part.differ || sum.count > 0;
+                        sum.first = part.first;
+                        sum.count += part.count;
+                        sum.value += part.value;
+                        sum.time += part.time;
+                    }
+                }
+            }
+            at = end;
+        }
+    }
+
+    /// The record, checked like any other.
     ///
     /// # Errors
-    /// No gyro of that instance, too few rows.
+    /// Too few rows; a gyro that does not move; a clock of the gyro's that begins anew.
     pub(super) fn finish(
         mut self,
         path: &Path,
         mapping: &RecordMapping,
         damage: Damage,
-        found: &str,
+        choice: Choice,
     ) -> Result<(ThermalRecord, Vec<Warning>)> {
-        self.turn_to(u64::MAX);
-        let mut warnings = damage_warnings(damage);
-        warnings.extend(unused(mapping));
-        let refused = |message: String, help: &str| {
-            let message = match warnings.first() {
-                Some(w) => format!("{message}; {}", w.message),
-                None => message,
-            };
-            InputError::new(message).in_file(path).help(help)
-        };
-        let Some(rate) = self.chosen("rate_out_dps") else {
-            return Err(refused(
-                format!(
-                    "the log has no samples of gyro {}: {found}",
-                    mapping.instance
-                ),
-                "choose another `instance` in [record], or log the gyro (PX4: sensor_gyro; \
-                 ArduPilot: IMU)",
-            )
-            .into());
-        };
-        let (rows, samples) = self.whole_rows(rate);
-        if rows.len() < LEAST_ROWS {
-            return Err(refused(
-                format!(
-                    "only {} rows of {} s have a gyro reading",
-                    rows.len(),
-                    self.period_us as f64 * 1e-6
-                ),
-                "at least 10 are needed: log longer, or give a smaller `average_s` in [record]",
-            )
-            .into());
-        }
-        let record = self.record(path, rate, &rows);
-        warnings.push(self.told(&record, samples));
-        warnings.extend(at_rest(&record));
-        plausibility::check(&record, &mut warnings);
-        frozen::check(&record, &mut warnings);
-        Ok((record, warnings))
+        log_rows::record(&mut self, path, mapping, damage, choice)
     }
-
-    /// The rows that the gyro fills to at least half of what the median row holds (the first and
-    /// the last are parts of a row), and their number of samples.
-    fn whole_rows(&self, rate: usize) -> (Vec<u64>, u64) {
-        let counted: Vec<(u64, u32)> = self
-            .rows
-            .iter()
-            .filter_map(|(number, row)| Some((*number, row.get(rate)?.count)))
-            .filter(|(_, count)| *count > 0)
-            .collect();
-        let counts: Vec<f64> = counted.iter().map(|(_, n)| f64::from(*n)).collect();
-        let half = 0.5 * stats::median(&counts);
-        let whole = counted.into_iter().filter(|(_, n)| f64::from(*n) >= half);
-        let samples = whole.clone().map(|(_, n)| u64::from(n)).sum();
-        (whole.map(|(number, _)| number).collect(), samples)
-    }
-
-    fn record(&self, path: &Path, rate: usize, rows: &[u64]) -> ThermalRecord {
-        let mean = |number: &u64, channel: usize| -> Option<(f64, f64)> {
-            let sum = self.rows.get(number)?.get(channel)?;
-            let n = f64::from(sum.count);
-            (sum.count > 0).then(|| (sum.time / n, sum.value / n))
-        };
-        let power_on_s: Vec<f64> = rows
-            .iter()
-            .map(|number| {
-                let inside = mean(number, rate).map_or(f64::NAN, |m| m.0);
-                ((number * self.period_us) as f64 + inside) * 1e-6
-            })
-            .collect();
-        let first = power_on_s.first().copied().unwrap_or(0.0);
-        let mut record = ThermalRecord {
-            source: path.to_path_buf(),
-            time_s: power_on_s.iter().map(|t| t - first).collect(),
-            columns: BTreeMap::new(),
-            lines: (1..=rows.len()).collect(),
-            renamed: BTreeMap::new(),
-        };
-        for column in ["rate_out_dps", "die_degc", "accel_g", "supply_v"] {
-            let Some(channel) = self.chosen(column) else {
-                continue;
-            };
-            let values: Vec<f64> = rows
-                .iter()
-                .map(|number| mean(number, channel).map_or(f64::NAN, |m| m.1))
-                .collect();
-            if values.iter().all(|v| v.is_nan()) {
-                continue;
-            }
-            record.columns.insert(column.to_owned(), values);
-            if let Some(channel) = self.channels.get(channel) {
-                record
-                    .renamed
-                    .insert(column.to_owned(), channel.source.clone());
-            }
-        }
-        record
-            .columns
-            .insert("time_since_power_on_s".to_owned(), power_on_s);
-        record
-    }
-
-    /// What was averaged, and where each column is from.
-    fn told(&self, record: &ThermalRecord, samples: u64) -> Warning {
-        let from: Vec<String> = record
-            .renamed
-            .iter()
-            .map(|(column, source)| format!("{column} from {source}"))
-            .collect();
-        Warning::on(
-            "log_averaged",
-            "rate_out_dps",
-            format!(
-                "{samples} gyro samples were averaged into {} rows of {} s: {}",
-                record.len(),
-                self.period_us as f64 * 1e-6,
-                from.join(", ")
-            ),
-        )
-    }
-}
-
-/// Keys of `[record]` that mean nothing for a log.
-fn unused(mapping: &RecordMapping) -> Option<Warning> {
-    let used = mapping.columns.is_empty() && mapping.row_period_s.is_none();
-    (!used).then(|| {
-        Warning::general(
-            "record_keys_unused",
-            "[record.columns] and row_period_s are for CSV: a log names its own columns and has a \
-             clock; they were not used",
-        )
-    })
-}
-
-/// What of the file could not be read.
-fn damage_warnings(damage: Damage) -> Vec<Warning> {
-    let mut warnings = Vec::new();
-    if damage.stretches > 0 {
-        warnings.push(Warning::general(
-            "log_damaged",
-            format!(
-                "{} bytes of the log in {} places could not be read and were left out, the first \
-                 at byte {}",
-                damage.bytes, damage.stretches, damage.first
-            ),
-        ));
-    }
-    if damage.cut {
-        warnings.push(Warning::general(
-            "log_cut_off",
-            "the log ends within a message, as after a loss of power; all before it was read",
-        ));
-    }
-    warnings
-}
-
-/// A gyro that is calibrated lies still: no thermal drift of an autopilot's gyro reaches 10 deg/s
-/// between a twentieth and 19 twentieths of its rows, and every flight does.
-fn at_rest(record: &ThermalRecord) -> Option<Warning> {
-    let rate = stats::sorted(record.column("rate_out_dps")?);
-    let spread = stats::quantile_sorted(&rate, 0.95) - stats::quantile_sorted(&rate, 0.05);
-    (spread > 10.0).then(|| {
-        Warning::on(
-            "log_not_at_rest",
-            "rate_out_dps",
-            format!(
-                "the gyro's rows spread over {spread:.1} deg/s: a flight? The bias can only be \
-                 seen while the vehicle lies still; cut the log to that part"
-            ),
-        )
-    })
 }

@@ -4,6 +4,7 @@ use super::cells::{self, Cell};
 use super::warning::Warning;
 use crate::design::RecordMapping;
 pub use crate::design::record_columns::{KNOWN, THERMOMETERS, is_known, unit_of};
+use crate::design::units::{self, Unit};
 use crate::error::{InputError, Result};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -39,6 +40,8 @@ impl Line<'_> {
 pub(super) struct Roles {
     /// By column of the file: its name there, and the contract or auxiliary names it serves.
     pub columns: Vec<(String, Vec<String>)>,
+    /// The contract's columns that the file has in another unit.
+    pub units: Vec<(String, Unit)>,
     /// What was decided on the way.
     pub warnings: Vec<Warning>,
 }
@@ -117,7 +120,14 @@ pub(super) fn resolve(line: Line<'_>, mapping: &RecordMapping) -> Result<Roles> 
             roles.push(name.clone());
         }
     }
-    let roles = Roles { columns, warnings };
+    in_other_units(&mut columns, &names, mapping);
+    let units = converted(line, &columns, mapping)?;
+    warnings.extend(told(&units, &columns));
+    let roles = Roles {
+        columns,
+        units,
+        warnings,
+    };
     for role in ["time_s", "rate_out_dps"] {
         let clocked = role == "time_s" && mapping.row_period_s.is_some();
         if roles.index_of(role).is_none() && !clocked {
@@ -131,6 +141,117 @@ pub(super) fn resolve(line: Line<'_>, mapping: &RecordMapping) -> Result<Roles> 
         }
     }
     Ok(roles)
+}
+
+/// Gives the contract's column to a file's column that has it in another unit (`time_ms`), where nothing else does.
+fn in_other_units(columns: &mut [(String, Vec<String>)], names: &[&str], mapping: &RecordMapping) {
+    let mut taken: Vec<&str> = Vec::new();
+    for (name, roles) in columns {
+        let Some(meant) = units::meant(name) else {
+            continue;
+        };
+        let free = !names.contains(&meant)
+            && !mapping.columns.contains_key(meant)
+            && !taken.contains(&meant);
+        if free && roles.len() == 1 && roles[0] == *name && !is_known(name) {
+            *roles = vec![meant.to_owned()];
+            taken.push(meant);
+        }
+    }
+}
+
+/// The units of the contract's columns where they are others than the contract's.
+///
+/// # Errors
+/// Two statements that contradict each other; a unit of another quantity.
+fn converted(
+    line: Line<'_>,
+    columns: &[(String, Vec<String>)],
+    mapping: &RecordMapping,
+) -> Result<Vec<(String, Unit)>> {
+    let mut out = Vec::new();
+    for (name, roles) in columns {
+        for role in roles.iter().filter(|r| is_known(r)) {
+            let asked = mapping.units.get(role).map(|text| {
+                units::parse(text).ok_or_else(|| -> crate::error::Error {
+                    line.error(
+                        1,
+                        format!("\"{text}\" is no unit that is known for {role}"),
+                        format!("{role} can be in {}", units::accepted(role)),
+                    )
+                    .into()
+                })
+            });
+            let asked = asked.transpose()?;
+            let stated = units::stated(name, role);
+            if let (Some(a), Some(b)) = (asked, stated)
+                && a != b
+            {
+                return Err(line
+                    .error(
+                        1,
+                        format!(
+                            "the design says that column \"{name}\" is in {}, and its name says {}",
+                            a.name, b.name
+                        ),
+                        "rename the column, or correct the unit in [record.columns]".to_owned(),
+                    )
+                    .into());
+            }
+            let Some(unit) = asked.or(stated) else {
+                continue;
+            };
+            if unit.of != unit_of(role) {
+                return Err(line
+                    .error(
+                        1,
+                        format!(
+                            "column \"{name}\" is in {}, which is no unit of {role} ({})",
+                            unit.name,
+                            unit_of(role)
+                        ),
+                        format!(
+                            "map another column to {role}; it can be in {}",
+                            units::accepted(role)
+                        ),
+                    )
+                    .into());
+            }
+            let own = name.strip_suffix(']').or(name.strip_suffix(')'));
+            let own = own
+                .and_then(|n| n.rsplit_once(['[', '(']))
+                .map(|n| n.0.trim());
+            if own.is_some_and(is_known) && !unit.is_own() {
+                return Err(line
+                    .error(
+                        1,
+                        format!("column \"{name}\" says {} and {}", unit_of(role), unit.name),
+                        "let its name say one unit".to_owned(),
+                    )
+                    .into());
+            }
+            if !unit.is_own() {
+                out.push((role.clone(), unit));
+            }
+        }
+    }
+    Ok(out)
+}
+
+/// What is said of columns that were converted.
+fn told(units: &[(String, Unit)], columns: &[(String, Vec<String>)]) -> Option<Warning> {
+    let each = units.iter().map(|(role, unit)| {
+        let serves = |c: &&(String, Vec<String>)| c.1.contains(role);
+        let file = columns.iter().find(serves).map_or("", |c| c.0.as_str());
+        format!(
+            "{role} is \"{file}\" in {}, converted to {} ({})",
+            unit.name,
+            unit_of(role),
+            unit.rule()
+        )
+    });
+    let each: Vec<String> = each.collect();
+    (!each.is_empty()).then(|| Warning::general("units_converted", each.join("; ")))
 }
 
 /// The header's cells, refused where the line cannot be a header.

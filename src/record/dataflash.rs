@@ -5,13 +5,16 @@
 //! every message begins with A3 95 and its type; messages of type 128 (FMT) say name, length,
 //! format and labels of the others.
 
-use super::averager::{Averager, Backwards, Channel, STANDARD_GRAVITY};
+use super::averager::{Averager, STANDARD_GRAVITY};
+use super::corrections::{self, Parameters};
 use super::log_bytes::{Damage, Scalar, Stream};
+use super::log_clock::{Message, Sample};
+use super::log_gyros::{self, Source};
 use super::thermal::ThermalRecord;
 use super::warning::Warning;
 use crate::design::RecordMapping;
 use crate::error::Result;
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::Path;
 
@@ -22,12 +25,36 @@ pub(super) const MAGIC: [u8; 2] = [0xA3, 0x95];
 const FMT: u8 = 128;
 const FMT_BYTES: usize = 89;
 
-/// The channels, of one column the best first: index, column, source.
-const RATE: usize = 0;
-const TEMPERATURE: usize = 1;
-const ACCELERATION: usize = 2;
-const BOARD: usize = 3;
-const BATTERY: usize = 4;
+/// What can be taken from a message: column, and what the source is called.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Quantity {
+    Rate,
+    Temperature,
+    Acceleration,
+    Board,
+    Battery,
+}
+
+impl Quantity {
+    fn column(self) -> &'static str {
+        match self {
+            Quantity::Rate => "rate_out_dps",
+            Quantity::Temperature => "die_degc",
+            Quantity::Acceleration => "accel_g",
+            Quantity::Board | Quantity::Battery => "supply_v",
+        }
+    }
+
+    fn source(self, axis: &str) -> String {
+        match self {
+            Quantity::Rate => format!("IMU.Gyr{axis}"),
+            Quantity::Temperature => "IMU.T".to_owned(),
+            Quantity::Acceleration => format!("IMU.Acc{axis}"),
+            Quantity::Board => "POWR.Vcc".to_owned(),
+            Quantity::Battery => "BAT.Volt".to_owned(),
+        }
+    }
+}
 
 /// What a message type holds.
 #[derive(Debug, Clone)]
@@ -41,6 +68,9 @@ struct Format {
     /// The number of the sensor: where a message says it, or by the message's name.
     instance: Instance,
     name: String,
+    /// A parameter's name and value.
+    text: Option<(usize, usize)>,
+    value: Option<(usize, Scalar)>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -51,7 +81,7 @@ enum Instance {
 
 #[derive(Debug, Clone, Copy)]
 struct Pick {
-    channel: usize,
+    quantity: Quantity,
     offset: usize,
     scalar: Scalar,
     factor: f64,
@@ -68,46 +98,64 @@ pub(super) fn read<R: Read>(
     path: &Path,
     mapping: &RecordMapping,
 ) -> Result<(ThermalRecord, Vec<Warning>)> {
-    let axis = mapping.axis.name().to_uppercase();
-    let channel = |column, source: String| Channel { column, source };
-    let channels = vec![
-        channel("rate_out_dps", format!("IMU.Gyr{axis}")),
-        channel("die_degc", "IMU.T".to_owned()),
-        channel("accel_g", format!("IMU.Acc{axis}")),
-        channel("supply_v", "POWR.Vcc".to_owned()),
-        channel("supply_v", "BAT.Volt".to_owned()),
-    ];
     let mut reader = Reader {
         stream: Stream::new(path, input),
         formats: vec![None; 256],
-        seen: BTreeSet::new(),
+        sensors: BTreeMap::new(),
+        parameters: Parameters::default(),
         damage: Damage::default(),
-        averager: Averager::new(channels, mapping),
-        axis,
-        instance: mapping.instance,
+        averager: Averager::new(mapping),
+        axis: mapping.axis.name().to_uppercase(),
     };
     reader.run()?;
-    let found = match reader.seen.is_empty() {
-        true => "it has no IMU message at all".to_owned(),
-        false => {
-            let numbers: Vec<String> = reader.seen.iter().map(u8::to_string).collect();
-            format!("it has IMU {}", numbers.join(", "))
-        }
-    };
-    reader.averager.finish(path, mapping, reader.damage, &found)
+    reader.averager.seal();
+    let mut sources: Vec<Source> = reader.sensors.into_values().map(|s| s.source).collect();
+    for source in sources.iter_mut().filter(|s| s.topic == "IMU") {
+        let number = match source.instance {
+            0 => String::new(),
+            n => (u32::from(n) + 1).to_string(),
+        };
+        let id = reader.parameters.last(&format!("INS_GYR{number}_ID"));
+        source.note(0, id.unwrap_or(0.0) as u32);
+    }
+    let nothing = ("no IMU message", reader.damage);
+    let (mut choice, chosen) =
+        log_gyros::choose(&reader.averager, &sources, mapping.instance, path, nothing)?;
+    if let Some(source) = sources.get(chosen.lead) {
+        let of = corrections::Chosen {
+            number: chosen.number,
+            id: chosen.id,
+            axis: mapping.axis.index(),
+            source: source.topic,
+            raw: source.raw,
+            undo: mapping.undo_correction,
+            path,
+        };
+        let found = corrections::ardupilot(&reader.parameters, of)?;
+        log_gyros::corrected(&reader.averager, &mut choice, found, source);
+    }
+    reader.averager.finish(path, mapping, reader.damage, choice)
+}
+
+/// What one instance of a message type gives.
+struct Sensor {
+    source: Source,
+    /// The averager's number of its clock.
+    topic: usize,
+    channels: BTreeMap<Quantity, usize>,
 }
 
 struct Reader<'a, R: Read> {
     stream: Stream<'a, R>,
     /// By type.
     formats: Vec<Option<Format>>,
-    /// The instances of the gyro.
-    seen: BTreeSet<u8>,
+    /// By kind and instance.
+    sensors: BTreeMap<(&'static str, u8), Sensor>,
+    parameters: Parameters,
     damage: Damage,
     averager: Averager,
     /// `X`, `Y` or `Z`.
     axis: String,
-    instance: u32,
 }
 
 impl<R: Read> Reader<'_, R> {
@@ -141,7 +189,7 @@ impl<R: Read> Reader<'_, R> {
             } else if kind == FMT {
                 self.define(&body, at)?;
             } else {
-                self.message(kind, &body, at)?;
+                self.message(kind, &body, at);
             }
             at = next;
         }
@@ -196,6 +244,8 @@ impl<R: Read> Reader<'_, R> {
             clock: None,
             instance: Instance::Named(0),
             name,
+            text: None,
+            value: None,
         };
         if !self.fill(&mut new, &format, &labels) {
             return Err(self.stream.broken(
@@ -217,7 +267,7 @@ impl<R: Read> Reader<'_, R> {
     /// Finds what to take from a message of interest; false if its format cannot be right.
     fn fill(&self, new: &mut Format, format: &str, labels: &str) -> bool {
         let number = match new.name.as_str() {
-            "IMU" | "POWR" | "BAT" => 0,
+            "IMU" | "POWR" | "BAT" | "PARM" => 0,
             "IMU2" => 1,
             "IMU3" => 2,
             _ => return true,
@@ -232,9 +282,9 @@ impl<R: Read> Reader<'_, R> {
             };
             let label = names.next().unwrap_or("");
             if let Some((scalar, unit)) = number {
-                let mut take = |channel, factor: f64| {
+                let mut take = |quantity, factor: f64| {
                     new.picks.push(Pick {
-                        channel,
+                        quantity,
                         offset,
                         scalar,
                         factor: factor * unit,
@@ -242,58 +292,97 @@ impl<R: Read> Reader<'_, R> {
                 };
                 let imu = new.name.starts_with("IMU");
                 match (label, label.strip_suffix(self.axis.as_str())) {
-                    (_, Some("Gyr")) if imu => take(RATE, degrees),
-                    (_, Some("Acc")) if imu => take(ACCELERATION, 1.0 / STANDARD_GRAVITY),
-                    ("T" | "Temp", _) if imu => take(TEMPERATURE, 1.0),
+                    (_, Some("Gyr")) if imu => take(Quantity::Rate, degrees),
+                    (_, Some("Acc")) if imu => take(Quantity::Acceleration, 1.0 / STANDARD_GRAVITY),
+                    ("T" | "Temp", _) if imu => take(Quantity::Temperature, 1.0),
                     // An integer without a unit of its own is in mV, as the oldest logs have it.
                     ("Vcc", _) if new.name == "POWR" => {
                         let plain = matches!(letter, 'h' | 'H' | 'i' | 'I');
-                        take(BOARD, if plain { 1e-3 } else { 1.0 });
+                        take(Quantity::Board, if plain { 1e-3 } else { 1.0 });
                     }
-                    ("Volt", _) if new.name == "BAT" => take(BATTERY, 1.0),
+                    ("Volt", _) if new.name == "BAT" => take(Quantity::Battery, 1.0),
                     ("TimeUS", _) => new.clock = Some((offset, scalar, 1.0)),
                     ("TimeMS", _) => new.clock = Some((offset, scalar, 1e3)),
+                    ("Value", _) if new.name == "PARM" => new.value = Some((offset, scalar)),
                     ("I" | "Inst" | "Instance", _) => new.instance = Instance::At(offset, scalar),
                     _ => {}
                 }
+            } else if label == "Name" && new.name == "PARM" {
+                new.text = Some((offset, size));
             }
             offset += size;
         }
         offset + 3 == new.length
     }
 
-    /// The samples of a message.
-    fn message(&mut self, kind: u8, body: &[u8], at: u64) -> Result<()> {
+    /// The samples of a message, or a parameter.
+    fn message(&mut self, kind: u8, body: &[u8], at: u64) {
         let Some(format) = self.formats.get(usize::from(kind)).and_then(Option::as_ref) else {
-            return Ok(());
+            return;
         };
         let Some((offset, scalar, us)) = format.clock else {
-            return Ok(());
+            return;
         };
+        let time_us = (scalar.read(body, offset).unwrap_or(0.0) * us) as u64;
+        if let (Some((from, size)), Some((offset, scalar))) = (format.text, format.value) {
+            let bytes = body.get(from..from + size).unwrap_or(&[]);
+            let end = bytes.iter().position(|b| *b == 0).unwrap_or(bytes.len());
+            let name = std::str::from_utf8(bytes.get(..end).unwrap_or(&[]));
+            if let (Ok(name), Some(value)) = (name, scalar.read(body, offset)) {
+                self.parameters.set(name, time_us, value);
+            }
+            return;
+        }
+        if format.picks.is_empty() {
+            return;
+        }
         let instance = match format.instance {
             Instance::Named(number) => number,
             Instance::At(offset, scalar) => scalar.read(body, offset).unwrap_or(0.0) as u8,
         };
-        let imu = format.name.starts_with("IMU");
-        if imu {
-            self.seen.insert(instance);
-        }
-        if u32::from(instance) != if imu { self.instance } else { 0 } {
-            return Ok(());
-        }
-        let time = (scalar.read(body, offset).unwrap_or(0.0) * us) as u64;
+        let topic = match format.name.as_str() {
+            "POWR" => "POWR",
+            "BAT" => "BAT",
+            _ => "IMU",
+        };
+        let averager = &mut self.averager;
+        let new = || Sensor {
+            source: Source {
+                topic,
+                instance,
+                numbers: topic == "IMU",
+                raw: false,
+                channels: Vec::new(),
+                ids: Vec::new(),
+                accel_id: None,
+                recalibrated: Vec::new(),
+            },
+            topic: averager.topic(format!("{topic} {instance}")),
+            channels: BTreeMap::new(),
+        };
+        let sensor = self.sensors.entry((topic, instance)).or_insert_with(new);
+        let mut samples = Vec::with_capacity(format.picks.len());
         for pick in &format.picks {
             let value = pick.scalar.read(body, pick.offset).unwrap_or(f64::NAN) * pick.factor;
-            if let Err(Backwards(from, to)) = self.averager.add(pick.channel, time, value) {
-                return Err(self.stream.broken(
-                    at,
-                    &format!("the log's clock runs backwards, from {from:.3} s to {to:.3} s"),
-                    "a record is one stretch from one power-on: cut the log there, or take another \
-                     copy of it",
-                ));
-            }
+            let channel = *sensor.channels.entry(pick.quantity).or_insert_with(|| {
+                let column = pick.quantity.column();
+                let text = pick.quantity.source(&self.axis);
+                let channel = self.averager.channel(sensor.topic, column, text);
+                sensor.source.channels.push((column, channel));
+                channel
+            });
+            samples.push(Sample {
+                channel,
+                value,
+                back_us: 0,
+            });
         }
-        Ok(())
+        let message = Message {
+            time_us,
+            at,
+            samples,
+        };
+        self.averager.take(sensor.topic, message);
     }
 }
 

@@ -21,20 +21,28 @@ pub mod capture_places;
 mod cells;
 mod clock;
 pub mod columns;
+mod corrections;
 mod dataflash;
+mod dead;
+mod error_values;
 mod frozen;
 mod lines;
 mod log_bytes;
+mod log_clock;
+mod log_gyros;
+mod log_rows;
 mod npy_header;
 mod plausibility;
 pub mod rows;
 mod scale;
 mod shorten;
+mod stopped;
 pub mod thermal;
 mod thermal_record;
 mod timing;
 mod ulog;
 mod ulog_layout;
+mod unpack;
 mod warning;
 
 #[cfg(test)]
@@ -46,13 +54,17 @@ mod capture_tests;
 #[cfg(test)]
 mod dataflash_tests;
 #[cfg(test)]
+mod log_cases_tests;
+#[cfg(test)]
+mod mutation_tests;
+#[cfg(test)]
 mod reading_tests;
 #[cfg(test)]
 mod rows_tests;
 #[cfg(test)]
 mod ulog_tests;
 
-pub use any::read_any;
+pub use any::{is_a_record, read_any};
 pub use shorten::condensed;
 pub use thermal::{ThermalRecord, read};
 pub use warning::Warning;

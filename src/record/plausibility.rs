@@ -22,7 +22,8 @@ pub(super) fn check(record: &ThermalRecord, warnings: &mut Vec<Warning>) {
         };
         let found = match name.as_str() {
             "phase_rad" => phase(&column),
-            "rate_out_dps" | "rate_dps" | "quad_dps" => rate(&column),
+            "rate_out_dps" => rate(&column).or_else(|| at_rest(&column)),
+            "rate_dps" | "quad_dps" => rate(&column),
             "freq_hz" => frequency(&column),
             "agc" => gain(&column),
             "supply_v" => supply(&column),
@@ -133,6 +134,20 @@ fn temperature(c: &Column<'_>) -> Option<Warning> {
             format!("{name} runs from {range}: it looks like kelvin; subtract 273.15 if it is"),
         );
     }
+    let celsius = |v: f64| (v - 32.0) / 1.8;
+    let (low, high) = (c.quantile(0.05), c.quantile(0.95));
+    if high > HOTTEST_DEGC && celsius(high) < 100.0 && celsius(low) > -60.0 {
+        return c.warn(
+            "temperature_in_fahrenheit",
+            format!(
+                "{name} runs from {range}: no gyro is rated beyond 125 degC, and few are heated beyond {HOTTEST_DEGC}. It \
+                 looks like Fahrenheit ({:.1} to {:.1} degC); say so in the design if it is: [record.columns] {name} = {{ \
+                 column = \"{name}\", unit = \"degF\" }}",
+                celsius(c.min()),
+                celsius(c.max())
+            ),
+        );
+    }
     let (beyond, line) = c.count(|v| !v.is_nan() && !(-100.0..=250.0).contains(&v));
     if beyond > 0 {
         return c.warn(
@@ -162,6 +177,74 @@ fn rate(c: &Column<'_>) -> Option<Warning> {
             ),
         )
     })
+}
+
+/// Hotter than a gyro is, as a rule, degC: industrial parts end at 85, and heat themselves by some kelvin.
+const HOTTEST_DEGC: f64 = 105.0;
+
+/// Beyond this no gyro's bias is, deg/s: parts that are sold are specified to 60, bare ones in a laboratory reach 200.
+const LARGEST_BIAS_DPS: f64 = 500.0;
+
+/// Noise that no gyro has, deg/s/sqrt(Hz): the worst parts are specified to 0.1.
+const NOISIEST_DPS_RTHZ: f64 = 3.0;
+
+/// No gyro that is made in silicon is quieter, deg/s/sqrt(Hz): the best are specified to ten times as much.
+const QUIETEST_DPS_RTHZ: f64 = 2e-4;
+
+/// What is quieter than this has no noise at all: a table of a formula.
+const NO_NOISE_DPS_RTHZ: f64 = 3e-6;
+
+/// Full scales of gyros, deg/s: a code of 16 bits is this over 2^15.
+const FULL_SCALES_DPS: [f64; 8] = [125.0, 250.0, 300.0, 450.0, 500.0, 1000.0, 2000.0, 4000.0];
+
+/// A gyro at rest shows its bias and its noise alone; both have a size.
+fn at_rest(c: &Column<'_>) -> Option<Warning> {
+    let applied = c.record.column("rate_dps").unwrap_or(&[]);
+    if c.record.is_of_log() || applied.iter().any(|r| !r.is_nan() && *r != 0.0) {
+        return None;
+    }
+    let middle = c.median();
+    let steps: Vec<f64> = c.record.time_s.windows(2).map(|w| w[1] - w[0]).collect();
+    let period_s = stats::median(&steps);
+    let noise_dps = stats::difference_noise(c.values);
+    let density = noise_dps * period_s.min(1.0).sqrt();
+    if middle.abs() > LARGEST_BIAS_DPS || density > NOISIEST_DPS_RTHZ {
+        return c.warn(
+            "rate_in_millidegrees",
+            format!(
+                "{} is about {middle:.1} deg/s with a noise of {noise_dps:.2} deg/s at rest, and no gyro has such: mdeg/s? Say so in the design if it is: \
+                 [record.columns] rate_out_dps = {{ column = \"rate_out_dps\", unit = \"mdps\" }}; raw codes are to be \
+                 multiplied by the gyro's scale first; and if it was turning, rate_dps is to say how fast",
+                c.name
+            ),
+        );
+    }
+    let lsb = stats::lattice_step(c.values);
+    let of_gyro = |step: f64| {
+        let steps = FULL_SCALES_DPS.iter().map(|fs| fs / 32_768.0);
+        let near = |s: f64| (step / s - 1.0).abs() < 2e-3;
+        steps.clone().any(near) || steps.map(|s| s * 1.146_88).any(near)
+    };
+    let by_lsb = lsb.is_some_and(|s| !of_gyro(s) && of_gyro(s.to_degrees()));
+    if by_lsb || (NO_NOISE_DPS_RTHZ..QUIETEST_DPS_RTHZ).contains(&density) {
+        let why = match (by_lsb, lsb) {
+            (true, Some(step)) => format!(
+                "moves in steps of {step:.4e}, which is a gyro's LSB in rad/s and not in deg/s"
+            ),
+            _ => format!(
+                "has a noise of {noise_dps:.2e} deg/s at rows {period_s} s apart, less than any gyro in silicon"
+            ),
+        };
+        return c.warn(
+            "rate_in_radians",
+            format!(
+                "{} {why}: rad/s? Say so in the design if it is: [record.columns] rate_out_dps = {{ column = \
+                 \"rate_out_dps\", unit = \"rad/s\" }}",
+                c.name
+            ),
+        );
+    }
+    None
 }
 
 /// Drive resonances lie between 1 and 200 kHz.
@@ -270,14 +353,14 @@ mod tests {
     fn each_mistake_has_its_warning() {
         // (column, values, warning)
         type Case = (&'static str, fn(f64) -> f64, Option<&'static str>);
-        let cases: [Case; 32] = [
+        let cases: [Case; 36] = [
             ("phase_rad", |k| -90.0 + k * 0.1, Some("phase_in_degrees")),
             ("phase_rad", |k| -2.0 + k * 0.13, Some("phase_in_degrees")),
             ("phase_rad", |k| -1.6 + k * 0.002, None),
             (
                 "phase_rad",
                 |k| if k == 7.0 { 99.0 } else { -1.6 + k * 0.002 },
-                Some("phase_out_of_range"),
+                Some("error_values"),
             ),
             (
                 "phase_rad",
@@ -307,17 +390,33 @@ mod tests {
             (
                 "die_degc",
                 |k| if k == 3.0 { -273.15 } else { 20.0 + k },
-                Some("temperature_out_of_range"),
+                Some("error_values"),
             ),
             ("rate_out_dps", |k| 30_000.0 + k, Some("rate_out_of_range")),
-            ("rate_out_dps", |k| 1900.0 + k, None),
+            ("rate_out_dps", |k| 1900.0 + k, Some("rate_in_millidegrees")),
+            ("rate_out_dps", |k| 19.0 + wiggle(k), None),
+            (
+                "rate_out_dps",
+                |k| 0.005 + 1e-3 * wiggle(k),
+                Some("rate_in_radians"),
+            ),
+            (
+                "die_degc",
+                |k| 70.0 + 1.2 * k,
+                Some("temperature_in_fahrenheit"),
+            ),
             (
                 "freq_hz",
                 |k| 17.5 + k * 1e-4,
                 Some("frequency_in_kilohertz"),
             ),
             ("freq_hz", |k| 17_500.0 + k * 0.1, None),
-            ("freq_hz", |k| k * 100.0, Some("frequency_out_of_range")),
+            ("freq_hz", |k| k * 100.0, Some("error_values")),
+            (
+                "freq_hz",
+                |k| -k * 100.0 - 1.0,
+                Some("frequency_out_of_range"),
+            ),
             ("agc", |k| 20_000.0 + k, Some("agc_not_relative")),
             ("agc", |k| 98.0 + k * 0.1, Some("agc_not_relative")),
             ("agc", |k| 45.0 + k * 0.01, Some("agc_not_relative")),

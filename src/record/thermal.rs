@@ -5,9 +5,9 @@ use super::columns::{self, Line, Roles};
 use super::lines::Lines;
 pub use super::thermal_record::ThermalRecord;
 use super::warning::Warning;
-use super::{applied, clock, frozen, plausibility, shorten};
+use super::{applied, clock, dead, error_values, frozen, plausibility, shorten, stopped};
 use crate::design::RecordMapping;
-use crate::error::{InputError, Result};
+use crate::error::{Error, InputError, Result};
 use crate::input;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -59,7 +59,11 @@ pub fn parse(
                 .at(1, 1)
                 .help("a record is a header row, such as time_s,rate_out_dps,die_degc, and rows")
         })?;
-    let roles = columns::resolve(header, mapping)?;
+    let before = source
+        .iter()
+        .take_while(|l| l.number < header.number)
+        .last();
+    let roles = columns::resolve(header, mapping).map_err(|e| commented(e, header, before))?;
     let (values, rows) = cells(lines, &roles, source.count())?;
     if rows.is_empty() {
         return Err(header
@@ -94,15 +98,47 @@ pub fn parse(
             record.columns.insert(last.clone(), column);
         }
     }
+    for (name, unit) in &roles.units {
+        if let Some(values) = record.columns.get_mut(name) {
+            values.iter_mut().for_each(|v| *v = unit.convert(*v));
+        }
+    }
     let last = record.lines.last().map_or(header, |n| source.at(*n));
     clock::take(&mut record, &source, &roles, mapping, &mut warnings)?;
     applied::take(&mut record, &mut warnings);
+    error_values::take(&mut record, &mut warnings);
+    stopped::take(&mut record, &mut warnings);
     clock::merge_repeated(&mut record, &mut warnings);
     shorten::rows(&mut record, mapping.average_s, &mut warnings);
     enough(&record, last, &mut warnings)?;
+    dead::refuse(&record, path, record.lines.first().copied())?;
     plausibility::check(&record, &mut warnings);
     frozen::check(&record, &mut warnings);
     Ok((record, warnings))
+}
+
+/// A header behind `#`, as `numpy.savetxt` writes it, said to be one.
+fn commented(error: Error, header: Line<'_>, before: Option<Line<'_>>) -> Error {
+    let Some(line) = before else {
+        return error;
+    };
+    let text = line.text.trim_start().trim_start_matches('#').trim();
+    let names = text.split(',').map(str::trim);
+    let named = names.clone().filter(|n| cells::number(n).is_err()).count();
+    let numbers = header
+        .text
+        .split(',')
+        .all(|c| cells::number(c.trim()).is_ok());
+    if !numbers || named < 2 || names.count() != header.text.split(',').count() {
+        return error;
+    }
+    line.error(
+        1,
+        "the record has no header row; this line, behind #, looks like it".to_owned(),
+        "remove the # in front of the names: # makes it a comment (numpy.savetxt: comments=\"\")"
+            .to_owned(),
+    )
+    .into()
 }
 
 /// UTF-8, with or without a byte order mark.

@@ -1,5 +1,6 @@
 //! A thermal record: rows of averaged readings.
 
+use crate::design::record_columns;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -37,6 +38,26 @@ impl ThermalRecord {
             return Some(&self.time_s);
         }
         self.columns.get(name).map(Vec::as_slice)
+    }
+
+    /// True for a record of an autopilot's log, whose topics state their units.
+    pub fn is_of_log(&self) -> bool {
+        let source = self.renamed.get("rate_out_dps");
+        source.is_some_and(|s| s.contains('.')) && !self.columns.contains_key("rate_dps")
+    }
+
+    /// Each column with its unit, and what the file calls it where that is another name: for a user to see how the file was
+    /// understood.
+    pub fn understood(&self) -> String {
+        let names = std::iter::once("time_s").chain(self.columns.keys().map(String::as_str));
+        let said = names.map(|name| {
+            let unit = record_columns::unit_of(name);
+            match self.renamed.get(name) {
+                Some(file) => format!("{name} in {unit} (from {file})"),
+                None => format!("{name} in {unit}"),
+            }
+        });
+        said.collect::<Vec<_>>().join(", ")
     }
 
     /// How many rows of a column are measured; 0 if there is none of that name.

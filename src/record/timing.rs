@@ -34,16 +34,36 @@ fn too_long(record: &ThermalRecord, lasts_s: f64) -> Option<Warning> {
     let steps: Vec<f64> = record.time_s.windows(2).map(|w| w[1] - w[0]).collect();
     let step = stats::median(&steps);
     let days = lasts_s / 86_400.0;
-    (step > 3600.0 || days > 5.0).then(|| {
+    // Rows that are whole thousands of seconds apart are of no logger.
+    let thousands = step >= 1000.0 && record.time_s.iter().all(|t| t % 1000.0 == 0.0);
+    (step > 3600.0 || days > 5.0 || thousands).then(|| {
+        let (unit, name, per_s) = likely(step);
         Warning::on(
             "time_step_implausible",
             "time_s",
             format!(
-                "the record lasts {days:.1} days with {step} s between rows: milliseconds for \
-                 seconds? Divide by 1000 if so"
+                "the record lasts {days:.1} days with {step} s between rows: {name} for seconds? In {unit} the rows are {} s \
+                 apart. If so, divide by {per_s}, or say the unit in the design: [record.columns] time_s = {{ column = \
+                 \"time_s\", unit = \"{unit}\" }}",
+                step / per_s
             ),
         )
     })
+}
+
+/// The unit in which the rows are nearest to 1 s apart: its name, how many of it are a second.
+fn likely(step: f64) -> (&'static str, &'static str, f64) {
+    const UNITS: [(&str, &str, f64); 3] = [
+        ("ms", "milliseconds", 1e3),
+        ("us", "microseconds", 1e6),
+        ("ns", "nanoseconds", 1e9),
+    ];
+    let off = |per_s: f64| (step / per_s).log10().abs();
+    let [first, others @ ..] = UNITS;
+    others.into_iter().fold(
+        first,
+        |best, u| if off(u.2) < off(best.2) { u } else { best },
+    )
 }
 
 /// The two clocks of a record run alike, except where one restarts.
@@ -145,9 +165,11 @@ mod tests {
             70.0 - (70.0 - k / 3.0).abs() + glitch
         };
         let row = |unit: f64| move |k: f64| format!("{},{},{}", unit * k, (k * 1.7).sin(), die(k));
-        assert!(codes(header, row(10.0)).is_empty());
-        assert_eq!(codes(header, row(10.0 / 60.0)), ["time_step_implausible"]);
-        assert_eq!(codes(header, row(10_000.0)), ["time_step_implausible"]);
+        assert_eq!(codes(header, row(10.0)), ["error_values"]);
+        for unit in [10.0 / 60.0, 10_000.0] {
+            let found = codes(header, row(unit));
+            assert_eq!(found, ["error_values", "time_step_implausible"], "{unit}");
+        }
     }
 
     #[test]

@@ -4,14 +4,17 @@
 //! Written from the public specification (PX4 guide, "ULog File Format"). The file describes
 //! itself: format definitions name the fields of each topic, subscriptions number the topics.
 
-use super::averager::{Averager, Backwards, Channel, STANDARD_GRAVITY};
+use super::averager::{Averager, STANDARD_GRAVITY};
+use super::corrections::{self, Parameters};
 use super::log_bytes::{Damage, Scalar, Stream};
+use super::log_clock::{Message, Sample};
+use super::log_gyros::{self, Source};
 use super::thermal::ThermalRecord;
 use super::ulog_layout::{Definitions, Layout};
 use super::warning::Warning;
 use crate::design::RecordMapping;
 use crate::error::Result;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::Path;
 
@@ -27,11 +30,14 @@ const APPENDED: u8 = 1;
 const GIVE_UP: &str = "the log is damaged where it says what it holds; take another copy of it";
 
 /// How a field becomes a value of the record.
+#[derive(Clone, Copy)]
 enum Unit {
     /// Times a constant.
     Times(f64),
     /// Times a constant, over a time in us that another field holds (an integral's length).
     Per(f64, &'static str),
+    /// A burst of counts, as many as `samples` says, `dt` us apart, times `scale` and a constant.
+    Burst(f64),
 }
 
 /// A field of a topic that can become a column.
@@ -40,84 +46,75 @@ struct Wanted {
     topic: &'static str,
     field: String,
     unit: Unit,
-    /// Its topic has one instance a gyro; a supply is the vehicle's.
-    of_gyro: bool,
 }
 
 /// The fields of interest, of one column the best first.
 ///
-/// `sensor_gyro` is the driver's own output, averaged by no filter; `vehicle_imu` integrates it,
+/// `sensor_gyro` and `sensor_gyro_fifo` are the driver's own output, averaged by no filter; `vehicle_imu` integrates it,
 /// `sensor_combined` is the gyro that was in use at the moment, of whatever instance.
 fn wanted(axis: usize) -> Vec<Wanted> {
     let letter = ["x", "y", "z"].get(axis).copied().unwrap_or("z");
     let degrees = 180.0 / std::f64::consts::PI;
     let g = 1.0 / STANDARD_GRAVITY;
-    let field = |column, topic, field: String, unit, of_gyro| Wanted {
-        column,
-        topic,
-        field,
-        unit,
-        of_gyro,
-    };
     let times = Unit::Times;
-    let (rate, accel) = ("rate_out_dps", "accel_g");
+    let (rate, heat, accel, supply) = ("rate_out_dps", "die_degc", "accel_g", "supply_v");
     let angle = Unit::Per(degrees * 1e6, "delta_angle_dt");
     let speed = Unit::Per(g * 1e6, "delta_velocity_dt");
     let at = |name: &str| format!("{name}[{axis}]");
-    vec![
-        field(rate, "sensor_gyro", letter.into(), times(degrees), true),
-        field(rate, "vehicle_imu", at("delta_angle"), angle, true),
-        field(
+    let fields: [(&'static str, &'static str, String, Unit); 11] = [
+        (rate, "sensor_gyro", letter.into(), times(degrees)),
+        (
             rate,
-            "sensor_combined",
-            at("gyro_rad"),
-            times(degrees),
-            false,
+            "sensor_gyro_fifo",
+            letter.into(),
+            Unit::Burst(degrees),
         ),
-        field(
-            "die_degc",
-            "sensor_gyro",
-            "temperature".into(),
-            times(1.0),
-            true,
-        ),
-        field(
-            "die_degc",
+        (rate, "vehicle_imu", at("delta_angle"), angle),
+        (rate, "sensor_combined", at("gyro_rad"), times(degrees)),
+        (heat, "sensor_gyro", "temperature".into(), times(1.0)),
+        (
+            heat,
             "vehicle_imu_status",
             "temperature_gyro".into(),
             times(1.0),
-            true,
         ),
-        field(accel, "sensor_accel", letter.into(), times(g), true),
-        field(accel, "vehicle_imu", at("delta_velocity"), speed, true),
-        field(
-            accel,
-            "sensor_combined",
-            at("accelerometer_m_s2"),
-            times(g),
-            false,
-        ),
-        field(
-            "supply_v",
-            "system_power",
-            "voltage5v_v".into(),
-            times(1.0),
-            false,
-        ),
-        field(
-            "supply_v",
-            "battery_status",
-            "voltage_v".into(),
-            times(1.0),
-            false,
-        ),
-    ]
+        (accel, "sensor_accel", letter.into(), times(g)),
+        (accel, "vehicle_imu", at("delta_velocity"), speed),
+        (accel, "sensor_combined", at("accelerometer_m_s2"), times(g)),
+        (supply, "system_power", "voltage5v_v".into(), times(1.0)),
+        (supply, "battery_status", "voltage_v".into(), times(1.0)),
+    ];
+    fields
+        .into_iter()
+        .map(|(column, topic, field, unit)| Wanted {
+            column,
+            topic,
+            field,
+            unit,
+        })
+        .collect()
 }
+
+/// The topic that says which gyro is in use.
+const SELECTION: &str = "sensor_selection";
+
+/// The topic of that gyro.
+const IN_USE: &str = "sensor_combined";
+
+/// Fields in which a topic says whose it is.
+const IDS: [&str; 2] = ["gyro_device_id", "device_id"];
 
 /// What to take from the messages of one subscription.
 struct Subscription {
     layout: Layout,
     picks: Vec<Pick>,
+    /// In the sources and the averager's topics.
+    source: usize,
+    topic: usize,
+    id: Option<(usize, Scalar)>,
+    /// The number of calibrations so far.
+    calibrations: Option<(usize, Scalar)>,
+    calibrated: Option<f64>,
 }
 
 struct Pick {
@@ -127,60 +124,98 @@ struct Pick {
     factor: f64,
     /// The field that the value is divided by.
     over: Option<(usize, Scalar)>,
+    burst: Option<Burst>,
+}
+
+/// Where a burst says how it is read.
+struct Burst {
+    samples: (usize, Scalar),
+    dt_us: (usize, Scalar),
+    scale: (usize, Scalar),
+    most: usize,
 }
 
 impl Pick {
-    fn value(&self, data: &[u8]) -> Option<f64> {
-        let value = self.scalar.read(data, self.offset)? * self.factor;
-        Some(match self.over {
-            Some((offset, scalar)) => value / scalar.read(data, offset)?,
-            None => value,
-        })
+    /// Adds the samples of a message.
+    fn take(&self, data: &[u8], samples: &mut Vec<Sample>) {
+        let read = |place: (usize, Scalar)| place.1.read(data, place.0);
+        let mut add = |value: f64, back_us: u64| {
+            samples.push(Sample {
+                channel: self.channel,
+                value,
+                back_us,
+            });
+        };
+        let Some(burst) = &self.burst else {
+            let value = read((self.offset, self.scalar)).map_or(f64::NAN, |v| v * self.factor);
+            let over = self.over.and_then(read);
+            return add(over.map_or(value, |over| value / over), 0);
+        };
+        let count = read(burst.samples).unwrap_or(0.0) as usize;
+        let count = count.min(burst.most);
+        let scale = read(burst.scale).unwrap_or(f64::NAN);
+        let dt_us = read(burst.dt_us).filter(|dt| (0.0..1e6).contains(dt));
+        for k in 0..count {
+            let offset = self.offset + k * self.scalar.size();
+            let counts = read((offset, self.scalar)).unwrap_or(f64::NAN);
+            let back = dt_us.unwrap_or(0.0) * (count - 1 - k) as f64;
+            add(counts * scale * self.factor, back as u64);
+        }
     }
 }
 
 /// Reads a ULog as a thermal record: rows of `average_s` of the gyro `instance`, axis `axis`.
 ///
 /// # Errors
-/// No ULog, a damaged definition, an incompatible version, a clock that runs backwards, no gyro of
+/// No ULog, a damaged definition, an incompatible version, a clock of the gyro's that runs backwards, no gyro of
 /// that instance, too few rows. Damage among the data is left out and told.
 pub(super) fn read<R: Read>(
     input: R,
     path: &Path,
     mapping: &RecordMapping,
 ) -> Result<(ThermalRecord, Vec<Warning>)> {
-    let fields = wanted(mapping.axis.index());
-    let channels = fields
-        .iter()
-        .map(|f| Channel {
-            column: f.column,
-            source: format!("{}.{}", f.topic, f.field),
-        })
-        .collect();
     let mut reader = Reader {
         stream: Stream::new(path, input),
         definitions: Definitions::default(),
         subscriptions: BTreeMap::new(),
-        seen: BTreeSet::new(),
+        sources: Vec::new(),
+        in_use: Vec::new(),
+        parameters: Parameters::default(),
         appended: Vec::new(),
         damage: Damage::default(),
-        averager: Averager::new(channels, mapping),
-        fields,
-        instance: mapping.instance,
+        averager: Averager::new(mapping),
+        fields: wanted(mapping.axis.index()),
     };
     reader.run()?;
-    let found = match reader.seen.is_empty() {
-        true => "it has no gyro topic at all".to_owned(),
-        false => {
-            let names: Vec<String> = reader
-                .seen
-                .iter()
-                .map(|(topic, instance)| format!("{topic} {instance}"))
-                .collect();
-            format!("it has {}", names.join(", "))
-        }
-    };
-    reader.averager.finish(path, mapping, reader.damage, &found)
+    let Reader {
+        mut sources,
+        mut averager,
+        ..
+    } = reader;
+    averager.seal();
+    for source in sources.iter_mut().filter(|s| s.topic == IN_USE) {
+        source.ids.clone_from(&reader.in_use);
+    }
+    // Sources stand in the order of the fields, not of the log.
+    let order = |s: &Source| reader.fields.iter().position(|f| f.topic == s.topic);
+    sources.sort_by_key(|s| (order(s), s.instance));
+    let nothing = ("no gyro topic", reader.damage);
+    let (mut choice, chosen) =
+        log_gyros::choose(&averager, &sources, mapping.instance, path, nothing)?;
+    if let Some(source) = sources.get(chosen.lead) {
+        let of = corrections::Chosen {
+            number: chosen.number,
+            id: chosen.id,
+            axis: mapping.axis.index(),
+            source: source.topic,
+            raw: source.raw,
+            undo: mapping.undo_correction,
+            path,
+        };
+        let found = corrections::px4(&reader.parameters, of)?;
+        log_gyros::corrected(&averager, &mut choice, found, source);
+    }
+    averager.finish(path, mapping, reader.damage, choice)
 }
 
 /// Samples that were read and not yet taken: a message of type D.
@@ -196,14 +231,16 @@ struct Reader<'a, R: Read> {
     definitions: Definitions,
     /// By the number that the log gives; `None` for a topic of no interest.
     subscriptions: BTreeMap<u16, Option<Subscription>>,
-    /// The gyro topics that the log has, with their instances.
-    seen: BTreeSet<(&'static str, u8)>,
+    /// The topics of interest that the log has, by instance.
+    sources: Vec<Source>,
+    /// The gyro in use: us since power-on, `device_id`.
+    in_use: Vec<(u64, u32)>,
+    parameters: Parameters,
     /// Where appended data begin, the nearest last.
     appended: Vec<u64>,
     damage: Damage,
     averager: Averager,
     fields: Vec<Wanted>,
-    instance: u32,
 }
 
 impl<R: Read> Reader<'_, R> {
@@ -279,7 +316,8 @@ impl<R: Read> Reader<'_, R> {
                 ));
             }
             b'A' => return self.subscribe(body, start),
-            // Information, parameters, text, marks: nothing that a record holds.
+            b'P' => self.parameter(body),
+            // Information, text, marks: nothing that a record holds.
             _ => {}
         }
         Ok(true)
@@ -353,6 +391,27 @@ impl<R: Read> Reader<'_, R> {
         Ok(())
     }
 
+    /// A parameter: a length, `type NAME`, four bytes.
+    fn parameter(&mut self, body: &[u8]) {
+        let Some((length, rest)) = body.split_first() else {
+            return;
+        };
+        let Some((key, value)) = rest.split_at_checked(usize::from(*length)) else {
+            return;
+        };
+        let key = std::str::from_utf8(key)
+            .ok()
+            .and_then(|k| k.split_once(' '));
+        let value = match key {
+            Some(("float", _)) => Scalar::F32.read(value, 0),
+            Some(("int32_t", _)) => Scalar::I32.read(value, 0),
+            _ => None,
+        };
+        if let Some(((_, name), value)) = key.zip(value) {
+            self.parameters.set(name, self.averager.now_us, value);
+        }
+    }
+
     /// Decides what to take from a topic; false if the message is damaged.
     fn subscribe(&mut self, body: &[u8], start: u64) -> Result<bool> {
         let Some(([instance, low, high], name)) = body.split_first_chunk::<3>() else {
@@ -362,47 +421,68 @@ impl<R: Read> Reader<'_, R> {
         let Ok(name) = std::str::from_utf8(name) else {
             return Ok(false);
         };
-        let mut picks = Vec::new();
-        let layout = self.definitions.layout(name);
-        let taken = self.fields.iter().enumerate();
-        for (channel, field) in taken.filter(|(_, f)| f.topic == name) {
-            if field.column == "rate_out_dps" {
-                self.seen.insert((field.topic, instance));
-            }
-            let asked = if field.of_gyro { self.instance } else { 0 };
-            let Some(layout) = layout.as_ref().filter(|_| u32::from(instance) == asked) else {
-                continue;
-            };
-            let Some((offset, scalar)) = layout.field(&field.field) else {
-                continue;
-            };
-            let (factor, over) = match field.unit {
-                Unit::Times(factor) => (factor, None),
-                Unit::Per(factor, time) => match layout.field(time) {
-                    Some(time) => (factor, Some(time)),
-                    None => continue,
-                },
-            };
-            picks.push(Pick {
-                channel,
-                offset,
-                scalar,
-                factor,
-                over,
-            });
-        }
-        if layout.is_none() && self.fields.iter().any(|f| f.topic == name) {
+        let topic = self
+            .fields
+            .iter()
+            .find(|f| f.topic == name)
+            .map(|f| f.topic);
+        let Some(topic) = topic.or((name == SELECTION).then_some(SELECTION)) else {
+            self.subscriptions.insert(number, None);
+            return Ok(true);
+        };
+        let Some(layout) = self.definitions.layout(name) else {
             return Err(self.stream.broken(
                 start,
                 &format!("the log has topic {name} without a usable definition of it"),
                 GIVE_UP,
             ));
+        };
+        let source = self.source(topic, instance, &layout);
+        let of = self.averager.topic(format!("{topic} {instance}"));
+        let mut picks = Vec::new();
+        for field in self.fields.iter().filter(|f| f.topic == name) {
+            let Some(mut pick) = pick(&layout, field) else {
+                continue;
+            };
+            let text = format!("{topic}.{}", field.field);
+            pick.channel = self.averager.channel(of, field.column, text);
+            if let Some(source) = self.sources.get_mut(source) {
+                source.channels.push((field.column, pick.channel));
+            }
+            picks.push(pick);
         }
-        let subscription = layout
-            .filter(|_| !picks.is_empty())
-            .map(|layout| Subscription { layout, picks });
-        self.subscriptions.insert(number, subscription);
+        let subscription = Subscription {
+            id: IDS.iter().find_map(|id| layout.field(id)),
+            calibrations: layout.field("gyro_calibration_count"),
+            calibrated: None,
+            layout,
+            picks,
+            source,
+            topic: of,
+        };
+        self.subscriptions.insert(number, Some(subscription));
         Ok(true)
+    }
+
+    /// The source of a topic's instance, a new one where there is none.
+    fn source(&mut self, topic: &'static str, instance: u8, layout: &Layout) -> usize {
+        let same = |s: &Source| s.topic == topic && s.instance == instance;
+        if let Some(found) = self.sources.iter().position(same) {
+            return found;
+        }
+        // Drivers of old versions took the learnt offset off themselves.
+        let old = layout.field("scaling").is_some();
+        self.sources.push(Source {
+            topic,
+            instance,
+            numbers: topic != IN_USE && topic != SELECTION,
+            raw: topic.starts_with("sensor_gyro") && !old,
+            channels: Vec::new(),
+            ids: Vec::new(),
+            accel_id: None,
+            recalibrated: Vec::new(),
+        });
+        self.sources.len() - 1
     }
 
     /// Samples; false if the message is damaged.
@@ -410,27 +490,88 @@ impl<R: Read> Reader<'_, R> {
         let Some((number, data)) = body.split_first_chunk::<2>() else {
             return Ok(false);
         };
-        let Some(subscription) = self.subscriptions.get(&u16::from_le_bytes(*number)) else {
+        let Some(subscription) = self.subscriptions.get_mut(&u16::from_le_bytes(*number)) else {
             return Ok(false);
         };
         let Some(subscription) = subscription else {
             return Ok(true);
         };
         let time = subscription.layout.time_us(data);
-        let (true, Some(time)) = (data.len() == subscription.layout.logged_bytes, time) else {
+        let (true, Some(time_us)) = (data.len() == subscription.layout.logged_bytes, time) else {
             return Ok(false);
         };
-        for pick in &subscription.picks {
-            let value = pick.value(data).unwrap_or(f64::NAN);
-            if let Err(Backwards(from, to)) = self.averager.add(pick.channel, time, value) {
-                return Err(self.stream.broken(
-                    start,
-                    &format!("the log's clock runs backwards, from {from:.3} s to {to:.3} s"),
-                    "a record is one stretch from one power-on: cut the log there, or take another \
-                     copy of it",
-                ));
+        let read = |place: Option<(usize, Scalar)>| place.and_then(|(o, s)| s.read(data, o));
+        if let (Some(id), Some(source)) = (
+            read(subscription.id),
+            self.sources.get_mut(subscription.source),
+        ) {
+            match source.topic {
+                SELECTION => {
+                    let id = id as u32;
+                    if id != 0 && self.in_use.last().is_none_or(|(_, last)| *last != id) {
+                        self.in_use.push((time_us, id));
+                    }
+                }
+                "sensor_accel" => source.accel_id = source.accel_id.or(Some(id as u32)),
+                _ => source.note(time_us, id as u32),
             }
+            if let Some((offset, scalar)) = subscription.layout.field("accel_device_id") {
+                let id = scalar.read(data, offset).map(|id| id as u32);
+                source.accel_id = source.accel_id.or(id.filter(|id| *id != 0));
+            }
+            if let Some(count) = read(subscription.calibrations) {
+                if subscription
+                    .calibrated
+                    .is_some_and(|before| before != count)
+                {
+                    source.recalibrated.push(time_us);
+                }
+                subscription.calibrated = Some(count);
+            }
+        }
+        let mut message = Message {
+            time_us,
+            at: start,
+            samples: Vec::with_capacity(subscription.picks.len()),
+        };
+        for pick in &subscription.picks {
+            pick.take(data, &mut message.samples);
+        }
+        if !message.samples.is_empty() {
+            self.averager.take(subscription.topic, message);
         }
         Ok(true)
     }
+}
+
+/// Where a field lies; `None` where the topic lacks it. The channel is still to be set.
+fn pick(layout: &Layout, field: &Wanted) -> Option<Pick> {
+    let (factor, over, burst) = match field.unit {
+        Unit::Times(factor) => (factor, None, None),
+        Unit::Per(factor, time) => (factor, Some(layout.field(time)?), None),
+        Unit::Burst(factor) => {
+            let elements =
+                (0..).take_while(|k| layout.field(&format!("{}[{k}]", field.field)).is_some());
+            let burst = Burst {
+                samples: layout.field("samples")?,
+                dt_us: layout.field("dt")?,
+                scale: layout.field("scale")?,
+                most: elements.count(),
+            };
+            (factor, None, Some(burst))
+        }
+    };
+    let name = match burst {
+        Some(_) => format!("{}[0]", field.field),
+        None => field.field.clone(),
+    };
+    let (offset, scalar) = layout.field(&name)?;
+    Some(Pick {
+        channel: 0,
+        offset,
+        scalar,
+        factor,
+        over,
+        burst,
+    })
 }

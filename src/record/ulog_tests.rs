@@ -14,7 +14,7 @@ use std::path::Path;
 pub(super) struct Writer(pub Vec<u8>);
 
 impl Writer {
-    fn new() -> Self {
+    pub(super) fn new() -> Self {
         let mut bytes = b"ULog\x01\x12\x35\x01".to_vec();
         bytes.extend(5_000_000u64.to_le_bytes());
         let mut w = Writer(bytes);
@@ -22,33 +22,33 @@ impl Writer {
         w
     }
 
-    fn message(&mut self, kind: u8, body: &[u8]) {
+    pub(super) fn message(&mut self, kind: u8, body: &[u8]) {
         self.0
             .extend(u16::try_from(body.len()).unwrap().to_le_bytes());
         self.0.push(kind);
         self.0.extend(body);
     }
 
-    fn subscribe(&mut self, number: u16, instance: u8, name: &str) {
+    pub(super) fn subscribe(&mut self, number: u16, instance: u8, name: &str) {
         let mut body = vec![instance];
         body.extend(number.to_le_bytes());
         body.extend(name.bytes());
         self.message(b'A', &body);
     }
 
-    fn data(&mut self, number: u16, time_us: u64, rest: &[u8]) {
+    pub(super) fn data(&mut self, number: u16, time_us: u64, rest: &[u8]) {
         let mut body = number.to_le_bytes().to_vec();
         body.extend(time_us.to_le_bytes());
         body.extend(rest);
         self.message(b'D', &body);
     }
 
-    fn sync(&mut self) {
+    pub(super) fn sync(&mut self) {
         self.message(b'S', &[0x2F, 0x73, 0x13, 0x20, 0x25, 0x0C, 0xBB, 0x12]);
     }
 }
 
-fn floats(values: &[f32]) -> Vec<u8> {
+pub(super) fn floats(values: &[f32]) -> Vec<u8> {
     values.iter().flat_map(|v| v.to_le_bytes()).collect()
 }
 
@@ -61,7 +61,7 @@ fn rate_dps(instance: usize, axis: usize, k: u64) -> f64 {
 }
 
 /// Twenty seconds at 10 Hz: two gyros with accelerometers, a battery every second.
-fn sound() -> Writer {
+pub(super) fn sound() -> Writer {
     let mut w = Writer::new();
     w.message(b'F', b"sensor_gyro:uint64_t timestamp;uint64_t timestamp_sample;uint32_t device_id;float x;float y;float z;float temperature;uint32_t error_count;uint8_t samples;uint8_t[3] _padding0;");
     w.message(
@@ -144,7 +144,7 @@ fn axis_instance_units_and_rows_are_what_was_written() {
     for (axis, instance) in [(LogAxis::Z, 0usize), (LogAxis::X, 1), (LogAxis::Y, 0)] {
         let mapping = RecordMapping {
             axis,
-            instance: instance as u32,
+            instance: Some(instance as u32),
             ..RecordMapping::default()
         };
         let (r, warnings) = of(&bytes, &mapping).unwrap();
@@ -200,7 +200,7 @@ fn integrals_and_the_gyro_in_use_serve_where_the_driver_was_not_logged() {
     w.subscribe(1, 0, "vehicle_imu_status");
     for k in 0..15u64 {
         let time = k * 1_000_000 + 300;
-        let rate = 0.5f32.to_radians() * 0.005;
+        let rate = (0.5 + 0.01 * (k % 3) as f32 - 0.02).to_radians() * 0.005;
         let mut body = floats(&[0.0, 0.0, rate, 0.0, 0.0, -9.80665 * 0.004]);
         body.extend(5000u32.to_le_bytes());
         body.extend(4000u16.to_le_bytes());
@@ -241,8 +241,21 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
     };
     let mut back = Writer::new();
     second(&mut back);
-    for time in [10_000_000u64, 11_000_000, 500_000] {
-        back.data(0, time, &floats(&[0.0; 3]));
+    for (k, time) in [
+        9_000_000u64,
+        10_000_000,
+        11_000_000,
+        12_000_000,
+        13_000_000,
+        500_000,
+        600_000,
+        700_000,
+        800_000,
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        back.data(0, time, &floats(&[k as f32; 3]));
     }
     let mut future = Writer::new();
     future.0[16 + 3 + 8] = 2;
@@ -254,7 +267,7 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
     none.message(b'F', b"attitude:uint64_t timestamp;float q;");
     none.subscribe(0, 0, "attitude");
     let instance = RecordMapping {
-        instance: 3,
+        instance: Some(3),
         ..RecordMapping::default()
     };
     type Case<'a> = (&'a [u8], &'a RecordMapping, &'a [&'a str]);
@@ -307,7 +320,10 @@ fn a_lost_battery_and_a_bad_sector_cost_only_what_they_hit() {
     let bytes = sound().0;
     let whole = of(&bytes, &plain).unwrap().0;
     let (cut, warnings) = of(&bytes[..bytes.len() - 20], &plain).unwrap();
-    assert_eq!(codes(&warnings), ["log_cut_off", "log_averaged"]);
+    assert_eq!(
+        codes(&warnings),
+        ["log_cut_off", "gyros_in_log", "log_averaged"]
+    );
     assert_eq!(cut.time_s[..19], whole.time_s[..19]);
 
     let mut bad = bytes.clone();
@@ -344,7 +360,10 @@ fn appended_data_are_read_behind_a_message_that_was_cut() {
     log.extend(more.0);
     let (r, warnings) = of(&log, &RecordMapping::default()).unwrap();
     assert_eq!(r.len(), 20);
-    assert_eq!(codes(&warnings), ["log_damaged", "log_averaged"]);
+    assert_eq!(
+        codes(&warnings),
+        ["log_damaged", "gyros_in_log", "log_averaged"]
+    );
 }
 
 #[test]

@@ -52,8 +52,8 @@ pub struct BaselineFit {
     pub heldout_rms_dps: f64,
     /// The largest held-out error.
     pub heldout_max_abs_dps: f64,
-    /// White noise of the output, deg/s: [`stats::difference_noise`] of the residuals. Noise with
-    /// memory counts in part.
+    /// White noise of the output, deg/s: [`stats::difference_noise`] of what the highest order that is tried by itself
+    /// leaves, whatever order was chosen: the floor is the record's. Noise with memory counts in part.
     pub noise_floor_rms_dps: f64,
     /// Drift of the bias over the thermometer's range, deg/s, peak to peak: of the mean error
     /// signal in twenty bins of the thermometer with at least three clean rows (of all bins that
@@ -164,11 +164,7 @@ pub fn thermometer<'a>(
                         "the record has no thermometer: none of {}",
                         THERMOMETERS.join(", ")
                     ),
-                    format!(
-                        "the file has: {}\n  say in the design which one it is:\n    \
-                         [record.columns]\n    die_degc = \"NAME_IN_THE_FILE\"",
-                        has.join(", ")
-                    ),
+                    without_thermometer(record, &has),
                 )
             })?,
     };
@@ -193,6 +189,21 @@ pub fn thermometer<'a>(
         ));
     }
     Ok((name, column))
+}
+
+/// What helps a record without a thermometer; `has` are its columns.
+fn without_thermometer(record: &ThermalRecord, has: &[&str]) -> String {
+    let columns = has.join(", ");
+    if record.is_of_log() {
+        return format!(
+            "the log gives: {columns}. Log the gyro's temperature beside it (PX4: sensor_gyro or vehicle_imu_status; ArduPilot: \
+             IMU with its T), or `gyrogen close --record` it, which does without"
+        );
+    }
+    format!(
+        "the file has: {columns}\n  say in the design which one it is:\n    [record.columns]\n    die_degc = \
+         \"NAME_IN_THE_FILE\""
+    )
 }
 
 /// Fits the bias model.
@@ -299,7 +310,7 @@ pub fn fit_with(
         in_sample_rms_dps: stats::rms(&residuals),
         heldout_rms_dps: choice.heldout.rms_dps,
         heldout_max_abs_dps: choice.heldout.max_abs_dps,
-        noise_floor_rms_dps: stats::difference_noise(&residuals),
+        noise_floor_rms_dps: noise_floor(&sample),
         drift_before_pp_dps: drift,
         drift_before_pp_plain_dps: stats::extremes(&sample.e).map_or(0.0, |(a, b)| b - a),
         residuals: spread_out(&residuals, f64::NAN),
@@ -425,6 +436,13 @@ fn most_order(sample: &Sample, wanted: FitOrder) -> usize {
         FitOrder::Fixed(_) => different.saturating_sub(1),
         FitOrder::Auto | FitOrder::ByRecord => (different / 2).min(t.len() / 5).saturating_sub(1),
     }
+}
+
+/// See [`BaselineFit::noise_floor_rms_dps`].
+fn noise_floor(sample: &Sample) -> f64 {
+    let order = most_order(sample, FitOrder::Auto).min(order::HIGHEST_AUTO);
+    let coefficients = sample.problem(order, |_| true).coefficients(order);
+    stats::difference_noise(&sample.residuals(&coefficients))
 }
 
 /// See [`BaselineFit::drift_before_pp_dps`].

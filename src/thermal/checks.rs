@@ -250,7 +250,7 @@ fn extrapolation(c: &Checked<'_>) -> Option<Warning> {
     })
 }
 
-/// The loop, if it is more than noise, or so large that it must be spoken of.
+/// The loop, if it is more than noise, or larger than noise makes it on the whole.
 fn loop_warning(c: &Checked<'_>) -> Option<Warning> {
     let l = c.sweep_loop?;
     let seen = format!(
@@ -270,7 +270,7 @@ fn loop_warning(c: &Checked<'_>) -> Option<Warning> {
                  drift in time can"
             ),
         ))
-    } else if l.rms_dps > c.fit.noise_floor_rms_dps {
+    } else if l.rms_dps > c.fit.noise_floor_rms_dps.max(l.noise_dps) {
         Some(Warning::on(
             "loop_or_slow_noise",
             &c.fit.thermometer,

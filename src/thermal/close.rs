@@ -4,6 +4,7 @@ mod carried;
 mod evidence;
 mod remarks;
 
+use super::baseline;
 use super::channels::Channels;
 use super::effects::{Candidate, user};
 use super::intake::{Intake, refused};
@@ -121,6 +122,7 @@ pub fn close(
     let record: &ThermalRecord = &taken.intake.record;
     let refuse = |why: String| refused(record, why);
     let mut warnings = taken.intake.warnings.clone();
+    warnings.extend(one_direction(record, design));
     let (closure, before, after, accidents, firmware) = {
         let search = taken.search(effort);
         if !search.heldout.contains(&true) {
@@ -163,6 +165,13 @@ pub fn close(
         correction,
         firmware_dps,
     })
+}
+
+/// What `run` says of a record that was heated or cooled alone: names of effects in time mean less there.
+fn one_direction(record: &ThermalRecord, design: &Design) -> Option<Warning> {
+    let fit = baseline::fit(record, &design.record, &design.fit).ok()?;
+    let mut warnings = fit.warnings.into_iter();
+    warnings.find(|w| w.code == "one_direction")
 }
 
 /// The rows that errors are of, and those that stand out, alone or a few in a row.

@@ -34,7 +34,13 @@ pub(super) fn take(
     for (name, values) in columns.iter() {
         let holes = values.iter().filter(|v| v.is_nan()).count();
         let few = holes > 0 && holes as f64 <= SELDOM * values.len() as f64;
-        if APART.contains(&name.as_str()) || !few {
+        if APART.contains(&name.as_str()) {
+            continue;
+        }
+        if !few {
+            if name == thermometer && holes > 0 && long_gaps(values, &mut lost) {
+                names.push(name.as_str());
+            }
             continue;
         }
         if name == thermometer || !is_given(time_s, values) {
@@ -63,6 +69,35 @@ pub(super) fn take(
         );
         Warning::general("rows_with_holes", said)
     })
+}
+
+/// Times the usual distance of two readings from which a gap between them is one that no line fills.
+const LONG: usize = 3;
+
+/// Marks the rows in the gaps of a channel that is read seldom which are longer than its readings are apart as a rule (and at
+/// its ends); true if there are any.
+fn long_gaps(values: &[f64], lost: &mut [bool]) -> bool {
+    let known: Vec<usize> = (0..values.len())
+        .filter(|i| values[*i].is_finite())
+        .collect();
+    let mut apart: Vec<usize> = known.windows(2).map(|w| w[1] - w[0]).collect();
+    apart.sort_unstable();
+    let Some(usual) = apart.get(apart.len() / 2).copied() else {
+        return false;
+    };
+    let (first, last) = (known.first().copied(), known.last().copied());
+    let ends = first.map(|f| (0, f)).into_iter();
+    let ends = ends.chain(last.map(|l| (l + 1, values.len())));
+    let inner = known.windows(2).map(|w| (w[0] + 1, w[1]));
+    let mut any = false;
+    for (from, to) in inner.chain(ends) {
+        // Readings every n rows leave up to n - 1 before the first and behind the last.
+        if to - from + 1 > LONG * usual {
+            lost[from..to].fill(true);
+            any = true;
+        }
+    }
+    any
 }
 
 /// Whether measured readings lie on the line between their neighbours.

@@ -1,0 +1,210 @@
+//! What a file is by its first bytes, and gzip and zstd streams unpacked while they are read.
+
+use ruzstd::decoding::{FrameDecoder, StreamingDecoder};
+use std::io::{self, BufRead, BufReader, Read};
+
+/// Bytes that tell what a file is.
+pub(super) const HEAD: usize = 16;
+
+const GZIP: [u8; 2] = [0x1F, 0x8B];
+const ZSTD: [u8; 4] = [0x28, 0xB5, 0x2F, 0xFD];
+
+/// Times that a MAVLink telemetry log can begin with, us since 1970: 2000 to 2100.
+const TELEMETRY_US: std::ops::Range<u64> = 946_684_800_000_000..4_102_444_800_000_000;
+
+/// Whether these are the first bytes of a packed file.
+pub(super) fn is_packed(head: &[u8]) -> bool {
+    head.starts_with(&GZIP) || head.starts_with(&ZSTD)
+}
+
+/// The stream unpacked, if its head is that of a packed one; the second: whether it was.
+///
+/// # Errors
+/// A head that is followed by no such stream.
+pub(super) fn unpacked(head: &[u8], input: Box<dyn Read>) -> io::Result<(Box<dyn Read>, bool)> {
+    if head.starts_with(&GZIP) {
+        return Ok((Box::new(flate2::read::MultiGzDecoder::new(input)), true));
+    }
+    if head.starts_with(&ZSTD) {
+        return Ok((Box::new(Zstd::new(input)?), true));
+    }
+    Ok((input, false))
+}
+
+/// A zstd stream of one frame after the other.
+struct Zstd {
+    frame: Option<StreamingDecoder<BufReader<Box<dyn Read>>, FrameDecoder>>,
+}
+
+impl Zstd {
+    fn new(input: Box<dyn Read>) -> io::Result<Self> {
+        let frame = frame(BufReader::new(input))?;
+        Ok(Zstd { frame: Some(frame) })
+    }
+}
+
+fn frame(
+    input: BufReader<Box<dyn Read>>,
+) -> io::Result<StreamingDecoder<BufReader<Box<dyn Read>>, FrameDecoder>> {
+    StreamingDecoder::new(input)
+        .map_err(|e| io::Error::new(io::ErrorKind::InvalidData, e.to_string()))
+}
+
+impl Read for Zstd {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        loop {
+            let Some(of) = self.frame.as_mut() else {
+                return Ok(0);
+            };
+            let count = of.read(buffer)?;
+            if count > 0 || buffer.is_empty() {
+                return Ok(count);
+            }
+            let Some(done) = self.frame.take() else {
+                return Ok(0);
+            };
+            let mut rest = done.into_inner();
+            if !rest.fill_buf()?.is_empty() {
+                self.frame = Some(frame(rest)?);
+            }
+        }
+    }
+}
+
+/// What a file that is no record is, and what to do; `None` for one that may be.
+pub(super) fn foreign(head: &[u8]) -> Option<(&'static str, &'static str)> {
+    const UNPACK: &str =
+        "unpack it, and give the record that is in it (gzip and zstd files are read as they are)";
+    const EXPORT: &str = "export the gyro's rate, its temperature and their time from it as CSV";
+    const KINDS: [(&[u8], &str, &str); 13] = [
+        (
+            b"PK\x03\x04",
+            "this is a ZIP archive or an Excel workbook",
+            "unpack it, or save the sheet as CSV UTF-8",
+        ),
+        (b"BZh", "this is a bzip2 file", UNPACK),
+        (b"\xFD7zXZ\0", "this is an xz file", UNPACK),
+        (b"7z\xBC\xAF\x27\x1C", "this is a 7-Zip archive", UNPACK),
+        (b"#ROSBAG V", "this is a ROS bag", EXPORT),
+        (b"\x89MCAP0\r\n", "this is an MCAP file (ROS 2)", EXPORT),
+        (
+            b"\x89HDF\r\n\x1A\n",
+            "this is an HDF5 file (or MATLAB's)",
+            EXPORT,
+        ),
+        (b"MATLAB 5.0", "this is a MATLAB file", EXPORT),
+        (b"PAR1", "this is a Parquet file", EXPORT),
+        (
+            b"SQLite format 3",
+            "this is an SQLite data base (ROS 2?)",
+            EXPORT,
+        ),
+        (
+            b"H Product:Blac",
+            "this is a Blackbox log (Betaflight, INAV)",
+            "decode it with blackbox_decode, which writes CSV",
+        ),
+        (
+            b"\x93NUMPY",
+            "this is a NumPy array",
+            "a capture of ADC codes is given with `close --capture`; write a thermal record as CSV",
+        ),
+        (
+            b"\xD0\xCF\x11\xE0",
+            "this is an old Excel workbook",
+            "save the sheet as CSV UTF-8",
+        ),
+    ];
+    if let Some((_, what, help)) = KINDS.iter().find(|(magic, ..)| head.starts_with(magic)) {
+        return Some((what, help));
+    }
+    // A time in front of each MAVLink packet (0xFE: version 1, 0xFD: version 2).
+    let time = head.first_chunk::<8>().map(|t| u64::from_be_bytes(*t));
+    let packet = head.get(8).is_some_and(|b| matches!(b, 0xFE | 0xFD));
+    (packet && time.is_some_and(|t| TELEMETRY_US.contains(&t))).then_some((
+        "this is a telemetry log (MAVLink, as a ground station writes it)",
+        "its IMU messages are few and scaled; give the log that the vehicle itself wrote (ArduPilot: .bin, PX4: .ulg)",
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::any::read_any;
+    use super::*;
+    use crate::design::RecordMapping;
+    use std::io::Write;
+
+    fn csv() -> Vec<u8> {
+        let rows =
+            (0..300).map(|k| format!("{k},{:.4},{}\n", (1.7 * f64::from(k)).sin(), 20 + k % 40));
+        ("time_s,rate_out_dps,die_degc\n".to_owned() + &rows.collect::<String>()).into_bytes()
+    }
+
+    fn gzip(bytes: &[u8]) -> Vec<u8> {
+        let mut out = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+        out.write_all(bytes).unwrap();
+        out.finish().unwrap()
+    }
+
+    fn zstd(bytes: &[u8]) -> Vec<u8> {
+        ruzstd::encoding::compress_to_vec(bytes, ruzstd::encoding::CompressionLevel::Fastest)
+    }
+
+    #[test]
+    fn a_packed_record_is_the_record() {
+        let folder = tempfile::tempdir().unwrap();
+        let mapping = RecordMapping::default();
+        let read = |name: &str, bytes: &[u8]| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, bytes).unwrap();
+            read_any(&path, &mapping)
+        };
+        let plain = read("r.csv", &csv()).unwrap();
+        let (first, second) = csv().split_at(1000).map_halves();
+        for (name, bytes) in [
+            ("r.csv.gz", gzip(&csv())),
+            ("r.gz", [gzip(&first), gzip(&second)].concat()),
+            ("r.csv.zst", zstd(&csv())),
+            ("r.zst", [zstd(&first), zstd(&second)].concat()),
+            ("r.bin", gzip(&csv())),
+        ] {
+            let (record, warnings) = read(name, &bytes).unwrap();
+            assert_eq!(record.columns, plain.0.columns, "{name}");
+            assert_eq!(warnings, plain.1, "{name}");
+            let cut = bytes.get(..bytes.len() / 2).unwrap();
+            assert_eq!(read(name, cut).unwrap_err().exit_status(), 2, "{name}");
+        }
+    }
+
+    trait Halves {
+        fn map_halves(self) -> (Vec<u8>, Vec<u8>);
+    }
+
+    impl Halves for (&[u8], &[u8]) {
+        fn map_halves(self) -> (Vec<u8>, Vec<u8>) {
+            (self.0.to_vec(), self.1.to_vec())
+        }
+    }
+
+    #[test]
+    fn a_file_of_another_kind_is_named() {
+        let mut telemetry = 1_700_000_000_000_000u64.to_be_bytes().to_vec();
+        telemetry.extend([0xFD, 9, 0, 0, 7, 1, 1, 0]);
+        for (head, part) in [
+            (&b"PK\x03\x04\x14\0"[..], "Excel"),
+            (b"BZh91AY", "bzip2"),
+            (&telemetry, "telemetry"),
+            (b"\x89MCAP0\r\n", "MCAP"),
+        ] {
+            assert!(foreign(head).unwrap().0.contains(part), "{part}");
+        }
+        for head in [
+            &b"time_s,rate_out"[..],
+            b"ULog\x01\x12\x35",
+            b"",
+            b"1,2,3,4,5,6,7,8",
+        ] {
+            assert_eq!(foreign(head), None);
+        }
+    }
+}
