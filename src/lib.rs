@@ -12,6 +12,7 @@ pub mod cli;
 pub mod compensation;
 pub mod correction;
 pub mod cosim;
+pub mod cost;
 pub mod design;
 pub mod digest;
 pub mod emit;

@@ -1,9 +1,9 @@
 //! Forms that meet a bound, and the cheapest of them.
 
-use super::cost::Cost;
 use super::describe;
 use super::job::{self, Request};
 use super::outcome::Alternative;
+use super::priced;
 use crate::approx::form::generate;
 use crate::approx::form::generate::{MOST_BIPARTITE_CODES, MOST_SEGMENTS};
 use crate::approx::form::measure::{Effort, Measured, Reference, measure};
@@ -12,6 +12,7 @@ use crate::approx::form::split::{Spacing, Split, Symmetry};
 use crate::approx::form::table::Kind;
 use crate::approx::form::{Codes, Form, Settled};
 use crate::approx::reference::Function;
+use crate::cost::function::FunctionCost;
 use crate::design::target::Target;
 use crate::error::Result;
 use crate::numeric::format::Format;
@@ -39,7 +40,7 @@ pub struct Candidate {
     /// Its error.
     pub measured: Measured,
     /// Its cost.
-    pub cost: Cost,
+    pub cost: FunctionCost,
 }
 
 impl Candidate {
@@ -58,7 +59,7 @@ impl Candidate {
         let measured = quick(&settled, reference).ok()?;
         (measured.certified <= bound).then(|| Candidate {
             detail: describe::detail(&settled.form),
-            cost: Cost::of(&settled, target),
+            cost: priced::cost(&settled, target),
             measured,
             settled,
         })

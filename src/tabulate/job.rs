@@ -3,10 +3,10 @@
 use super::check;
 use super::choice::{self, Candidate, Wanted};
 use super::coefficients::{self, Chosen};
-use super::cost::Cost;
 use super::describe;
 use super::ideal;
 use super::outcome::{ErrorBounds, Outcome};
+use super::priced;
 use crate::approx::form::coefficient_formats::CoefficientFormats;
 use crate::approx::form::measure::{Effort, Measured, SAMPLE, measure};
 use crate::approx::form::polynomial;
@@ -201,7 +201,7 @@ pub fn approximate(
         error: bounds(&measured),
         inputs_checked: measured.inputs_checked,
         exhaustive: measured.exhaustive,
-        cost: Cost::of(&settled, request.target),
+        cost: priced::cost(&settled, request.target),
         target: request.target,
         search,
         ideal,

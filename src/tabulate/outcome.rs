@@ -1,8 +1,8 @@
 //! `approx.json` (`gyrogen.approx/1`): what was made and how accurate it is.
 
-use super::cost::Cost;
 use crate::approx::form::polynomial::{Monomials, Scheme};
 use crate::approx::form::split::{Spacing, Symmetry};
+use crate::cost::function::FunctionCost;
 use serde::Serialize;
 
 /// The whole result. Errors and values are in the function's own unit.
@@ -48,7 +48,7 @@ pub struct Outcome {
     pub exhaustive: bool,
     /// What it costs.
     #[serde(flatten)]
-    pub cost: Cost,
+    pub cost: FunctionCost,
     /// The processor of the estimate.
     pub target: crate::design::target::Target,
     /// How the coefficients were found.
@@ -176,7 +176,7 @@ pub struct Alternative {
     pub detail: String,
     /// What it costs.
     #[serde(flatten)]
-    pub cost: Cost,
+    pub cost: FunctionCost,
     /// Proved.
     pub certified_max_abs: f64,
     /// No other one is at least as good in ROM, multiplications, additions and error.
