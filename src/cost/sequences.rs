@@ -249,7 +249,7 @@ fn cortex_m4() -> Processor {
         // PUSH and POP take lists.
         save: Sequence::NONE,
         free_registers: 5,
-        registers: 13,
+        registers: 14,
         spill: Sequence::of(0.0, 1.0, 1.0, 0.0),
         immediate: Immediate::Rotated,
         constant: Sequence::load(1.0),
@@ -271,7 +271,8 @@ fn cortex_m0(multiplication: f64) -> Processor {
         ..Sequence::of(29.0, 3.0, 2.0, 2.0)
     };
     let mut library_call = library;
-    library_call.add(&Sequence::of(4.0, 0.0, 0.0, 1.0), 1.0);
+    // Two words of 64 bits into their registers, signs extended; the result out of them.
+    library_call.add(&Sequence::of(9.0, 0.0, 0.0, 1.0), 1.0);
     let mut wide = Sequence::alu(60.0);
     wide.add(&library_call, 6.0);
     Processor {

@@ -30,7 +30,11 @@ fn words_of_32_bits_in_the_decimator_are_cheaper_by_a_third() {
     };
     for target in Target::ALL {
         let [wide, same, short] = ["Q2.22", "Q2.16", "Q2.15"].map(|f| at(f, target).cycles_per_row);
-        assert_eq!(wide, same, "{target:?}");
+        // But for the slow part's shifts.
+        assert!(
+            wide.abs_diff(same) * 100 < wide,
+            "{target:?}: {wide} {same}"
+        );
         if target != Target::Host {
             assert!(short < wide * 4 / 5, "{target:?}: {short} of {wide}");
         }

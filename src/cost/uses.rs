@@ -28,8 +28,8 @@ pub struct Use {
 pub struct Uses<'a> {
     function: &'a Function,
     temps: Vec<Use>,
-    /// Definitions of words where more are alive than `registers`.
-    pub crowded: usize,
+    /// Definitions of words where more are alive than `registers`, as often as they are executed.
+    pub crowded: f64,
     /// The most that are alive.
     pub peak: usize,
     /// The most that are alive over a call.
@@ -37,15 +37,17 @@ pub struct Uses<'a> {
 }
 
 impl<'a> Uses<'a> {
-    /// Of a lowered function; `calls` says whether a call of that number is one in machine code.
+    /// Of a lowered function; `inside` gives the words that are alive in the callee of a call which is none in
+    /// machine code.
     pub fn of(
         function: &'a Function,
         lowered: &Lowered,
         registers: usize,
-        calls: &dyn Fn(usize) -> bool,
+        inside: &dyn Fn(usize) -> Option<usize>,
     ) -> Self {
-        let mut flat = Vec::new();
-        flatten(&lowered.body, &mut flat);
+        let mut repeated = Vec::new();
+        flatten(&lowered.body, 1.0, &mut repeated);
+        let flat: Vec<&Statement> = repeated.iter().map(|(s, _)| *s).collect();
         let mut uses = Uses {
             function,
             temps: vec![
@@ -60,7 +62,7 @@ impl<'a> Uses<'a> {
                 };
                 temps(&lowered.body)
             ],
-            crowded: 0,
+            crowded: 0.0,
             peak: 0,
             over_call: 0,
         };
@@ -77,7 +79,7 @@ impl<'a> Uses<'a> {
             uses.statement(statement, at);
         }
         let state = usize::from(!function.state.is_empty());
-        uses.alive(&flat, lowered, state, registers, calls);
+        uses.alive(&repeated, lowered, state, registers, inside);
         uses
     }
 
@@ -193,14 +195,14 @@ impl<'a> Uses<'a> {
 
     fn alive(
         &mut self,
-        flat: &[&Statement],
+        flat: &[(&Statement, f64)],
         lowered: &Lowered,
         state: usize,
         registers: usize,
-        calls: &dyn Fn(usize) -> bool,
+        inside: &dyn Fn(usize) -> Option<usize>,
     ) {
         let mut inputs = vec![0usize; lowered.inputs.len()];
-        for (at, statement) in flat.iter().enumerate() {
+        for (at, (statement, _)) in flat.iter().enumerate() {
             operands(statement, &mut |v| {
                 if let Value::Input(k) = v.value {
                     inputs[k] = at;
@@ -213,11 +215,18 @@ impl<'a> Uses<'a> {
             live[*last] += words(lowered.inputs[k]);
         }
         let mut now = state + live.iter().sum::<usize>();
-        for (at, statement) in flat.iter().enumerate() {
-            if let Statement::Call(number, ..) = statement
-                && calls(*number)
-            {
-                self.over_call = self.over_call.max(now.saturating_sub(live[at]));
+        for (at, (statement, times)) in flat.iter().enumerate() {
+            if let Statement::Call(number, ..) = statement {
+                let waiting = now.saturating_sub(live[at]);
+                match inside(*number) {
+                    None => self.over_call = self.over_call.max(waiting),
+                    // What waits while the callee's words take the registers; both have the state's address.
+                    Some(words) => {
+                        let waiting = waiting.saturating_sub(state);
+                        let over = (waiting + words).saturating_sub(registers.max(words));
+                        self.crowded += over.min(waiting) as f64 * times;
+                    }
+                }
             }
             now -= live[at];
             for (t, ty) in defined(statement) {
@@ -227,7 +236,7 @@ impl<'a> Uses<'a> {
                     now += words;
                     live[self.temps[t].last] += words;
                     if now > registers {
-                        self.crowded += words.min(now - registers);
+                        self.crowded += words.min(now - registers) as f64 * times;
                     }
                 }
             }
@@ -261,11 +270,12 @@ fn operands(statement: &Statement, note: &mut dyn FnMut(&Typed)) {
     }
 }
 
-fn flatten<'s>(body: &'s [Statement], into: &mut Vec<&'s Statement>) {
+/// Every statement with how often it is executed.
+fn flatten<'s>(body: &'s [Statement], times: f64, into: &mut Vec<(&'s Statement, f64)>) {
     for statement in body {
-        into.push(statement);
-        if let Statement::Loop(_, inner) = statement {
-            flatten(inner, into);
+        into.push((statement, times));
+        if let Statement::Loop(count, inner) = statement {
+            flatten(inner, times * f64::from(*count), into);
         }
     }
 }

@@ -26,6 +26,8 @@ pub struct Walk<'a> {
     lowered: &'a [Lowered],
     processor: &'a Processor,
     sizes: Vec<u32>,
+    /// The most words that are alive in each function.
+    peaks: Vec<usize>,
     tallies: Vec<Tally>,
 }
 
@@ -47,13 +49,15 @@ impl<'a> Walk<'a> {
             lowered,
             processor,
             sizes: Vec::new(),
+            peaks: Vec::new(),
             tallies: Vec::new(),
         };
         for number in 0..program.functions.len() {
             let size = walk.size(number, &lowered[number].body);
             walk.sizes.push(size);
-            let tally = walk.count(number);
+            let (tally, peak) = walk.count(number);
             walk.tallies.push(tally);
+            walk.peaks.push(peak);
         }
         walk
     }
@@ -67,12 +71,16 @@ impl<'a> Walk<'a> {
         self.sizes[number] <= INLINED
     }
 
-    fn count(&self, number: usize) -> Tally {
+    fn count(&self, number: usize) -> (Tally, usize) {
         let (function, lowered) = (&self.program.functions[number], &self.lowered[number]);
         let is_call = |site: usize| !self.is_inlined(function.calls[site].function);
-        let uses = Uses::of(function, lowered, self.processor.registers, &is_call);
+        let inside = |site: usize| {
+            let callee = function.calls[site].function;
+            self.is_inlined(callee).then(|| self.peaks[callee])
+        };
+        let uses = Uses::of(function, lowered, self.processor.registers, &inside);
         let p = self.processor;
-        let crowded = uses.crowded as f64;
+        let (crowded, peak) = (uses.crowded, uses.peak);
         let saved = uses
             .peak
             .max(p.registers.min(p.free_registers + uses.over_call));
@@ -102,7 +110,7 @@ impl<'a> Walk<'a> {
                 }
             }
         }
-        counting.tally
+        (counting.tally, peak)
     }
 
     /// A function's size as the compiler sees it when it decides where to put it.
