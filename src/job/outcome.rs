@@ -3,6 +3,7 @@
 use super::bound::Kept;
 use super::budget::Budget;
 use super::coefficients::Rounded;
+use super::word_lengths::WordLengths;
 use super::{drift_pp, rms};
 use crate::compensation::certainty;
 use crate::compensation::certainty::Certainty;
@@ -70,6 +71,8 @@ pub struct Parts {
     pub compared: Vec<Compared>,
     /// Readings.
     pub points: Vec<Point>,
+    /// What the word lengths do to them.
+    pub word_lengths: WordLengths,
 }
 
 /// `summary.json` (`gyrogen.run/1`).
@@ -95,7 +98,11 @@ pub struct Summary {
     pub fit: FitSummary,
     /// Formats that were chosen, with the reason; empty if the design's own were used.
     pub chosen: Vec<String>,
-    /// What each step costs.
+    /// What limits the result: the fit, the word lengths, which of them most.
+    pub finding: String,
+    /// Fixed less float over the readings, and by which word.
+    pub word_lengths: WordLengths,
+    /// What each step of the compensation costs.
     pub budget: Budget,
     /// The emitted bias against the fitted polynomial: proved, and run over the calibrated inputs.
     pub certainty: Certainty,
@@ -250,6 +257,10 @@ impl Outcome {
                 outliers: fit.outliers.len(),
             },
             chosen: parts.chosen.clone(),
+            finding: parts
+                .word_lengths
+                .sentence(fit.heldout_rms_dps, parts.budget.bound_dps),
+            word_lengths: parts.word_lengths.clone(),
             budget: parts.budget.clone(),
             certainty_text: {
                 let mut text = certainty::sentences(&parts.design, &parts.certainty.bounds);
