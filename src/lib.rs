@@ -7,6 +7,7 @@
 
 pub mod approx;
 pub mod capture;
+pub mod check;
 pub mod circuit;
 pub mod cli;
 pub mod compensation;
@@ -28,6 +29,7 @@ pub mod parallel;
 pub mod plant;
 pub mod record;
 pub mod report;
+pub mod schemas;
 pub mod selftest;
 pub mod simulation;
 pub mod spectrum;

@@ -11,7 +11,7 @@ use crate::numeric::trace::ir::{Function, Id, Interval, Op, Program, SlotKind};
 use serde::Serialize;
 
 /// Parts of an FPGA.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, schemars::JsonSchema)]
 pub struct Fabric {
     /// Multipliers of 25 x 18 bits, signed.
     pub multiplier_tiles: u64,

@@ -10,7 +10,7 @@ use serde::Serialize;
 const BYTES_A_CYCLE: u64 = 32;
 
 /// What a form costs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, schemars::JsonSchema)]
 pub struct FunctionCost {
     /// Tables and coefficients at the widths of their types.
     pub rom_bytes: u64,

@@ -31,7 +31,7 @@ use std::collections::BTreeMap;
 use walk::Walk;
 
 /// What a design costs on a processor and in an FPGA.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Cost {
     /// The processor.
     pub target: Target,

@@ -4,7 +4,7 @@ use super::{Cost, Target};
 use serde::Serialize;
 
 /// What each part of a cost weighs.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, schemars::JsonSchema)]
 pub struct Weights {
     /// A cycle for a row.
     pub cycle: f64,
@@ -27,7 +27,7 @@ pub struct Weights {
 }
 
 /// What is to be small, and on which processor.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Objective {
     /// The processor of the cycles and bytes.
     pub target: Target,

@@ -260,7 +260,7 @@ pub(super) const KEYS: &[(&str, &[(&str, &str)])] = &[
 ];
 
 /// Of each `[[effects]]`.
-const USER_EFFECT: &[(&str, &str)] = &[
+pub(super) const USER_EFFECT: &[(&str, &str)] = &[
     ("id", "\"bearing_wobble\""),
     ("expression", "\"gain*sin(2*pi*time_s/period)\""),
     (

@@ -12,6 +12,7 @@ mod correction_table;
 mod device_tables;
 mod effect_catalogue;
 pub mod effects;
+mod json_schema;
 mod keys;
 pub mod limits;
 mod log_axis;
@@ -26,5 +27,6 @@ pub mod user_effects;
 
 pub use bound::BiasBound;
 pub use effects::Effects;
+pub use json_schema::json_schema;
 pub use schema::*;
 pub use user_effects::UserEffect;

@@ -24,7 +24,7 @@ use serde::Serialize;
 const WIDEST_BITS: u32 = 64;
 
 /// How the bound is kept.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Kept {
     /// What was asked, deg/s.
     pub bound_dps: f64,
@@ -43,7 +43,7 @@ pub struct Kept {
 }
 
 /// A form that keeps to the bound.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Line {
     /// `polynomial`, `table` or `piecewise`.
     pub form: &'static str,

@@ -18,7 +18,7 @@ use serde::Serialize;
 use std::path::PathBuf;
 
 /// One reading: the same rate through every path, deg/s. The applied rate is subtracted.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Point {
     /// s.
     pub time_s: f64,
@@ -76,7 +76,7 @@ pub struct Parts {
 }
 
 /// `summary.json` (`gyrogen.run/1`).
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct Summary {
     /// `gyrogen.run/1`.
     pub schema: &'static str,
@@ -120,7 +120,7 @@ pub struct Summary {
 }
 
 /// How far the rate output drifts over the record.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Drift {
     /// Greatest minus least mean over bins of the thermometer, deg/s.
     pub drift_pp_dps: f64,
@@ -129,7 +129,7 @@ pub struct Drift {
 }
 
 /// After compensation, by path.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct After {
     /// `f64`, the fit's own coefficients.
     pub float: Drift,
@@ -144,7 +144,7 @@ pub struct After {
 }
 
 /// The fit in numbers.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct FitSummary {
     /// The record's column.
     pub thermometer: String,
@@ -175,7 +175,7 @@ pub struct FitSummary {
 }
 
 /// Emitted code against the model.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct Equivalence {
     /// Output words.
     pub compared: u64,
@@ -188,7 +188,7 @@ pub struct Equivalence {
 }
 
 /// An emitted file.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct Emitted {
     /// Inside the output folder.
     pub path: String,

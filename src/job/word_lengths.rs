@@ -15,7 +15,7 @@ const MORE_BITS: u32 = 8;
 const NOTABLE: f64 = 0.05;
 
 /// What the readings passed in fixed point.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Covers {
     /// From the ADC's codes to the compensated rate.
@@ -25,7 +25,7 @@ pub enum Covers {
 }
 
 /// One word with more bits, the others as they are.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Widened {
     /// The dotted key.
     pub key: &'static str,
@@ -38,7 +38,7 @@ pub struct Widened {
 }
 
 /// How far fixed-point readings are from those of the float path.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct WordLengths {
     /// Which words are in it.
     pub covers: Covers,

@@ -12,7 +12,7 @@ use crate::approx::form::polynomial::Polynomial;
 use serde::Serialize;
 
 /// Coefficients with the least error under ideal evaluation, in the formats of the emitted ones.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Ideal {
     /// From order 0 to the degree; zeros where the monomials have none.
     pub coefficients: Vec<Word>,

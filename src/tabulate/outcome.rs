@@ -6,7 +6,7 @@ use crate::cost::function::FunctionCost;
 use serde::Serialize;
 
 /// The whole result. Errors and values are in the function's own unit.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Outcome {
     /// `gyrogen.approx/1`.
     pub schema: &'static str,
@@ -68,7 +68,7 @@ pub struct Outcome {
 }
 
 /// Formats by their place.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Formats {
     /// Of the input.
     pub input: String,
@@ -81,7 +81,7 @@ pub struct Formats {
 }
 
 /// A raw word with its value.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Word {
     /// The integer.
     pub raw: i128,
@@ -90,7 +90,7 @@ pub struct Word {
 }
 
 /// A table's data.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct TableData {
     /// `plain`, `linear`, `quadratic`, `bipartite`, `piecewise`.
     pub kind: &'static str,
@@ -110,7 +110,7 @@ pub struct TableData {
 }
 
 /// Errors in the function's unit.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct ErrorBounds {
     /// Proved over the real domain: approximation + coefficients + evaluation + output rounding.
     pub certified_max_abs: f64,
@@ -128,7 +128,7 @@ pub struct ErrorBounds {
 }
 
 /// How a polynomial's coefficients were found.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Search {
     /// The error of the best real coefficients.
     pub minimax_error: f64,
@@ -152,7 +152,7 @@ pub struct Search {
 }
 
 /// One choice of coefficients.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Compared {
     /// What it is.
     pub name: &'static str,
@@ -168,7 +168,7 @@ pub struct Compared {
 }
 
 /// A form that meets the bound.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Alternative {
     /// `polynomial`, `table` or `piecewise`.
     pub form: &'static str,

@@ -32,7 +32,7 @@ const PIECES: i128 = 128;
 pub(super) const SLACK: f64 = 1.0 + 1e-9;
 
 /// Which monomials a polynomial has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Monomials {
     /// 1, x, x^2, ..
