@@ -33,6 +33,7 @@ pub mod schemas;
 pub mod selftest;
 pub mod simulation;
 pub mod spectrum;
+pub mod study;
 pub mod statistics;
 pub mod tabulate;
 pub mod thermal;

@@ -20,6 +20,7 @@ mod run;
 mod schema;
 mod self_test;
 mod simulate;
+mod study;
 mod values;
 mod verify;
 
@@ -49,6 +50,7 @@ enum Command {
     Run(run::Arguments),
     Schema(schema::Arguments),
     Simulate(simulate::Arguments),
+    Study(study::Arguments),
     Verify(verify::Arguments),
 }
 
@@ -89,6 +91,7 @@ fn run(command: &Command, recorded: &Recorded) -> Result<()> {
         Command::Run(arguments) => run::run(arguments, recorded),
         Command::Schema(arguments) => schema::run(arguments),
         Command::Simulate(arguments) => simulate::run(arguments, recorded),
+        Command::Study(arguments) => study::run(arguments, recorded),
         Command::Verify(arguments) => verify::run(arguments, recorded),
     }
 }

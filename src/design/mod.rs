@@ -19,14 +19,17 @@ mod log_axis;
 pub mod reader;
 pub mod record_columns;
 pub mod schema;
+mod study_tables;
 pub(crate) mod suggest;
 mod table;
 pub mod target;
 pub mod template;
 pub mod user_effects;
+pub mod word;
 
 pub use bound::BiasBound;
 pub use effects::Effects;
 pub use json_schema::json_schema;
 pub use schema::*;
+pub use study_tables::{Limit, LimitName, Limits, StudyOptions};
 pub use user_effects::UserEffect;
