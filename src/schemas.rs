@@ -1,20 +1,21 @@
 //! JSON Schemas of the design and of everything that is written as JSON, from the types themselves.
 
 use crate::{
-    check, design, equivalence, firmware, job, selftest, simulation, tabulate, timing, verdict,
-    verify,
+    check, design, equivalence, firmware, job, selftest, simulation, study, tabulate, timing,
+    verdict, verify,
 };
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde_json::Value;
 
 /// Every name, and what it is the schema of.
-pub const NAMES: [(&str, &str); 11] = [
+pub const NAMES: [(&str, &str); 12] = [
     ("design", "the design file, its TOML as JSON"),
     ("run", "summary.json of `run`"),
     ("simulate", "simulate.json"),
     ("equiv", "equiv.json"),
     ("check", "check.json"),
+    ("study", "study.json"),
     ("approx", "approx.json"),
     ("close", "closure.json"),
     ("selftest", "selftest.json"),
@@ -31,6 +32,7 @@ pub fn schema(name: &str) -> Option<Value> {
         "simulate" => of::<simulation::outcome::Summary>(),
         "equiv" => of::<equivalence::outcome::Equivalence>(),
         "check" => of::<check::outcome::Check>(),
+        "study" => of::<study::outcome::Study>(),
         "approx" => of::<tabulate::outcome::Outcome>(),
         "close" => of::<verdict::Closure>(),
         "selftest" => of::<selftest::outcome::Outcome>(),

@@ -90,7 +90,9 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         OutputFormat::Text => print(&done.study),
     }
     let unmet = done.study.chosen.iter().filter(|c| c.point.is_none());
-    let unmet: Vec<String> = unmet.map(|c| format!("{}: {}", c.target, c.reason)).collect();
+    let unmet: Vec<String> = unmet
+        .map(|c| format!("{}: {}", c.target, c.reason))
+        .collect();
     if !request.limits.is_empty() && !unmet.is_empty() {
         return Err(Error::Check(unmet.join("; ")));
     }
@@ -152,7 +154,11 @@ fn print(s: &Study) {
 
 fn row(p: &Point, targets: &[String]) -> Vec<String> {
     let mut row = vec![
-        if p.number == 0 { "given".to_owned() } else { p.number.to_string() },
+        if p.number == 0 {
+            "given".to_owned()
+        } else {
+            p.number.to_string()
+        },
         p.targets.join(", "),
     ];
     for target in targets {

@@ -47,7 +47,9 @@ impl Additive {
         let costs = (0..bench.objectives.len()).map(|o| {
             let base = bench.cost(o, &given);
             let of = |(k, low, high): &(usize, u32, u32)| {
-                (*low..=*high).map(|l| bench.cost(o, &at(*k, l)) - base).collect()
+                (*low..=*high)
+                    .map(|l| bench.cost(o, &at(*k, l)) - base)
+                    .collect()
             };
             ranges.iter().map(of).collect()
         });

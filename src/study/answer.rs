@@ -5,9 +5,9 @@ use super::figures::Figures;
 use super::job::{Reporting, Request};
 use super::outcome::{Chosen, Point, Required, Step};
 use super::space::Lengths;
-use crate::parallel::in_parallel;
 use crate::cost;
 use crate::design::{LimitName, Limits};
+use crate::parallel::in_parallel;
 use std::collections::BTreeMap;
 
 /// The answers.
@@ -34,7 +34,11 @@ pub(super) fn answers(
             .filter(|(_, p)| meets(p, target, limits, bandwidth_hz))
             .filter(|(_, p)| !limits.is_empty() || p.as_good_as_given)
             .collect();
-        able.sort_by(|a, b| cost(&a.1).total_cmp(&cost(&b.1)).then_with(|| a.0.cmp(&b.0)));
+        able.sort_by(|a, b| {
+            cost(&a.1)
+                .total_cmp(&cost(&b.1))
+                .then_with(|| a.0.cmp(&b.0))
+        });
         let first = able.first();
         let reason = match first {
             Some((_, p)) => {
@@ -65,9 +69,7 @@ fn meets(p: &Point, target: &str, limits: &Limits, bandwidth_hz: f64) -> bool {
         match limit.name {
             LimitName::Bandwidth => bandwidth_hz >= limit.value,
             LimitName::RomBytes => cost.is_some_and(|c| c.rom_bytes as f64 <= limit.value),
-            LimitName::CyclesPerRow => {
-                cost.is_some_and(|c| c.cycles_per_row as f64 <= limit.value)
-            }
+            LimitName::CyclesPerRow => cost.is_some_and(|c| c.cycles_per_row as f64 <= limit.value),
             LimitName::Bias => p.bias_error_dps.abs() <= limit.value,
             LimitName::Drift => p.drift_residual_dps <= limit.value,
             LimitName::Noise => p.noise_dps_rthz <= limit.value,
@@ -111,7 +113,11 @@ fn required(
             }
             name => finest(work, name),
         };
-        let met = if limit.name.is_least() { best >= limit.value } else { best <= limit.value };
+        let met = if limit.name.is_least() {
+            best >= limit.value
+        } else {
+            best <= limit.value
+        };
         out.push(Required {
             name: limit.name.name(),
             limit: limit.value,
@@ -158,8 +164,13 @@ fn why_not(required: &[Required], limits: &Limits) -> String {
     }
     let said: Vec<String> = missed
         .map(|r| {
-            let word = r.limited_by.map_or(String::new(), |w| format!(", limited by `{w}`"));
-            format!("{} cannot be met: {:.3e} is required, {:.3e} the best{word}", r.name, r.limit, r.best)
+            let word = r
+                .limited_by
+                .map_or(String::new(), |w| format!(", limited by `{w}`"));
+            format!(
+                "{} cannot be met: {:.3e} is required, {:.3e} the best{word}",
+                r.name, r.limit, r.best
+            )
         })
         .collect();
     said.join("; ")
@@ -172,7 +183,9 @@ fn sensitivity(work: &Reporting, lengths: &[u32]) -> Vec<Step> {
 
 fn steps(work: &Reporting, lengths: &[u32], by: &[i32]) -> Vec<Step> {
     let count = work.space.variables.len();
-    let moves: Vec<(usize, i32)> = (0..count).flat_map(|k| by.iter().map(move |b| (k, *b))).collect();
+    let moves: Vec<(usize, i32)> = (0..count)
+        .flat_map(|k| by.iter().map(move |b| (k, *b)))
+        .collect();
     in_parallel(&moves, work.bench.threads(), &|_| {}, |(k, by)| {
         let name = work.space.variables[*k].key();
         let length = lengths[*k].saturating_add_signed(*by);

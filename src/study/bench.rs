@@ -7,11 +7,11 @@ use super::merit::Scale;
 use super::scenario::{Extent, Plan};
 use super::space::{Lengths, Space};
 use crate::circuit::engine::ArithmeticKind;
-use crate::parallel::in_parallel;
 use crate::cost::price::Objective;
 use crate::cost::{self, Cost};
 use crate::design::Design;
 use crate::error::Result;
+use crate::parallel::in_parallel;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What a run of a design gave: `None` = there is no such design, or it cannot run.

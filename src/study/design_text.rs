@@ -78,9 +78,15 @@ fn values(design: &Design) -> Vec<(String, Value)> {
     put("circuit.adc.format", c.adc.format.to_string().into());
     put("circuit.nco.phase_bits", bits(c.nco.phase_bits));
     put("circuit.nco.tuning_word", integer(c.nco.tuning_word));
-    put("circuit.nco.table_address_bits", bits(c.nco.table_address_bits));
+    put(
+        "circuit.nco.table_address_bits",
+        bits(c.nco.table_address_bits),
+    );
     put("circuit.nco.table", c.nco.table.to_string().into());
-    put("circuit.demodulator.product", format(&c.demodulator.product));
+    put(
+        "circuit.demodulator.product",
+        format(&c.demodulator.product),
+    );
     put("circuit.decimator.output", format(&c.decimator.output));
     put("circuit.cordic.iterations", bits(c.cordic.iterations));
     put("circuit.cordic.guard_bits", bits(c.cordic.guard_bits));
@@ -89,16 +95,31 @@ fn values(design: &Design) -> Vec<(String, Value)> {
     put("circuit.cordic.gain_bits", bits(c.cordic.gain_bits));
     if let Some(l) = &c.phase_loop {
         put("circuit.phase_loop.setpoint_raw", integer(l.setpoint_raw));
-        put("circuit.phase_loop.proportional.raw", integer(l.proportional.raw));
-        put("circuit.phase_loop.proportional.shift", bits(l.proportional.shift));
+        put(
+            "circuit.phase_loop.proportional.raw",
+            integer(l.proportional.raw),
+        );
+        put(
+            "circuit.phase_loop.proportional.shift",
+            bits(l.proportional.shift),
+        );
         put("circuit.phase_loop.integral.raw", integer(l.integral.raw));
         put("circuit.phase_loop.integral.shift", bits(l.integral.shift));
-        put("circuit.phase_loop.integrator_bits", bits(l.integrator_bits));
+        put(
+            "circuit.phase_loop.integrator_bits",
+            bits(l.integrator_bits),
+        );
     }
     if let Some(l) = &c.amplitude_loop {
-        put("circuit.amplitude_loop.setpoint_raw", integer(l.setpoint_raw));
+        put(
+            "circuit.amplitude_loop.setpoint_raw",
+            integer(l.setpoint_raw),
+        );
         put("circuit.amplitude_loop.error_shift", bits(l.error_shift));
-        put("circuit.amplitude_loop.integrator_shift", bits(l.integrator_shift));
+        put(
+            "circuit.amplitude_loop.integrator_shift",
+            bits(l.integrator_shift),
+        );
         put("circuit.amplitude_loop.initial_raw", integer(l.initial_raw));
         put("circuit.amplitude_loop.gain_bits", bits(l.gain_bits));
     }
@@ -109,7 +130,10 @@ fn values(design: &Design) -> Vec<(String, Value)> {
             Value::Array(raw.collect())
         };
         put("compensation.coefficients_raw", list(&c.coefficients_raw));
-        put("compensation.coefficient_format", c.coefficient_format.to_string().into());
+        put(
+            "compensation.coefficient_format",
+            c.coefficient_format.to_string().into(),
+        );
         put("compensation.accumulator", format(&c.accumulator));
         put("compensation.output", format(&c.output));
         if let Some((low, high)) = c.clamp_raw {
@@ -120,10 +144,16 @@ fn values(design: &Design) -> Vec<(String, Value)> {
             put("compensation.input_scale_bits", bits(t.scale_bits));
         }
     }
-    put("thermal_run.adc_noise_lsb", design.thermal_run.adc_noise_lsb.into());
+    put(
+        "thermal_run.adc_noise_lsb",
+        design.thermal_run.adc_noise_lsb.into(),
+    );
     for (kind, parameters) in design.gyro.effects.iter() {
         for (parameter, value) in kind.parameters.iter().zip(parameters) {
-            put(&format!("gyro.effects.{}.{}", kind.id, parameter.key), (*value).into());
+            put(
+                &format!("gyro.effects.{}.{}", kind.id, parameter.key),
+                (*value).into(),
+            );
         }
     }
     out
@@ -157,12 +187,23 @@ mod tests {
 
     #[test]
     fn the_file_of_a_point_reads_back_with_its_comments() {
-        let lengths = [(Word::Adc, 14), (Word::Product, 18), (Word::Decimated, 20), (Word::Coefficients, 28)];
-        for file in [DEFAULT.to_owned(), "name = \"mine\" # my gyro\n[fit]\norder = 3\n".to_owned()] {
+        let lengths = [
+            (Word::Adc, 14),
+            (Word::Product, 18),
+            (Word::Decimated, 20),
+            (Word::Coefficients, 28),
+        ];
+        for file in [
+            DEFAULT.to_owned(),
+            "name = \"mine\" # my gyro\n[fit]\norder = 3\n".to_owned(),
+        ] {
             let given = reader::parse(&file, None).expect("a design");
             let point = with_lengths(&given, &lengths).expect("a design");
             let text = text(&given, &point).expect("a file");
-            assert!(text.contains("format = \"Q2.16\", rounding = \"half_up\""), "{text}");
+            assert!(
+                text.contains("format = \"Q2.16\", rounding = \"half_up\""),
+                "{text}"
+            );
             assert!(text.contains("adc_noise_lsb = 0.25"));
             if file.len() < 100 {
                 assert!(text.contains("# my gyro") && text.contains("order = 3"));

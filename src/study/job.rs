@@ -12,9 +12,9 @@ use super::search::{self, Effort};
 use super::space::{Lengths, Space};
 use super::verify::{Verified, Verifier};
 use super::{overflow, shard};
-use crate::parallel::in_parallel;
 use crate::design::{Design, Limits};
 use crate::error::{InputError, Result};
+use crate::parallel::in_parallel;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -55,9 +55,11 @@ pub const RESOLUTION: f64 = 0.03;
 /// cannot be written.
 pub fn study(design: &Design, request: &Request, said: &(dyn Fn(usize) + Sync)) -> Result<Done> {
     if design.compensation.is_none() && design.bound.is_some() {
-        return Err(InputError::new("the compensation's formats are not chosen yet")
-            .help("run `gyrogen run` first, and study the design.toml that it writes")
-            .into());
+        return Err(
+            InputError::new("the compensation's formats are not chosen yet")
+                .help("run `gyrogen run` first, and study the design.toml that it writes")
+                .into(),
+        );
     }
     overflow::refuse(design)?;
     let space = Space::new(design)?;
@@ -202,8 +204,10 @@ impl Reporting<'_> {
             files.push((name.clone(), c.text.clone()));
             point.design = Some(name);
         }
-        let numbered: Vec<(Lengths, Point)> =
-            points.iter().map(|(l, _, p)| (l.clone(), p.clone())).collect();
+        let numbered: Vec<(Lengths, Point)> = points
+            .iter()
+            .map(|(l, _, p)| (l.clone(), p.clone()))
+            .collect();
         let answers = answer::answers(self, &numbered, &base, request, bandwidth_hz);
         let plan = &self.bench.plan;
         let ratio = self.design.circuit.decimator.ratio;
@@ -257,7 +261,10 @@ impl Reporting<'_> {
     /// No overflow that the given design cannot have, and a start that ends where the settled circuit is: within
     /// the limit of the bias, or of what a mean over so few rows is certain to.
     fn holds(&self, v: &Verified) -> bool {
-        let noise = v.figures.noise_dps_rthz.max(self.instrument.noise_dps_rthz.unwrap_or(0.0));
+        let noise = v
+            .figures
+            .noise_dps_rthz
+            .max(self.instrument.noise_dps_rthz.unwrap_or(0.0));
         let limit = self.instrument.bias_dps.unwrap_or(f64::INFINITY);
         let allowed = 3.0 * (limit + noise + v.figures.bias_dps.abs());
         v.overflows.is_empty() && v.startup_error_dps.is_none_or(|e| e.abs() <= allowed)
@@ -289,7 +296,9 @@ impl Reporting<'_> {
         let f = &c.verified.figures;
         let price = self.prices(&c.lengths);
         let base = self.prices(&self.space.given());
-        let relative = price.iter().filter_map(|(t, p)| Some((t.clone(), p / base.get(t)?)));
+        let relative = price
+            .iter()
+            .filter_map(|(t, p)| Some((t.clone(), p / base.get(t)?)));
         let costs = self.bench.costs(&c.lengths).unwrap_or_default();
         let targets = self.design.study.targets.iter().cloned();
         let changes = design_text::changes(self.design, &c.point).into_iter();
@@ -316,15 +325,23 @@ impl Reporting<'_> {
             as_good_as_given: self.as_good(f, given),
             verified: true,
             startup_error_dps: c.verified.startup_error_dps,
-            changes: changes.map(|(k, v)| (k, v.to_string().trim().to_owned())).collect(),
+            changes: changes
+                .map(|(k, v)| (k, v.to_string().trim().to_owned()))
+                .collect(),
             alternatives: Vec::new(),
         }
     }
 
     /// No figure of the data sheet is more than one percent worse than the given design's.
     fn as_good(&self, f: &Figures, given: &Figures) -> bool {
-        let parts = self.instrument.parts(f).into_iter().zip(self.instrument.parts(given));
-        parts.into_iter().all(|((_, own), (_, given))| own <= given.max(1.0))
+        let parts = self
+            .instrument
+            .parts(f)
+            .into_iter()
+            .zip(self.instrument.parts(given));
+        parts
+            .into_iter()
+            .all(|((_, own), (_, given))| own <= given.max(1.0))
     }
 
     fn sweeps(&self) -> Vec<Sweep> {

@@ -4,8 +4,8 @@ use crate::cosim::stream::stimulus;
 use crate::design::Design;
 use crate::equivalence::job::{Stimulus, repairs};
 use crate::equivalence::outcome::FirstOverflow;
-use crate::nodes::run;
 use crate::error::{Error, Result};
+use crate::nodes::run;
 
 /// ADC samples that are looked at.
 const SAMPLES: usize = 120_000;

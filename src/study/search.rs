@@ -80,12 +80,20 @@ pub fn search(bench: &mut Bench, scale: &Scale, effort: Effort) -> Result<Vec<Ve
         let mut wanted: BTreeMap<Lengths, f64> = BTreeMap::new();
         for (objective, points) in fronts.iter().enumerate() {
             for point in points {
-                promising(bench, &sums, objective, points, point, effort.slack, &mut |l, gain| {
-                    if !tried.contains(&l) {
-                        let best = wanted.entry(l).or_insert(gain);
-                        *best = best.min(gain);
-                    }
-                });
+                promising(
+                    bench,
+                    &sums,
+                    objective,
+                    points,
+                    point,
+                    effort.slack,
+                    &mut |l, gain| {
+                        if !tried.contains(&l) {
+                            let best = wanted.entry(l).or_insert(gain);
+                            *best = best.min(gain);
+                        }
+                    },
+                );
             }
         }
         let left = effort.runs.saturating_sub(tried.len()).min(effort.round);
@@ -110,7 +118,9 @@ pub fn search(bench: &mut Bench, scale: &Scale, effort: Effort) -> Result<Vec<Ve
 /// # Errors
 /// A journal that cannot be written.
 pub fn exhaust(bench: &mut Bench, scale: &Scale) -> Result<Vec<Vec<Point>>> {
-    let mut all: Vec<Lengths> = (0..bench.space.size()).map(|k| bench.space.nth(k)).collect();
+    let mut all: Vec<Lengths> = (0..bench.space.size())
+        .map(|k| bench.space.nth(k))
+        .collect();
     // The one-word sweeps are shown, and the given design may be outside the ranges.
     all.extend(sweeps(bench));
     bench.run(&all)?;
@@ -127,7 +137,11 @@ pub fn exhaust(bench: &mut Bench, scale: &Scale) -> Result<Vec<Vec<Point>>> {
 /// Above this a point does not count.
 pub fn worst_merit(bench: &Bench, scale: &Scale) -> f64 {
     let given = bench.merit(scale, &bench.space.given());
-    if given.is_finite() { WORST_MERIT.max(given) } else { WORST_MERIT }
+    if given.is_finite() {
+        WORST_MERIT.max(given)
+    } else {
+        WORST_MERIT
+    }
 }
 
 fn fronts(bench: &Bench, scale: &Scale, worst: f64) -> Vec<Vec<Point>> {

@@ -45,7 +45,11 @@ pub fn hash(design: &Design, space: &Space) -> String {
     hasher.update(format!("{:?}", space.variables));
     hasher.update(format!("{:?}", super::scenario::Extent::SEARCH));
     let digest = hasher.finalize();
-    digest.iter().take(16).map(|byte| format!("{byte:02x}")).collect()
+    digest
+        .iter()
+        .take(16)
+        .map(|byte| format!("{byte:02x}"))
+        .collect()
 }
 
 /// The designs that are known beforehand.
@@ -70,7 +74,12 @@ pub fn run(bench: &mut Bench, part: Part, hash: &str, folder: &Path) -> Result<P
         .map(|(_, l)| l)
         .collect();
     bench.run(&own)?;
-    let mut text = format!("gyrogen.study.shard/1 {hash} {}/{} {}\n", part.number, part.of, own.len());
+    let mut text = format!(
+        "gyrogen.study.shard/1 {hash} {}/{} {}\n",
+        part.number,
+        part.of,
+        own.len()
+    );
     for lengths in &own {
         text += &journal::line(lengths, &bench.figures(lengths).copied());
     }
@@ -94,7 +103,10 @@ pub fn merged(folders: &[PathBuf], hash: &str) -> Result<BTreeMap<Lengths, Trial
             paths.push(entry.map_err(failed)?.path());
         }
         paths.sort();
-        for path in paths.iter().filter(|p| p.extension().is_some_and(|e| e == "runs")) {
+        for path in paths
+            .iter()
+            .filter(|p| p.extension().is_some_and(|e| e == "runs"))
+        {
             any = true;
             let text = std::fs::read_to_string(path).map_err(|e| io_error(path, "read", &e))?;
             let part = read(&text, hash, &mut known).map_err(|what| {
@@ -111,7 +123,9 @@ pub fn merged(folders: &[PathBuf], hash: &str) -> Result<BTreeMap<Lengths, Trial
                 .into());
         }
     }
-    let complete = parts.iter().any(|(of, numbers)| numbers.len() == *of as usize);
+    let complete = parts
+        .iter()
+        .any(|(of, numbers)| numbers.len() == *of as usize);
     if complete {
         return Ok(known);
     }
@@ -124,9 +138,12 @@ pub fn merged(folders: &[PathBuf], hash: &str) -> Result<BTreeMap<Lengths, Trial
                 .map(move |k| format!("{k}/{of}"))
         })
         .collect();
-    Err(InputError::new(format!("the study is not complete: {} is missing", missing.join(", ")))
-        .help("run these parts, and merge again")
-        .into())
+    Err(InputError::new(format!(
+        "the study is not complete: {} is missing",
+        missing.join(", ")
+    ))
+    .help("run these parts, and merge again")
+    .into())
 }
 
 fn read(
@@ -151,7 +168,9 @@ fn read(
         seen += 1;
     }
     if count.parse() != Ok(seen) {
-        return Err(format!("this part has {seen} designs and should have {count}"));
+        return Err(format!(
+            "this part has {seen} designs and should have {count}"
+        ));
     }
     Ok(part)
 }

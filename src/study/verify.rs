@@ -106,7 +106,12 @@ impl<'a> Verifier<'a> {
         if circuit.phase_loop.is_none() && circuit.amplitude_loop.is_none() {
             return Ok(None);
         }
-        let rests: Vec<_> = self.plan.nominal.iter().filter(|s| s.role == Role::Rest).collect();
+        let rests: Vec<_> = self
+            .plan
+            .nominal
+            .iter()
+            .filter(|s| s.role == Role::Rest)
+            .collect();
         let Some(stretch) = rests.get(rests.len() / 2) else {
             return Ok(None);
         };
@@ -122,7 +127,11 @@ impl<'a> Verifier<'a> {
         for _ in 0..AFTER_START {
             let row = path.period(&noise)?;
             let [_, _, sense_i, _] = row.channels;
-            sum += if row.rate_dps.is_nan() { sense_i * scale } else { row.rate_dps };
+            sum += if row.rate_dps.is_nan() {
+                sense_i * scale
+            } else {
+                row.rate_dps
+            };
         }
         Ok(Some(sum / AFTER_START as f64))
     }
