@@ -78,11 +78,13 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         eprintln!();
     }
     let json = super::json(&done.study);
+    let html = crate::report::study::html(&done.study)?;
     super::make_folder(&arguments.out.join("designs"))?;
     for (name, text) in &done.files {
         crate::output::write_whole(&arguments.out.join(name), text.as_bytes())?;
     }
     crate::output::write_whole(&arguments.out.join("study.json"), json.as_bytes())?;
+    crate::output::write_whole(&arguments.out.join("report.html"), html.as_bytes())?;
     watch.write(&arguments.out, &done.study.design_sha256, &recorded.command)?;
     journal::remove(&arguments.out)?;
     match arguments.format {

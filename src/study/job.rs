@@ -11,7 +11,7 @@ use super::outcome::{Conditions, Parameter, Point, Study, Sweep, Swept, WordLeng
 use super::search::{self, Effort};
 use super::space::{Lengths, Space};
 use super::verify::{Verified, Verifier};
-use super::{overflow, shard};
+use super::{budget, overflow, shard};
 use crate::design::{Design, Limits};
 use crate::error::{InputError, Result};
 use crate::parallel::in_parallel;
@@ -209,6 +209,17 @@ impl Reporting<'_> {
             .map(|(l, _, p)| (l.clone(), p.clone()))
             .collect();
         let answers = answer::answers(self, &numbered, &base, request, bandwidth_hz);
+        let threads = self.bench.threads();
+        let mut chosen_budgets = BTreeMap::new();
+        for chosen in &answers.chosen {
+            let point = numbered
+                .iter()
+                .find(|(_, p)| Some(p.number) == chosen.point);
+            if let Some(c) = point.and_then(|(l, _)| good.get(l)) {
+                let budget = budget::budget(&c.point, self.verifier, threads)?;
+                chosen_budgets.insert(chosen.target.clone(), budget);
+            }
+        }
         let plan = &self.bench.plan;
         let ratio = self.design.circuit.decimator.ratio;
         let study = Study {
@@ -231,6 +242,8 @@ impl Reporting<'_> {
             designs_simulated: self.bench.simulated(),
             points_dropped: dropped,
             sweeps: self.sweeps(),
+            budget: budget::budget(self.design, self.verifier, threads)?,
+            chosen_budgets,
             conditions: Conditions {
                 temperatures: [
                     super::scenario::Extent::SEARCH.temperatures,

@@ -3,12 +3,13 @@
 //! [`space`] says which words vary, [`retune`] makes a design with other lengths. [`scenario`] is what every design
 //! runs, [`measure`] runs it, [`figures`] are what comes out, [`merit`] is one number of them. [`bench`] runs and
 //! prices designs, each once, [`journal`] keeps that. [`front`] and [`search`] look for the cheapest. [`verify`] runs
-//! again what is reported, [`job`] does all of it, [`outcome`] is `study.json`, [`shard`] divides the work.
+//! again what is reported, [`budget`] says what each word adds, [`job`] does all of it, [`outcome`] is `study.json`, [`shard`] divides the work.
 
 mod additive;
 mod answer;
 pub mod bandwidth;
 pub mod bench;
+pub mod budget;
 pub mod design_text;
 pub mod figures;
 pub mod front;

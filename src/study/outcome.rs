@@ -1,5 +1,6 @@
 //! `study.json`: what a study found.
 
+use super::budget::Budget;
 use super::figures::Figures;
 use super::merit::Scale;
 use crate::cost::Cost;
@@ -191,6 +192,10 @@ pub struct Study {
     pub points_dropped: usize,
     /// By word.
     pub sweeps: Vec<Sweep>,
+    /// What each word of the given design adds.
+    pub budget: Budget,
+    /// The same of the chosen designs, by target.
+    pub chosen_budgets: BTreeMap<String, Budget>,
     /// What was run.
     pub conditions: Conditions,
     /// What else is to be known.
