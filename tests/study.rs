@@ -40,7 +40,11 @@ fn whole() -> &'static Vec<u8> {
         let file = design(folder.path(), 2000, "");
         let out = folder.path().join("out");
         let done = study(&[file.to_str().expect("UTF-8"), "--threads", "2"], &out);
-        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        assert!(
+            done.status.success(),
+            "{}",
+            String::from_utf8_lossy(&done.stderr)
+        );
         assert!(!out.join("study.journal").exists());
         assert!(out.join("report.html").exists());
         // Every point's file is a design, and says what the point says.
@@ -49,7 +53,10 @@ fn whole() -> &'static Vec<u8> {
             let path = out.join(point["design"].as_str().expect("a file"));
             let design = gyrogen::design::reader::read(Some(&path)).expect("a design");
             let lengths = &point["word_lengths"];
-            assert_eq!(lengths["circuit.cordic.iterations"], design.circuit.cordic.iterations);
+            assert_eq!(
+                lengths["circuit.cordic.iterations"],
+                design.circuit.cordic.iterations
+            );
             let product = design.circuit.demodulator.product.format.bits();
             assert_eq!(lengths["circuit.demodulator.product"], product);
         }
@@ -60,7 +67,13 @@ fn whole() -> &'static Vec<u8> {
 fn front(study: &Value) -> Vec<(Value, Value, Value)> {
     let points = study["front"].as_array().expect("a front").iter();
     points
-        .map(|p| (p["word_lengths"].clone(), p["price"].clone(), p["merit"].clone()))
+        .map(|p| {
+            (
+                p["word_lengths"].clone(),
+                p["price"].clone(),
+                p["merit"].clone(),
+            )
+        })
         .collect()
 }
 
@@ -73,7 +86,11 @@ fn the_search_finds_the_front_of_the_whole_space() {
     let file = design(folder.path(), 0, "");
     let out = folder.path().join("out");
     let done = study(&[file.to_str().expect("UTF-8")], &out);
-    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    assert!(
+        done.status.success(),
+        "{}",
+        String::from_utf8_lossy(&done.stderr)
+    );
     let searched = json(&bytes(&out));
     assert_eq!(searched["method"], "search");
     assert!(front(&whole).len() >= 4);
@@ -82,7 +99,9 @@ fn the_search_finds_the_front_of_the_whole_space() {
     let points = front(&whole);
     for pair in points.windows(2) {
         let (a, b) = (&pair[0], &pair[1]);
-        assert!(a.2.as_f64() > b.2.as_f64() && a.1["cortex-m4"].as_f64() < b.1["cortex-m4"].as_f64());
+        assert!(
+            a.2.as_f64() > b.2.as_f64() && a.1["cortex-m4"].as_f64() < b.1["cortex-m4"].as_f64()
+        );
     }
 }
 
@@ -91,23 +110,48 @@ fn threads_shards_and_a_kill_leave_the_same_bytes() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = design(folder.path(), 2000, "");
     let file = file.to_str().expect("UTF-8");
-    let parts: Vec<PathBuf> = (1..=3).map(|k| folder.path().join(format!("part{k}"))).collect();
+    let parts: Vec<PathBuf> = (1..=3)
+        .map(|k| folder.path().join(format!("part{k}")))
+        .collect();
     for (k, part) in parts.iter().enumerate() {
         let done = study(&[file, "--shard", &format!("{}/3", k + 1)], part);
-        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        assert!(
+            done.status.success(),
+            "{}",
+            String::from_utf8_lossy(&done.stderr)
+        );
     }
     let names: Vec<&str> = parts.iter().map(|p| p.to_str().expect("UTF-8")).collect();
     let out = folder.path().join("merged");
     let some = study(&[file, "--merge", names[0], names[2]], &out);
     assert_eq!(some.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&some.stderr).contains("2/3 is missing"));
-    let all = study(&[file, "--threads", "1", "--merge", names[0], names[1], names[2]], &out);
-    assert!(all.status.success(), "{}", String::from_utf8_lossy(&all.stderr));
+    let all = study(
+        &[
+            file,
+            "--threads",
+            "1",
+            "--merge",
+            names[0],
+            names[1],
+            names[2],
+        ],
+        &out,
+    );
+    assert!(
+        all.status.success(),
+        "{}",
+        String::from_utf8_lossy(&all.stderr)
+    );
     assert!(&bytes(&out) == whole(), "merged");
 
     let out = folder.path().join("killed");
     let mut command = Command::new(env!("CARGO_BIN_EXE_gyrogen"));
-    let mut running = command.args(["study", file, "--threads", "1", "--out"]).arg(&out).spawn().expect("starts");
+    let mut running = command
+        .args(["study", file, "--threads", "1", "--out"])
+        .arg(&out)
+        .spawn()
+        .expect("starts");
     let journal = out.join("study.journal");
     let lines = || std::fs::read_to_string(&journal).map_or(0, |t| t.lines().count());
     while lines() < 60 && running.try_wait().expect("runs").is_none() {
@@ -117,7 +161,11 @@ fn threads_shards_and_a_kill_leave_the_same_bytes() {
     let _ = running.wait();
     let known = lines();
     let again = study(&[file], &out);
-    assert!(again.status.success(), "{}", String::from_utf8_lossy(&again.stderr));
+    assert!(
+        again.status.success(),
+        "{}",
+        String::from_utf8_lossy(&again.stderr)
+    );
     assert!(&bytes(&out) == whole(), "resumed after {known} lines");
 }
 
@@ -134,18 +182,33 @@ fn limits_are_met_by_the_cheapest_or_the_word_in_the_way_is_named() {
     let file = file.to_str().expect("UTF-8");
     let out = folder.path().join("out");
     let done = study(&[file, "--for", &format!("noise_dps_rthz<={limit}")], &out);
-    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    assert!(
+        done.status.success(),
+        "{}",
+        String::from_utf8_lossy(&done.stderr)
+    );
     let result = json(&bytes(&out));
     let number = result["chosen"][0]["point"].as_u64().expect("a point") as usize;
     let chosen = &result["front"][number - 1];
     assert!(chosen["noise_dps_rthz"].as_f64() <= Some(limit));
-    let steps = result["chosen"][0]["sensitivity"].as_array().expect("steps");
+    let steps = result["chosen"][0]["sensitivity"]
+        .as_array()
+        .expect("steps");
     assert_eq!(steps.len(), 6);
     let done = study(&[file, "--for", "noise_dps_rthz<=1e-9 bias_dps<=0.5"], &out);
     assert_eq!(done.status.code(), Some(1));
     let said = String::from_utf8_lossy(&done.stderr).into_owned();
-    assert!(said.contains("noise_dps_rthz cannot be met") && said.contains("limited by `"), "{said}");
-    for wrong in ["noise<=1", "bias_dps>=1", "bias_dps<=-1", "bias_dps<=0.1 bias_dps<=0.2", ""] {
+    assert!(
+        said.contains("noise_dps_rthz cannot be met") && said.contains("limited by `"),
+        "{said}"
+    );
+    for wrong in [
+        "noise<=1",
+        "bias_dps>=1",
+        "bias_dps<=-1",
+        "bias_dps<=0.1 bias_dps<=0.2",
+        "",
+    ] {
         let done = study(&[file, "--for", wrong], &out);
         assert_eq!(done.status.code(), Some(2), "{wrong}");
     }
@@ -155,13 +218,19 @@ fn limits_are_met_by_the_cheapest_or_the_word_in_the_way_is_named() {
 fn an_overflow_is_said_first_and_a_wrong_word_in_its_place() {
     let folder = tempfile::tempdir().expect("a folder");
     let text = include_str!("../src/design/default.toml");
-    let narrow = text.replace("output = { format = \"Q12.12\"", "output = { format = \"Q5.12\"");
+    let narrow = text.replace(
+        "output = { format = \"Q12.12\"",
+        "output = { format = \"Q5.12\"",
+    );
     let path = folder.path().join("narrow.toml");
     std::fs::write(&path, narrow).expect("writes");
     let done = study(&[path.to_str().expect("UTF-8")], &folder.path().join("out"));
     assert_eq!(done.status.code(), Some(1));
     let said = String::from_utf8_lossy(&done.stderr).into_owned();
-    assert!(said.contains("overflow") && said.contains("smallest repair"), "{said}");
+    assert!(
+        said.contains("overflow") && said.contains("smallest repair"),
+        "{said}"
+    );
     let path = folder.path().join("wrong.toml");
     std::fs::write(&path, "[study]\nwords = [\"circuit.adc\"]\n").expect("writes");
     let done = study(&[path.to_str().expect("UTF-8")], &folder.path().join("out"));

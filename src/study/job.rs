@@ -169,7 +169,8 @@ impl Reporting<'_> {
             let why = notes.join("; ");
             return Err(InputError::new(format!("the given design cannot be run: {why}")).into());
         };
-        let worst = search::worst_merit(self.bench, self.scale);
+        let own = self.scale.merit(&reference.verified.figures);
+        let worst = search::worst_merit(self.bench, self.scale).max(own);
         let mut reported: BTreeMap<Lengths, (Vec<String>, Vec<WordLengths>)> = BTreeMap::new();
         for (objective, target) in self.design.study.targets.iter().enumerate() {
             let candidates = good.iter().map(|(lengths, c)| Candidate {

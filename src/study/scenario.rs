@@ -230,19 +230,32 @@ pub fn detuned(design: &Design, hz: f64) -> Design {
     out
 }
 
-/// The largest rate at which no ADC is filled by more than [`FILLED`] at any of the plan's temperatures, deg/s.
+/// The largest rate, both ways, at which the sense ADC is filled by at most [`FILLED`] at any of the plan's
+/// temperatures, deg/s. A rate moves the demodulated vector along a line; both ends have to stay inside the circle.
 fn full_rate_dps(design: &Design, plan: &Plan) -> Result<f64> {
     let scale = full_scale_dps(design);
-    let full = design.thermal_run.sense_full_scale_dps;
+    let radius = FILLED * design.thermal_run.sense_full_scale_dps;
+    let probe_dps = design.thermal_run.scale_rate_dps;
     let mut path = Path::new(design, ArithmeticKind::Float);
-    let mut least = full;
+    let mut vector = |conditions: Conditions| -> Result<[f64; 2]> {
+        // Beyond the end of what was drawn there is no noise.
+        let silent = Drawn::new(&Noise::new(0, 0), u64::MAX, 0);
+        path.warm_start(design, conditions, &silent)?;
+        let [_, _, i, q] = path.period(&silent)?.channels;
+        Ok([i * scale, q * scale])
+    };
+    let mut least = design.thermal_run.sense_full_scale_dps;
     for stretch in &plan.nominal {
-        path.warm_start(design, stretch.conditions, &stretch.noise)?;
-        let row = path.period(&stretch.noise)?;
-        let [_, _, i, q] = row.channels.map(|c| c * scale);
-        let room = (FILLED * full).powi(2) - q * q;
-        let per_dps = path.gyroscope.scale_factor().abs().max(1e-3);
-        least = least.min((room.max(0.0).sqrt() - i.abs()) / per_dps);
+        let mut turning = stretch.conditions;
+        turning.rate_dps = probe_dps;
+        let ([i, q], [ti, tq]) = (vector(stretch.conditions)?, vector(turning)?);
+        let (di, dq) = ((ti - i) / probe_dps, (tq - q) / probe_dps);
+        // |v + R d|^2 = radius^2, the smaller of the two roots' sizes.
+        let square = (di * di + dq * dq).max(1e-9);
+        let across = (i * di + q * dq).abs();
+        let room = radius * radius - i * i - q * q;
+        let root = (across * across + square * room.max(0.0)).sqrt();
+        least = least.min((root - across) / square);
     }
     Ok(least.max(0.0))
 }
