@@ -3,7 +3,6 @@
 use super::answer;
 use super::bench::Bench;
 use super::design_text;
-use super::figures::Figures;
 use super::front::{Point as Candidate, front, resolved};
 use super::journal::Journal;
 use super::merit::Scale;
@@ -73,10 +72,15 @@ pub fn study(design: &Design, request: &Request, said: &(dyn Fn(usize) + Sync)) 
         bench = bench.with_journal(journal, known);
     }
     let bandwidth_hz = super::bandwidth::bandwidth_hz(design);
-    let instrument = Scale::of_instrument(design, &bench.whole, bandwidth_hz);
+    let verifier = Verifier::new(design)?;
+    let own = verifier.figures(&design.without_stops())?;
+    let instrument = Scale::of_instrument(design, &bench.whole, bandwidth_hz).at_least(&own);
     let asked = Scale::of_limits(&request.limits);
     let (scale, limits_from) = if asked.is_empty() {
-        (instrument, "one percent of the instrument's own figures")
+        (
+            instrument,
+            "no figure of the data sheet more than one percent worse than the given design's",
+        )
     } else {
         (asked, "requirements")
     };
@@ -86,7 +90,6 @@ pub fn study(design: &Design, request: &Request, said: &(dyn Fn(usize) + Sync)) 
     } else {
         (search::search(&mut bench, &scale, Effort::STUDY)?, "search")
     };
-    let verifier = Verifier::new(design)?;
     let work = Reporting {
         design,
         space: &space,
@@ -176,7 +179,10 @@ impl Reporting<'_> {
             let candidates = good.iter().map(|(lengths, c)| Candidate {
                 lengths: lengths.clone(),
                 cost: self.bench.cost(objective, lengths),
-                merit: self.scale.merit(&c.verified.figures),
+                merit: self
+                    .scale
+                    .merit(&c.verified.figures)
+                    .max(search::FINEST_MERIT),
             });
             let points = front(candidates.collect(), &given, worst);
             for (leader, others) in resolved(points, RESOLUTION) {
@@ -186,11 +192,11 @@ impl Reporting<'_> {
                 entry.1.extend(others);
             }
         }
-        let base = self.point(reference, 0, &reference.verified.figures);
+        let base = self.point(reference);
         let mut points = Vec::new();
         for (lengths, (targets, alternatives)) in reported {
             if let Some(c) = good.get(&lengths) {
-                let mut point = self.point(c, 0, &reference.verified.figures);
+                let mut point = self.point(c);
                 point.targets = targets;
                 point.alternatives = alternatives;
                 points.push((lengths, c, point));
@@ -306,7 +312,7 @@ impl Reporting<'_> {
             .collect()
     }
 
-    fn point(&self, c: &Checked, number: usize, given: &Figures) -> Point {
+    fn point(&self, c: &Checked) -> Point {
         let f = &c.verified.figures;
         let price = self.prices(&c.lengths);
         let base = self.prices(&self.space.given());
@@ -317,7 +323,7 @@ impl Reporting<'_> {
         let targets = self.design.study.targets.iter().cloned();
         let changes = design_text::changes(self.design, &c.point).into_iter();
         Point {
-            number,
+            number: 0,
             design: None,
             targets: Vec::new(),
             word_lengths: self.named(&c.lengths),
@@ -336,7 +342,7 @@ impl Reporting<'_> {
             merit: self.scale.merit(f),
             limited_by: self.scale.worst(f),
             parts: self.scale.parts(f).into_iter().collect(),
-            as_good_as_given: self.as_good(f, given),
+            as_good_as_given: self.instrument.merit(f) <= 1.0,
             verified: true,
             startup_error_dps: c.verified.startup_error_dps,
             changes: changes
@@ -344,18 +350,6 @@ impl Reporting<'_> {
                 .collect(),
             alternatives: Vec::new(),
         }
-    }
-
-    /// No figure of the data sheet is more than one percent worse than the given design's.
-    fn as_good(&self, f: &Figures, given: &Figures) -> bool {
-        let parts = self
-            .instrument
-            .parts(f)
-            .into_iter()
-            .zip(self.instrument.parts(given));
-        parts
-            .into_iter()
-            .all(|((_, own), (_, given))| own <= given.max(1.0))
     }
 
     fn sweeps(&self) -> Vec<Sweep> {

@@ -2,7 +2,8 @@
 //!
 //! Where the user requires nothing, a figure counts as 1 where it makes the data sheet's own figure one percent
 //! worse: bias and drift one percent of the instrument's drift over temperature, noise and lines so much that they
-//! add one percent to the instrument's noise (in squares), the scale factor one percent of its change.
+//! add one percent to the instrument's noise (in squares), the scale factor one percent of its change. What the given
+//! design adds itself is no worsening.
 
 use super::figures::Figures;
 use crate::circuit::scale::full_scale_dps;
@@ -46,6 +47,18 @@ impl Scale {
             noise_dps_rthz: Some(density),
             scale_factor_ppm: Some((WORSE * whole.scale_factor_ppm).max(1e-3)),
             spur_dps: Some(density * (2.0 * bandwidth_hz).sqrt()),
+        }
+    }
+
+    /// No limit below what a design adds itself.
+    pub fn at_least(self, f: &Figures) -> Scale {
+        let more = |limit: Option<f64>, own: f64| limit.map(|l| l.max(own.abs()));
+        Scale {
+            bias_dps: more(self.bias_dps, f.bias_dps),
+            drift_dps: more(self.drift_dps, f.drift_dps),
+            noise_dps_rthz: more(self.noise_dps_rthz, f.noise_dps_rthz),
+            scale_factor_ppm: more(self.scale_factor_ppm, f.scale_factor_ppm),
+            spur_dps: more(self.spur_dps, f.spur_dps),
         }
     }
 

@@ -34,7 +34,7 @@ impl Effort {
     /// Of a study.
     pub const STUDY: Effort = Effort {
         ladder: 72,
-        runs: 3000,
+        runs: 4000,
         slack: 1.15,
         round: 400,
     };
@@ -42,6 +42,9 @@ impl Effort {
 
 /// Points with a larger merit than this, and than the given design's, are of no use to anybody.
 pub const WORST_MERIT: f64 = 10.0;
+
+/// A smaller merit counts as this: a twentieth of every limit is fine enough for anybody.
+pub const FINEST_MERIT: f64 = 0.05;
 
 /// Every variable over its range, the rest as given.
 pub fn sweeps(bench: &Bench) -> Vec<Lengths> {
@@ -152,7 +155,7 @@ fn fronts(bench: &Bench, scale: &Scale, worst: f64) -> Vec<Vec<Point>> {
         let points = all.iter().filter(inside).map(|lengths| Point {
             lengths: lengths.clone(),
             cost: bench.cost(objective, lengths),
-            merit: bench.merit(scale, lengths),
+            merit: bench.merit(scale, lengths).max(FINEST_MERIT),
         });
         front(points.collect(), &given, worst)
     };
@@ -185,8 +188,10 @@ fn promising(
         let behind = front.partition_point(|p| p.cost <= cost);
         let best = behind.checked_sub(1).and_then(|k| front.get(k));
         let best = best.map_or(WORST_MERIT, |p| p.merit);
-        let gain = merit / best;
-        if gain <= slack {
+        let gain = merit.max(FINEST_MERIT) / best;
+        // What costs more has to be better; what costs less may be a little worse than is known for that.
+        let limit = if cost < point.cost { slack } else { 0.999 };
+        if gain <= limit {
             found(lengths, gain);
         }
     };
