@@ -102,12 +102,12 @@ impl Additive {
     ) -> Option<(f64, f64)> {
         let mut sum = squares(&self.scale, from.1);
         let mut cost = cost;
-        for k in 0..to.len() {
-            if to[k] == from.0[k] {
+        for (k, (new, old)) in to.iter().zip(from.0).enumerate() {
+            if new == old {
                 continue;
             }
             let place = |length: u32| (length - self.lows[k]) as usize;
-            let (old, new) = (place(from.0[k]), place(to[k]));
+            let (old, new) = (place(*old), place(*new));
             let errors = &self.errors[k];
             let (before, after) = (errors.get(old)?.as_ref()?, errors.get(new)?.as_ref()?);
             for i in 0..FIGURES {
