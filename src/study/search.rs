@@ -34,7 +34,7 @@ impl Effort {
     /// Of a study.
     pub const STUDY: Effort = Effort {
         ladder: 72,
-        runs: 4000,
+        runs: 6500,
         slack: 1.15,
         round: 400,
     };
