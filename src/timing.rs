@@ -18,7 +18,7 @@ pub struct Stopwatch {
 }
 
 /// What a part of the work took.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Stage {
     /// What was done.
     pub stage: String,
@@ -27,7 +27,7 @@ pub struct Stage {
 }
 
 /// `timing.json` (`gyrogen.timing/1`).
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Timing {
     /// `gyrogen.timing/1`.
     pub schema: &'static str,

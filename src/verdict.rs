@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 pub const SCHEMA: &str = "gyrogen.closure/1";
 
 /// What it comes to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// Nothing beyond the noise was left before any step.
@@ -35,7 +35,7 @@ impl Verdict {
 }
 
 /// The error with one model, in [`Closure::unit`].
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, schemars::JsonSchema)]
 pub struct Errors {
     /// Over the rows that were fitted.
     pub train_rms: f64,
@@ -46,7 +46,7 @@ pub struct Errors {
 }
 
 /// An effect that was added.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Step {
     /// Id of the contract, `covariate:NAME`, or the user's own.
     pub effect: String,
@@ -69,7 +69,7 @@ pub struct Step {
 }
 
 /// What the firmware that would be emitted leaves, bit-accurately, on the same held-out rows.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, schemars::JsonSchema)]
 pub struct FirmwareErrors {
     /// Whether firmware can see all that the steps need.
     pub compensable: bool,
@@ -80,7 +80,7 @@ pub struct FirmwareErrors {
 }
 
 /// What is left after the last step.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, schemars::JsonSchema)]
 pub struct Structure {
     /// More than noise.
     pub left: bool,
@@ -89,7 +89,7 @@ pub struct Structure {
 }
 
 /// What became of a candidate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Fate {
     /// It is a step.
@@ -105,7 +105,7 @@ pub enum Fate {
 }
 
 /// The evidence for and against one candidate.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Evidence {
     /// Its id.
     pub effect: String,
@@ -121,7 +121,7 @@ pub struct Evidence {
 }
 
 /// `closure.json`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Closure {
     /// [`SCHEMA`].
     pub schema: &'static str,

@@ -1,12 +1,12 @@
 //! The table of forms that meet a bound.
 
-use crate::tabulate::cost::Cost;
+use crate::cost::function::FunctionCost;
 use comfy_table::{CellAlignment, Table};
 
 /// A line: form in words, cost, errors as they are shown, undominated, chosen.
 pub(super) struct Line<'a> {
     pub detail: &'a str,
-    pub cost: Cost,
+    pub cost: FunctionCost,
     pub errors: Vec<String>,
     pub undominated: bool,
     pub chosen: bool,

@@ -8,6 +8,7 @@ mod common;
 
 mod alternatives;
 mod approx;
+mod check;
 mod close;
 mod controls;
 mod emit;
@@ -16,8 +17,10 @@ mod init;
 mod recorded;
 mod replay;
 mod run;
+mod schema;
 mod self_test;
 mod simulate;
+mod study;
 mod values;
 mod verify;
 
@@ -38,13 +41,16 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Approx(approx::Arguments),
+    Check(check::Arguments),
     Close(close::Arguments),
     Emit(emit::Arguments),
     Equiv(equiv::Arguments),
     Init(init::Arguments),
     Replay(replay::Arguments),
     Run(run::Arguments),
+    Schema(schema::Arguments),
     Simulate(simulate::Arguments),
+    Study(study::Arguments),
     Verify(verify::Arguments),
 }
 
@@ -91,13 +97,16 @@ fn run(command: &Command, recorded: &Recorded) -> Result<()> {
     }
     match command {
         Command::Approx(arguments) => approx::run(arguments, recorded),
+        Command::Check(arguments) => check::run(arguments, recorded),
         Command::Close(arguments) => close::run(arguments, recorded),
         Command::Emit(arguments) => emit::run(arguments, recorded),
         Command::Equiv(arguments) => equiv::run(arguments, recorded),
         Command::Init(arguments) => init::run(arguments),
         Command::Replay(arguments) => replay::run(arguments, recorded),
         Command::Run(arguments) => run::run(arguments, recorded),
+        Command::Schema(arguments) => schema::run(arguments),
         Command::Simulate(arguments) => simulate::run(arguments, recorded),
+        Command::Study(arguments) => study::run(arguments, recorded),
         Command::Verify(arguments) => verify::run(arguments, recorded),
     }
 }

@@ -144,7 +144,7 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
         say!("chosen: {chosen}");
     }
     say!(
-        "budget: firmware within {:.5} deg/s of the fitted polynomial (bound); \
+        "budget of the compensation: bias and rate within {:.5} deg/s of the fitted polynomial (bound); \
          calibration and fit {:.4} deg/s (estimate)",
         s.budget.bound_dps,
         s.budget.estimate_dps
@@ -152,6 +152,7 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
     for line in &s.certainty_text {
         say!("{line}");
     }
+    say!("{}", s.finding);
     if let Some(kept) = &s.bound {
         let errors = ["certified, deg/s", "output LSB"];
         say!(

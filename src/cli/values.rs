@@ -5,7 +5,7 @@ use clap::builder::PossibleValue;
 
 /// A choice of the library's as a value of the command line: variant, spelling, what it means.
 macro_rules! values {
-    ($choice:ty { $($variant:ident = $spelled:literal, $means:literal;)+ }) => {
+    ($choice:ty { $($variant:ident = $spelled:literal $(| $other:literal)?, $means:literal;)+ }) => {
         impl ValueEnum for $choice {
             fn value_variants<'a>() -> &'a [Self] {
                 &[$(Self::$variant),+]
@@ -13,7 +13,7 @@ macro_rules! values {
 
             fn to_possible_value(&self) -> Option<PossibleValue> {
                 Some(match self {
-                    $(Self::$variant => PossibleValue::new($spelled).help($means),)+
+                    $(Self::$variant => PossibleValue::new($spelled)$(.alias($other))?.help($means),)+
                 })
             }
         }
@@ -34,9 +34,11 @@ values!(crate::emit::bundle::Part {
 
 values!(crate::design::target::Target {
     Host = "host", "A 64-bit processor";
-    CortexM4 = "cortex-m4", "32 bits with a single-cycle 32 x 32 -> 64 bit multiplier";
-    CortexM0 = "cortex-m0", "32 bits with a 32 x 32 -> 32 bit multiplier of many cycles and none for the upper half";
-    Riscv32 = "riscv32", "RV32IM";
+    CortexM4 = "cortex-m4", "ARMv7E-M: single-cycle 32 x 32 to 64 bit multiplier";
+    CortexM0 = "cortex-m0", "ARMv6-M: 32-cycle 32 x 32 to 32 bit multiplier and none for the upper half";
+    CortexM0Fast = "cortex-m0-fast", "The same with the single-cycle multiplier";
+    Rv32imc = "rv32imc" | "riscv32", "32-bit RISC-V with multiplication, as Ibex executes it";
+    Dsp16 = "dsp16", "A 16-bit signal processor";
 });
 
 values!(crate::tabulate::job::Asked {

@@ -6,16 +6,16 @@ use crate::approx::form::Codes;
 use crate::approx::form::polynomial::Scheme;
 use crate::approx::form::stored::{Stored, WIDEST_BITS};
 use crate::approx::reference::Function;
+use crate::cost::function::FunctionCost;
 use crate::design::target::Target;
 use crate::design::{Compensation, Design};
 use crate::error::Result;
 use crate::numeric::format::Format;
 use crate::tabulate::choice;
 use crate::tabulate::choice::{Candidate, Wanted};
-use crate::tabulate::cost;
-use crate::tabulate::cost::Cost;
 use crate::tabulate::job::{Asked, Request, Weight};
 use crate::tabulate::outcome::Alternative;
+use crate::tabulate::priced;
 use std::collections::BTreeMap;
 
 /// A way to evaluate the bias.
@@ -86,7 +86,7 @@ pub fn forms(design: &Design, c: &Compensation, room_dps: f64, target: Target) -
             form: Some(stored.clone()),
             ..c.clone()
         };
-        let constants = cost::constants(&candidate.settled.form);
+        let constants = priced::constants(&candidate.settled.form);
         let mut listed = candidate.listed();
         listed.cost = whole_cost(design, &with, &constants, target);
         Way {
@@ -98,9 +98,14 @@ pub fn forms(design: &Design, c: &Compensation, room_dps: f64, target: Target) -
 }
 
 /// Of the whole emitted bias function: limit, offset and evaluation.
-fn whole_cost(design: &Design, c: &Compensation, constants: &[Format], target: Target) -> Cost {
+fn whole_cost(
+    design: &Design,
+    c: &Compensation,
+    constants: &[Format],
+    target: Target,
+) -> FunctionCost {
     let program = Evaluation::new(&design.circuit, c).program();
-    Cost::of_program(&program, constants, target)
+    FunctionCost::of_program(&program, constants, target)
 }
 
 fn request(codes: Codes, output: Format, bound: f64, target: Target) -> Request {

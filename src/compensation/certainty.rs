@@ -17,7 +17,7 @@ const PIECE: i128 = 1 << 16;
 
 /// Bounds of the emitted bias's distance from the fitted polynomial (from the design's own coefficients, where no
 /// fit is known), deg/s, inside the calibrated range and unless a word saturates.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Bounds {
     /// Fitted polynomial against the rounded coefficients, real arithmetic: a proved supremum.
     pub coefficients_dps: f64,
@@ -34,7 +34,7 @@ pub struct Bounds {
 }
 
 /// What the firmware does outside the calibrated range.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Beyond {
     /// `clamp`, `hold_slope` or `flag`.
     pub contract: &'static str,
@@ -44,7 +44,7 @@ pub struct Beyond {
 }
 
 /// The bounds, and what running the bias over its words showed.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Certainty {
     /// By proof.
     pub bounds: Bounds,

@@ -9,7 +9,7 @@ use crate::numeric::format::pow2;
 use crate::plant::Gyroscope;
 use crate::plant::converter::{Channel, Converter};
 use crate::plant::gyroscope::{Conditions, Drive, Reference};
-use crate::plant::noise::Noise;
+use crate::plant::noise::Pairs;
 use std::f64::consts::TAU;
 
 /// What a decimated sample says, in physical units.
@@ -133,7 +133,7 @@ impl Path {
         &mut self,
         design: &Design,
         conditions: Conditions,
-        noise: &Noise,
+        noise: &impl Pairs,
     ) -> Result<Rest> {
         self.gyroscope.set(conditions);
         let rest = rest::rest(design, &self.gyroscope)?;
@@ -178,7 +178,7 @@ impl Path {
     ///
     /// # Errors
     /// A circuit that stops on an overflow.
-    pub fn period(&mut self, noise: &Noise) -> Result<RealRow> {
+    pub fn period(&mut self, noise: &impl Pairs) -> Result<RealRow> {
         let drive = self.drive();
         self.gyroscope
             .block(drive, &mut self.drive_lsb, &mut self.sense_lsb);
@@ -218,14 +218,14 @@ impl Path {
         [&self.codes[0], &self.codes[1]]
     }
 
-    fn add_noise(&mut self, noise: &Noise) {
+    fn add_noise(&mut self, noise: &impl Pairs) {
         let [drive_rms, sense_rms] = self.noise_lsb;
         let [drive_adc, sense_adc] = &self.converters;
         let silent = drive_rms == 0.0 && sense_rms == 0.0;
         let inputs = self.drive_lsb.iter_mut().zip(&mut self.sense_lsb);
         for (index, (d, s)) in (self.sample..).zip(inputs) {
             if !silent {
-                let (a, b) = noise.gaussian_pair(index);
+                let (a, b) = noise.pair(index);
                 *d += drive_rms * a;
                 *s += sense_rms * b;
             }

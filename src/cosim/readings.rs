@@ -13,7 +13,7 @@ use crate::plant::profile::{Profile, Reading};
 use serde::Serialize;
 
 /// The mean of a reading's rows.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Mean {
     /// Drive phase, rad.
     pub phase_rad: f64,

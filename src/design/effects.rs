@@ -67,6 +67,14 @@ impl Effects {
         values.try_into().ok()
     }
 
+    /// Multiplies a parameter of an effect that is on, by its position in the catalogue.
+    pub fn scale(&mut self, id: &str, parameter: usize, factor: f64) {
+        let found = self.on.iter_mut().find(|(kind, _)| kind.id == id);
+        if let Some(value) = found.and_then(|(_, values)| values.get_mut(parameter)) {
+            *value *= factor;
+        }
+    }
+
     /// The effects that are on, with their parameters, in the catalogue's order.
     pub fn iter(&self) -> impl Iterator<Item = (&'static EffectKind, &[f64])> {
         self.on.iter().map(|(kind, v)| (*kind, v.as_slice()))

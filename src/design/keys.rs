@@ -16,6 +16,8 @@ pub(super) const KEYS: &[(&str, &[(&str, &str)])] = &[
             ("thermal_run", "["),
             ("record", "["),
             ("fit", "["),
+            ("study", "["),
+            ("requirements", "["),
             ("effects", "["),
         ],
     ),
@@ -257,10 +259,59 @@ pub(super) const KEYS: &[(&str, &[(&str, &str)])] = &[
         ],
     ),
     ("fit", &[("order", "2"), ("heldout_blocks", "10")]),
+    (
+        "study",
+        &[
+            ("words", "[\"circuit.adc.format\", \"circuit.nco.table\"]"),
+            (
+                "tied",
+                "[[\"circuit.demodulator.product\", \"circuit.decimator.output\"]]",
+            ),
+            ("targets", "[\"cortex-m4\", \"fpga\"]"),
+            ("exhaustive", "2000"),
+            ("ranges", "["),
+        ],
+    ),
+    (
+        "study.ranges",
+        &[
+            ("circuit.adc.format", "[10, 18]"),
+            ("circuit.nco.phase_bits", "[24, 34]"),
+            ("circuit.nco.table_address_bits", "[8, 14]"),
+            ("circuit.nco.table", "[10, 18]"),
+            ("circuit.demodulator.product", "[14, 26]"),
+            ("circuit.decimator.output", "[14, 26]"),
+            ("circuit.cordic.iterations", "[10, 22]"),
+            ("circuit.cordic.guard_bits", "[0, 8]"),
+            ("circuit.cordic.angle_bits", "[14, 26]"),
+            ("circuit.cordic.gain_bits", "[14, 26]"),
+            ("circuit.phase_loop.proportional", "[3, 8]"),
+            ("circuit.phase_loop.integral", "[8, 13]"),
+            ("circuit.phase_loop.integrator_bits", "[40, 50]"),
+            ("circuit.amplitude_loop.gain_bits", "[10, 18]"),
+            ("compensation.coefficient_format", "[22, 34]"),
+            ("compensation.accumulator", "[28, 42]"),
+            ("compensation.output", "[16, 26]"),
+        ],
+    ),
+    (
+        "requirements",
+        &[
+            ("bias_dps", "0.01"),
+            ("drift_dps", "0.02"),
+            ("noise_dps_rthz", "0.001"),
+            ("arw_deg_rth", "0.04"),
+            ("scale_factor_ppm", "100.0"),
+            ("spur_dps", "0.01"),
+            ("bandwidth_hz", "100.0"),
+            ("rom_bytes", "8192.0"),
+            ("cycles_per_row", "4000.0"),
+        ],
+    ),
 ];
 
 /// Of each `[[effects]]`.
-const USER_EFFECT: &[(&str, &str)] = &[
+pub(super) const USER_EFFECT: &[(&str, &str)] = &[
     ("id", "\"bearing_wobble\""),
     ("expression", "\"gain*sin(2*pi*time_s/period)\""),
     (

@@ -2,7 +2,8 @@
 
 use super::table::{Doc, Table};
 use super::{
-    bound, circuit_tables, correction_table, device_tables, limits, template, user_effects,
+    bound, circuit_tables, correction_table, device_tables, limits, study_tables, template,
+    user_effects,
 };
 use crate::design::schema::*;
 use crate::digest::sha256;
@@ -99,6 +100,8 @@ fn build(text: &str, file: Option<&Path>, base: Option<&Design>) -> Result<Desig
         )?,
         record: device_tables::record(&section("record")?, base.map(|b| &b.record))?,
         fit: device_tables::fit(&section("fit")?, base.map(|b| &b.fit))?,
+        study: study_tables::study(&section("study")?)?,
+        requirements: study_tables::requirements(&section("requirements")?)?,
         effects: match root.get("effects") {
             Some(value) => user_effects::effects(&doc, &value)?,
             None => Vec::new(),

@@ -6,6 +6,7 @@ use super::correction::Planned;
 use super::effects::Effects;
 pub use super::log_axis::LogAxis;
 pub use super::record_mapping::RecordMapping;
+use super::study_tables::{Limits, StudyOptions};
 use super::user_effects::UserEffect;
 use crate::approx::form::Codes;
 use crate::approx::form::stored::Stored;
@@ -36,6 +37,10 @@ pub struct Design {
     pub record: RecordMapping,
     /// How the compensation is fitted.
     pub fit: FitOptions,
+    /// Which words a word-length study varies.
+    pub study: StudyOptions,
+    /// What the figures may be.
+    pub requirements: Limits,
     /// What the user suspects: candidates of `gyrogen close`.
     pub effects: Vec<UserEffect>,
     /// Where the design came from.

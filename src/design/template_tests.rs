@@ -117,6 +117,13 @@ fn every_key_is_in_the_template_and_every_example_is_toml() {
             if *example == "[" {
                 continue;
             }
+            // A key with a dot in it is quoted.
+            let quoted = key.contains('.');
+            let key = if quoted {
+                format!("\"{key}\"")
+            } else {
+                (*key).to_owned()
+            };
             let line = format!("{key} = {example}");
             toml::de::DeTable::parse(&line).unwrap_or_else(|e| panic!("{table}: {line}: {e}"));
             let inside = table.ends_with("proportional") || table.ends_with("integral");

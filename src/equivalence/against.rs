@@ -18,7 +18,7 @@ use std::rc::Rc;
 const SPAN: u64 = 1 << 14;
 
 /// The result of a comparison.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Against {
     /// SHA-256 of the other design's text.
     pub design_sha256: String,
@@ -31,7 +31,7 @@ pub struct Against {
 }
 
 /// The first word in which two chains differ, in the order of the circuit's steps.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct FirstDifference {
     /// 0-based ADC sample; at the slow rate the period's last.
     pub sample: u64,

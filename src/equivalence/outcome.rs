@@ -12,7 +12,7 @@ use crate::verify::compare::Compared;
 use serde::Serialize;
 
 /// One node.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct NodeReport {
     /// The dotted key of the design, with the channel or the part.
     pub name: String,
@@ -98,7 +98,7 @@ impl NodeReport {
 }
 
 /// The first overflow, in the order of the circuit's steps.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct FirstOverflow {
     /// 0-based ADC sample; at the slow rate the period's last.
     pub sample: u64,
@@ -161,7 +161,7 @@ impl FirstOverflow {
 }
 
 /// Emitted code against the model.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct Emitted {
     /// Output words compared.
     pub compared: u64,
@@ -190,7 +190,7 @@ impl Emitted {
 }
 
 /// `equiv.json`.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct Equivalence {
     /// `gyrogen.equiv/1`.
     pub schema: &'static str,
@@ -239,7 +239,7 @@ pub struct Equivalence {
 }
 
 /// How the phase loop was bounded.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct LoopReport {
     /// The linear loop contracts.
     pub contracting: bool,

@@ -7,7 +7,7 @@ use crate::numeric::format::{Format, Overflow, Quantizer};
 use serde::Serialize;
 
 /// A change of one format.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, schemars::JsonSchema)]
 pub struct Repair {
     /// The dotted key.
     pub key: String,

@@ -6,7 +6,7 @@ use crate::vectors::model::Model;
 use serde::{Deserialize, Serialize};
 
 /// The calibrated range in a manifest.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Calibrated {
     /// The first calibrated input, raw.
     pub low: i128,

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 pub const NAME: &str = "manifest.json";
 
 /// `manifest.json`: what is in the bundle and how it is verified.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Manifest {
     /// `gyrogen.bundle/1`.
     pub schema: String,
@@ -47,7 +47,7 @@ pub struct Manifest {
 }
 
 /// A table.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct TableEntry {
     /// Number in the self-test.
     pub number: u32,
@@ -58,7 +58,7 @@ pub struct TableEntry {
 }
 
 /// A function.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct FunctionEntry {
     /// Number in the self-test.
     pub number: u32,
@@ -74,7 +74,7 @@ pub struct FunctionEntry {
 }
 
 /// The chain.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ChainEntry {
     /// Number in the self-test.
     pub number: u32,
@@ -85,7 +85,7 @@ pub struct ChainEntry {
 }
 
 /// A fault.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct FaultEntry {
     /// What the emitted code notes.
     pub number: usize,
@@ -94,7 +94,7 @@ pub struct FaultEntry {
 }
 
 /// A file.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct FileEntry {
     /// Inside the bundle.
     pub path: String,

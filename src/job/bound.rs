@@ -10,13 +10,13 @@ use crate::compensation::alternatives;
 use crate::compensation::alternatives::Way;
 use crate::compensation::certainty::{Bounds, Certainty, bounds};
 use crate::compensation::{Evaluation, coefficients, one_rounding};
+use crate::cost::function::FunctionCost;
 use crate::design::bound::hindrance;
 use crate::design::target::Target;
 use crate::design::{BiasBound, Compensation, CompensationInput, Design, limits};
 use crate::error::{InputError, Result};
 use crate::numeric::format::Format;
 use crate::tabulate::choice;
-use crate::tabulate::cost::Cost;
 use crate::thermal::BaselineFit;
 use serde::Serialize;
 
@@ -24,7 +24,7 @@ use serde::Serialize;
 const WIDEST_BITS: u32 = 64;
 
 /// How the bound is kept.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Kept {
     /// What was asked, deg/s.
     pub bound_dps: f64,
@@ -43,7 +43,7 @@ pub struct Kept {
 }
 
 /// A form that keeps to the bound.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Line {
     /// `polynomial`, `table` or `piecewise`.
     pub form: &'static str,
@@ -51,7 +51,7 @@ pub struct Line {
     pub detail: String,
     /// Of the whole bias function.
     #[serde(flatten)]
-    pub cost: Cost,
+    pub cost: FunctionCost,
     /// The bias against the fitted polynomial: proved, deg/s.
     pub certified_max_dps: f64,
     /// The same in LSB of the output.

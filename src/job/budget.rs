@@ -8,7 +8,7 @@ use crate::thermal::BaselineFit;
 use serde::Serialize;
 
 /// One contribution.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Line {
     /// What it is.
     pub what: String,
@@ -21,7 +21,7 @@ pub struct Line {
 }
 
 /// All contributions.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Budget {
     /// Estimates first, then bounds.
     pub lines: Vec<Line>,

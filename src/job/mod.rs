@@ -4,7 +4,8 @@
 //!
 //! [`own_run`] is the design's own thermal run through the circuit, [`from_record`] a measured
 //! record through the compensation alone; [`calibration`] fits, [`formats`] chooses formats that the design leaves open,
-//! [`coefficients`] rounds the fit into them, [`bound`] keeps to the error that was asked for, [`budget`] adds up what each step costs; [`firmware`]
+//! [`coefficients`] rounds the fit into them, [`bound`] keeps to the error that was asked for, [`budget`] adds up what each step of it costs,
+//! [`word_lengths`] measures what those of the whole circuit do; [`firmware`]
 //! emits, builds and compares; [`fitted_design`] is the
 //! design that reproduces it; [`outcome`] is what comes of it.
 
@@ -19,6 +20,7 @@ pub mod outcome;
 pub mod own_run;
 mod points;
 mod reading;
+pub mod word_lengths;
 
 use crate::compensation::certainty;
 use crate::design::Design;
@@ -28,6 +30,7 @@ use outcome::Outcome;
 pub use points::{Point, drift_pp, rms};
 use reading::{clamped_bias, compensation, no_compensation, thermometer_raw, warning};
 use std::path::Path;
+use word_lengths::WordLengths;
 
 /// What a job says while it runs: a step's name.
 pub type Say<'a> = &'a dyn Fn(&str);
@@ -86,6 +89,11 @@ pub fn run(
         Some(run) => run.points(&design, &fit, &firmware)?,
         None => from_record::points(&design, &fit, &record, &firmware)?,
     };
+    let word_lengths = {
+        let (fixed, float): (Vec<f64>, Vec<f64>) =
+            points.iter().map(|p| (p.fixed_dps, p.float_dps)).unzip();
+        WordLengths::measure(&design, &fit, &fixed, &float, simulated.as_ref())?
+    };
     let record_csv = simulated.map(|run| run.record_csv());
     Ok(Outcome::new(outcome::Parts {
         design,
@@ -103,5 +111,6 @@ pub fn run(
         firmware,
         compared,
         points,
+        word_lengths,
     }))
 }

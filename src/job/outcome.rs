@@ -4,6 +4,7 @@ use super::bound::Kept;
 use super::budget::Budget;
 use super::coefficients::Rounded;
 pub use super::points::Point;
+use super::word_lengths::WordLengths;
 use super::{drift_pp, rms};
 use crate::compensation::certainty;
 use crate::compensation::certainty::Certainty;
@@ -50,10 +51,12 @@ pub struct Parts {
     pub compared: Vec<Compared>,
     /// Readings.
     pub points: Vec<Point>,
+    /// What the word lengths do to them.
+    pub word_lengths: WordLengths,
 }
 
 /// `summary.json` (`gyrogen.run/1`).
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct Summary {
     /// `gyrogen.run/1`.
     pub schema: &'static str,
@@ -75,7 +78,11 @@ pub struct Summary {
     pub fit: FitSummary,
     /// Formats that were chosen, with the reason; empty if the design's own were used.
     pub chosen: Vec<String>,
-    /// What each step costs.
+    /// What limits the result: the fit, the word lengths, which of them most.
+    pub finding: String,
+    /// Fixed less float over the readings, and by which word.
+    pub word_lengths: WordLengths,
+    /// What each step of the compensation costs.
     pub budget: Budget,
     /// The emitted bias against the fitted polynomial: proved, and run over the calibrated inputs.
     pub certainty: Certainty,
@@ -93,7 +100,7 @@ pub struct Summary {
 }
 
 /// How far the rate output drifts over the record.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Drift {
     /// Greatest minus least mean over bins of the thermometer, deg/s.
     pub drift_pp_dps: f64,
@@ -102,7 +109,7 @@ pub struct Drift {
 }
 
 /// After compensation, by path.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct After {
     /// `f64`, the fit's own coefficients.
     pub float: Drift,
@@ -117,7 +124,7 @@ pub struct After {
 }
 
 /// The fit in numbers.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct FitSummary {
     /// The record's column.
     pub thermometer: String,
@@ -148,7 +155,7 @@ pub struct FitSummary {
 }
 
 /// Emitted code against the model.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct Equivalence {
     /// Output words.
     pub compared: u64,
@@ -161,7 +168,7 @@ pub struct Equivalence {
 }
 
 /// An emitted file.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct Emitted {
     /// Inside the output folder.
     pub path: String,
@@ -230,6 +237,10 @@ impl Outcome {
                 outliers: fit.outliers.len(),
             },
             chosen: parts.chosen.clone(),
+            finding: parts
+                .word_lengths
+                .sentence(fit.heldout_rms_dps, parts.budget.bound_dps),
+            word_lengths: parts.word_lengths.clone(),
             budget: parts.budget.clone(),
             certainty_text: {
                 let mut text = certainty::sentences(&parts.design, &parts.certainty.bounds);

@@ -180,40 +180,19 @@ impl OwnRun {
         fit: &BaselineFit,
         firmware: &Firmware,
     ) -> Result<Vec<Point>> {
-        let scale = full_scale_dps(design);
-        let float: Vec<f64> = self
-            .rows(design, ArithmeticKind::Float)?
-            .iter()
-            .map(|rows| {
-                let rates = rows
-                    .iter()
-                    .map(|r| r.sense_i * scale - clamped_bias(fit, r.thermometer));
-                mean(rates)
-            })
-            .collect();
-        let columns = engine::columns(design);
-        let rate = columns.iter().position(|c| *c == "rate").unwrap_or(0);
-        let lsb = compensation(design)?.output.format.lsb();
-        let rate_of = |words: &[i64]| self.mean_column(words, columns.len(), rate, lsb);
-        let mut engine = engine::engine(design, ArithmeticKind::Fixed);
-        let mut rows = engine.no_rows();
-        engine
-            .process(&self.stream.drive, &self.stream.sense, &mut rows)
-            .map_err(|o| Error::Check(o.to_string()))?;
-        let fixed: Vec<i64> = match rows {
-            Rows::Integer(words) => words.iter().map(|w| *w as i64).collect(),
-            Rows::Real(_) => Vec::new(),
-        };
-        let fixed = rate_of(&fixed);
-        let c = rate_of(&firmware.c.chain(
-            &self.stream.drive,
-            &self.stream.sense,
-            columns.len(),
-        )?);
+        let float = self.float_dps(design, fit)?;
+        let fixed = self.fixed_dps(design)?;
+        let (columns, rate, lsb) = rate_column(design)?;
+        let rate_of = |words: &[i64]| self.mean_column(words, columns, rate, lsb);
+        let c = rate_of(
+            &firmware
+                .c
+                .chain(&self.stream.drive, &self.stream.sense, columns)?,
+        );
         let rust = rate_of(&firmware.rust.chain(
             &self.stream.drive,
             &self.stream.sense,
-            columns.len(),
+            columns,
         )?);
         let missing = f64::NAN;
         let at = |values: &[f64], k: usize| values.get(k).copied().unwrap_or(missing);
@@ -234,6 +213,40 @@ impl OwnRun {
             .collect())
     }
 
+    /// Every reading's rate through the float circuit and the fit's own coefficients, deg/s.
+    ///
+    /// # Errors
+    /// A circuit that stops on an overflow.
+    pub fn float_dps(&self, design: &Design, fit: &BaselineFit) -> Result<Vec<f64>> {
+        let scale = full_scale_dps(design);
+        let rows = self.rows(design, ArithmeticKind::Float)?;
+        let rates = rows.iter().map(|rows| {
+            let rates = rows
+                .iter()
+                .map(|r| r.sense_i * scale - clamped_bias(fit, r.thermometer));
+            mean(rates)
+        });
+        Ok(rates.collect())
+    }
+
+    /// Every reading's rate through the bit-accurate chain of a design, which need not be that of the run, deg/s.
+    ///
+    /// # Errors
+    /// A circuit that stops on an overflow.
+    pub fn fixed_dps(&self, design: &Design) -> Result<Vec<f64>> {
+        let (columns, rate, lsb) = rate_column(design)?;
+        let mut engine = engine::engine(design, ArithmeticKind::Fixed);
+        let mut rows = engine.no_rows();
+        engine
+            .process(&self.stream.drive, &self.stream.sense, &mut rows)
+            .map_err(|o| Error::Check(o.to_string()))?;
+        let fixed: Vec<i64> = match rows {
+            Rows::Integer(words) => words.iter().map(|w| *w as i64).collect(),
+            Rows::Real(_) => Vec::new(),
+        };
+        Ok(self.mean_column(&fixed, columns, rate, lsb))
+    }
+
     /// The mean of a column over each reading after settling.
     fn mean_column(&self, words: &[i64], columns: usize, column: usize, lsb: f64) -> Vec<f64> {
         words
@@ -246,6 +259,14 @@ impl OwnRun {
             })
             .collect()
     }
+}
+
+/// Columns of a row, which of them is the rate, and its LSB in deg/s.
+fn rate_column(design: &Design) -> Result<(usize, usize, f64)> {
+    let columns = engine::columns(design);
+    let rate = columns.iter().position(|c| *c == "rate").unwrap_or(0);
+    let lsb = compensation(design)?.output.format.lsb();
+    Ok((columns.len(), rate, lsb))
 }
 
 #[derive(Debug, Clone, Copy)]

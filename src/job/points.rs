@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 /// One reading: the same rate through every path, deg/s. The applied rate is subtracted.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Point {
     /// s.
     pub time_s: f64,

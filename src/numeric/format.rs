@@ -7,7 +7,7 @@ use std::fmt;
 use std::str::FromStr;
 
 /// A fixed-point format: `Qm.n` or `UQm.n`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, schemars::JsonSchema)]
 #[serde(into = "String")]
 pub struct Format {
     /// False for `UQm.n`.
@@ -128,7 +128,9 @@ impl FromStr for Format {
 }
 
 /// How a value between two LSBs is brought to one of them. Every mode names its tie rule.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum Rounding {
     /// Toward minus infinity.
@@ -171,7 +173,9 @@ impl Rounding {
 }
 
 /// What becomes of a value outside its format.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum Overflow {
     /// Modulo 2^(m+n).
@@ -206,7 +210,7 @@ impl Overflow {
 }
 
 /// A format with its rounding and overflow: all that one quantiser does.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, schemars::JsonSchema)]
 pub struct Quantizer {
     /// The format of the result.
     pub format: Format,

@@ -60,6 +60,45 @@ impl Noise {
     }
 }
 
+/// Pairs of independent standard normal numbers by the index of the ADC sample that they belong to.
+pub trait Pairs {
+    /// Those of a sample.
+    fn pair(&self, index: u64) -> (f64, f64);
+}
+
+impl Pairs for Noise {
+    #[inline(always)]
+    fn pair(&self, index: u64) -> (f64, f64) {
+        self.gaussian_pair(index)
+    }
+}
+
+/// Pairs drawn beforehand, for many circuits that are to see the same noise; none beyond their end.
+#[derive(Debug, Clone)]
+pub struct Drawn {
+    pairs: Vec<(f64, f64)>,
+    first: u64,
+}
+
+impl Drawn {
+    /// The first `count` pairs of a stream, for the samples from `first` on.
+    pub fn new(noise: &Noise, first: u64, count: usize) -> Self {
+        let pairs = (0..count as u64).map(|k| noise.gaussian_pair(k));
+        Drawn {
+            pairs: pairs.collect(),
+            first,
+        }
+    }
+}
+
+impl Pairs for Drawn {
+    #[inline(always)]
+    fn pair(&self, index: u64) -> (f64, f64) {
+        let at = index.wrapping_sub(self.first) as usize;
+        self.pairs.get(at).copied().unwrap_or_default()
+    }
+}
+
 /// The quantile of the standard normal distribution at `p` in (0, 1): Wichura's PPND7, algorithm
 /// AS 241, Applied Statistics 37 (1988) 477. Rational functions for the middle 85 % and for two parts of the tails.
 #[inline(always)]

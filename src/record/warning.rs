@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 /// One remark on a record or on a fit; `closure.json` carries it as is.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, schemars::JsonSchema)]
 pub struct Warning {
     /// A stable identifier, such as `phase_in_degrees`.
     pub code: &'static str,

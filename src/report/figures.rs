@@ -222,7 +222,10 @@ impl Scene<'_> {
             (
                 "bound",
                 Swatch::Line,
-                format!("± bound of the budget, {} LSB", significant(bound, 3)),
+                format!(
+                    "± bound of the compensation alone, {} LSB",
+                    significant(bound, 3)
+                ),
             ),
         ];
         legend.extend(self.outside_entry());

@@ -2,7 +2,7 @@
 //!
 //! [`page`] and [`tables`] turn an outcome into what the template prints, [`figures`] draws it on
 //! what [`scene`] prepares, [`svg`] with [`axis`] is the plot writer under the figures, [`text`]
-//! formats numbers; [`simulation`] is the page of `simulate`, [`closure`] that of `close`, [`capture`] that of `close --capture`, [`design_diff`] what a closure changes in the design, [`selftest`] that of its self-test. Colours and layout are in `templates/report/`.
+//! formats numbers; [`simulation`] is the page of `simulate`, [`closure`] that of `close`, [`capture`] that of `close --capture`, [`design_diff`] what a closure changes in the design, [`selftest`] that of its self-test, [`study`] that of a word-length study. Colours and layout are in `templates/report/`.
 
 pub mod axis;
 pub mod capture;
@@ -14,6 +14,7 @@ pub mod scene;
 pub mod selftest;
 mod shown;
 pub mod simulation;
+pub mod study;
 pub mod svg;
 pub mod tables;
 pub mod text;

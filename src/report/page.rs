@@ -134,7 +134,7 @@ impl Page {
             name: shown.design.name.clone(),
             headline: headline(shown),
             holds: s.equivalence.mismatches == 0,
-            finding: finding(shown),
+            finding: s.finding.clone(),
             drift: drift(shown),
             apart: significant(s.equivalence.fixed_minus_float_max_dps, 3),
             figures: figures::all(shown),
@@ -208,26 +208,13 @@ fn headline(shown: &Shown) -> String {
     format!(
         "Bias drift over temperature {change} from {} to {} deg/s peak to peak ({} of what it was), \
          computed in fixed point; the emitted C and Rust {verdict} the model's bits: {} in {} words \
-         compared.",
+         compared. What is left: {}.",
         fixed(before, decimals),
         fixed(after, decimals),
         percent(after, before),
         mismatches(s.equivalence.mismatches),
-        grouped(s.equivalence.compared)
-    )
-}
-
-fn finding(shown: &Shown) -> String {
-    let b = &shown.summary.budget;
-    let what = if b.bound_dps < b.estimate_dps {
-        "The fit and its calibration limit the result, not the word lengths"
-    } else {
-        "The word lengths limit the result: wider formats would help"
-    };
-    format!(
-        "{what}: fixed point adds at most {} deg/s (bound), fit and calibration {} deg/s (estimate).",
-        significant(b.bound_dps, 2),
-        significant(b.estimate_dps, 3)
+        grouped(s.equivalence.compared),
+        s.word_lengths.clause(s.fit.heldout_rms_dps)
     )
 }
 

@@ -5,6 +5,7 @@ use crate::compensation::certainty;
 use crate::design::Design;
 use crate::job::coefficients::{self, Rounded};
 use crate::job::outcome::{After, Drift, Emitted, Equivalence, FitSummary, Point, Summary};
+use crate::job::word_lengths::WordLengths;
 use crate::job::{budget, drift_pp, formats, rms};
 use crate::record::{self, Warning};
 use crate::thermal;
@@ -69,7 +70,11 @@ impl Made {
             mismatches,
             first: first.map(str::to_owned),
         };
+        let word_lengths = WordLengths::measure(&design, &fit, &[1.0, 2.5], &[1.0, 2.0], None);
+        let word_lengths = word_lengths.unwrap();
         let summary = Summary {
+            finding: word_lengths.sentence(fit.heldout_rms_dps, budget.bound_dps),
+            word_lengths,
             chosen: Vec::new(),
             schema: "gyrogen.run/1",
             version: "0.1.0",

@@ -279,6 +279,33 @@ impl Frame {
         self.marks.push_str(&path(class, &d));
     }
 
+    /// An invisible circle that says something to who points at it.
+    pub fn hint(&mut self, r: f64, point: (f64, f64), content: &str) {
+        if let Some((x, y)) = self.place(point) {
+            let _ = writeln!(
+                self.marks,
+                "<circle class=\"hint\" cx=\"{}\" cy=\"{}\" r=\"{}\"><title>{}</title></circle>",
+                number(x),
+                number(y),
+                number(r),
+                escape(content)
+            );
+        }
+    }
+
+    /// Labels in place of numbers on the vertical axis, at these ordinates.
+    pub fn named(mut self, names: &[(f64, String)]) -> Self {
+        self.y_ticks.values = names.iter().map(|n| n.0).collect();
+        self.y_ticks.labels = names.iter().map(|n| n.1.clone()).collect();
+        self
+    }
+
+    /// The vertical axis logarithmic: its interval, and the ordinates of what is drawn, are powers of ten.
+    pub fn logarithmic_up(mut self, y: &Axis) -> Self {
+        (self.y_ticks, self.y_label) = (decades(self.y), y.labelled(0));
+        self
+    }
+
     fn svg(&self) -> String {
         let (right, bottom) = (self.left + self.width, self.top + self.height);
         let mut grid = String::new();

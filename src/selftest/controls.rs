@@ -51,7 +51,7 @@ pub struct Seen {
 pub type Look<'a> = &'a dyn Fn(&ThermalRecord) -> Result<Seen>;
 
 /// A column without meaning.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct FakeSeen {
     /// Its column.
     pub name: String,
@@ -68,7 +68,7 @@ pub struct FakeSeen {
 }
 
 /// The negative control.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Negative {
     /// Of the closing without fakes: effect and probability of each step.
     pub steps: Vec<(String, f64)>,
@@ -88,7 +88,7 @@ pub struct Negative {
 }
 
 /// An effect that was planted in what the closing left.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Planted {
     /// Its id.
     pub effect: String,
@@ -115,7 +115,7 @@ pub struct Planted {
 }
 
 /// What the controls of a closing say.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Controls {
     /// Columns without meaning.
     pub negative: Negative,

@@ -7,7 +7,7 @@ use serde::Serialize;
 pub const SCHEMA: &str = "gyrogen.selftest/1";
 
 /// Noise of a row and slow noise, as in the records.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct NoiseOf {
     /// deg/s rms: the unit of all sizes.
     pub white_rms_dps: f64,
@@ -18,7 +18,7 @@ pub struct NoiseOf {
 }
 
 /// One size of an effect.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct BySize {
     /// Error that the effect leaves beyond the declared model, rms, in noises of a row.
     pub times_noise: f64,
@@ -35,7 +35,7 @@ pub struct BySize {
 }
 
 /// How an effect is found.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct EffectScore {
     /// Its id.
     pub effect: String,
@@ -54,7 +54,7 @@ pub struct EffectScore {
 }
 
 /// The least size that is found in nine records of ten.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Minimum {
     /// `at`, or `below` the smallest or `above` the largest size that was tried.
     pub relation: &'static str,
@@ -89,7 +89,7 @@ impl Minimum {
 }
 
 /// Records without an effect.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Clean {
     /// Their noise.
     pub noise: String,
@@ -100,7 +100,7 @@ pub struct Clean {
 }
 
 /// All of them.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct FalseAlarms {
     /// How many.
     pub records: usize,
@@ -115,7 +115,7 @@ pub struct FalseAlarms {
 }
 
 /// The result of a self-test.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Outcome {
     /// [`SCHEMA`].
     pub schema: &'static str,

@@ -36,7 +36,7 @@ type Integers = Fixed<i128, i128>;
 const ROWS: usize = 8192;
 
 /// A loop at one temperature.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Hunting {
     /// `phase_loop` or `amplitude_loop`.
     pub name: &'static str,

@@ -41,7 +41,7 @@ pub struct Parts {
 }
 
 /// Drift over the run, deg/s.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Drift {
     /// Greatest less least reading, applied rate subtracted.
     pub drift_pp_dps: f64,
@@ -50,7 +50,7 @@ pub struct Drift {
 }
 
 /// Float and fixed.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Both {
     /// Without quantisation.
     pub float: Drift,
@@ -59,7 +59,7 @@ pub struct Both {
 }
 
 /// The largest distance of float and fixed over the readings.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Apart {
     /// Drive phase, rad.
     pub phase_rad: f64,
@@ -74,7 +74,7 @@ pub struct Apart {
 }
 
 /// The loops at the readings.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Lock {
     /// Every reading's mean phase is within 0.1 deg of the setpoint.
     pub locked: bool,
@@ -87,7 +87,7 @@ pub struct Lock {
 }
 
 /// The fit.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct FitSummary {
     /// The record's column.
     pub thermometer: String,
@@ -104,7 +104,7 @@ pub struct FitSummary {
 }
 
 /// `simulate.json` (`gyrogen.simulate/1`).
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct Summary {
     /// `gyrogen.simulate/1`.
     pub schema: &'static str,

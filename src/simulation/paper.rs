@@ -12,7 +12,7 @@ use crate::plant::Device;
 use serde::Serialize;
 
 /// A published figure.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Figure {
     /// What it is.
     pub what: &'static str,
@@ -33,7 +33,7 @@ pub struct Figure {
 }
 
 /// The scale factor at one temperature.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct ScaleFactor {
     /// Chamber, degC.
     pub chamber_degc: f64,

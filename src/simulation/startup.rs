@@ -12,7 +12,7 @@ use crate::plant::profile::Profile;
 use serde::Serialize;
 
 /// The rows of the bit-accurate circuit after power-on, and when it was settled.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Startup {
     /// Chamber, degC.
     pub chamber_degc: f64,

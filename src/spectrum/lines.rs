@@ -18,7 +18,7 @@ const COSINES: [f64; 7] = [
 ];
 
 /// How a sequence is looked at.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
     /// The sequence is one whole period: each line is exactly one bin.

@@ -24,7 +24,7 @@ const AGREEMENT_DB: f64 = 1.0;
 const NEIGHBOURS: i64 = 32;
 
 /// The spurs of a design's oscillator, at the tuning word of the design (a phase loop moves it).
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, schemars::JsonSchema)]
 pub struct NcoSpurs {
     /// Hz, folded into 0 to half the sample rate.
     pub carrier_hz: f64,
@@ -55,7 +55,7 @@ pub struct NcoSpurs {
 }
 
 /// The measured spectrum of the sine.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, schemars::JsonSchema)]
 pub struct Measured {
     /// Spurious-free dynamic range: carrier over worst spur, dB, positive. Absent: no spur above the floor.
     pub sfdr_dbc: Option<f64>,
@@ -70,7 +70,7 @@ pub struct Measured {
 }
 
 /// A measured spur.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, schemars::JsonSchema)]
 pub struct Spur {
     /// Hz, above 0 to half the sample rate.
     pub frequency_hz: f64,
@@ -79,7 +79,7 @@ pub struct Spur {
 }
 
 /// What makes the strongest spur.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Dominant {
     /// The bits of the phase that do not address the table.

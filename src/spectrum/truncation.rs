@@ -27,7 +27,7 @@ use std::f64::consts::PI;
 const LISTED: usize = 8;
 
 /// A spur that phase truncation makes.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, schemars::JsonSchema)]
 pub struct TruncationSpur {
     /// k: the harmonic 1 + k 2^P of the table's staircase.
     pub order: i64,
@@ -38,7 +38,7 @@ pub struct TruncationSpur {
 }
 
 /// What theory says of an oscillator's spurs.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, schemars::JsonSchema)]
 pub struct Predicted {
     /// B: bits of the phase that do not address the table.
     pub dropped_bits: u32,

@@ -1,9 +1,9 @@
 //! Forms that meet a bound, and the cheapest of them.
 
 use super::coefficients;
-use super::cost::Cost;
 use super::describe;
 use super::outcome::Alternative;
+use super::priced;
 use super::request::Request;
 use crate::approx::form::generate;
 use crate::approx::form::generate::{MOST_BIPARTITE_CODES, MOST_SEGMENTS};
@@ -13,6 +13,7 @@ use crate::approx::form::split::{Spacing, Split, Symmetry};
 use crate::approx::form::table::Kind;
 use crate::approx::form::{Codes, Form, Settled};
 use crate::approx::reference::Function;
+use crate::cost::function::FunctionCost;
 use crate::design::target::Target;
 use crate::error::Result;
 use crate::numeric::format::Format;
@@ -40,7 +41,7 @@ pub struct Candidate {
     /// Its error.
     pub measured: Measured,
     /// Its cost.
-    pub cost: Cost,
+    pub cost: FunctionCost,
 }
 
 impl Candidate {
@@ -59,7 +60,7 @@ impl Candidate {
         let measured = quick(&settled, reference).ok()?;
         (measured.certified <= bound).then(|| Candidate {
             detail: describe::detail(&settled.form),
-            cost: Cost::of(&settled, target),
+            cost: priced::cost(&settled, target),
             measured,
             settled,
         })

@@ -3,10 +3,10 @@
 use super::check;
 use super::choice::{self, Candidate, Wanted};
 use super::coefficients::{self, Chosen};
-use super::cost::Cost;
 use super::describe;
 use super::ideal;
 use super::outcome::{ErrorBounds, Outcome};
+use super::priced;
 pub use super::request::{Asked, EXHAUSTIVE_CODES, MOST_CODES, Request, Weight};
 use crate::approx::form::coefficient_formats::CoefficientFormats;
 use crate::approx::form::measure::{Effort, Measured, SAMPLE, measure};
@@ -98,7 +98,7 @@ pub fn approximate(
         error: bounds(&measured),
         inputs_checked: measured.inputs_checked,
         exhaustive: measured.exhaustive,
-        cost: Cost::of(&settled, request.target),
+        cost: priced::cost(&settled, request.target),
         target: request.target,
         search,
         ideal,

@@ -6,11 +6,11 @@
 mod check;
 pub mod choice;
 pub mod coefficients;
-pub mod cost;
 mod datapath;
 pub(crate) mod describe;
 pub mod ideal;
 pub mod job;
 pub mod outcome;
+pub mod priced;
 pub mod request;
 pub mod selection;

@@ -1,12 +1,12 @@
 //! `approx.json` (`gyrogen.approx/1`): what was made and how accurate it is.
 
-use super::cost::Cost;
 use crate::approx::form::polynomial::{Monomials, Scheme};
 use crate::approx::form::split::{Spacing, Symmetry};
+use crate::cost::function::FunctionCost;
 use serde::Serialize;
 
 /// The whole result. Errors and values are in the function's own unit.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Outcome {
     /// `gyrogen.approx/1`.
     pub schema: &'static str,
@@ -48,7 +48,7 @@ pub struct Outcome {
     pub exhaustive: bool,
     /// What it costs.
     #[serde(flatten)]
-    pub cost: Cost,
+    pub cost: FunctionCost,
     /// The processor of the estimate.
     pub target: crate::design::target::Target,
     /// How the coefficients were found.
@@ -68,7 +68,7 @@ pub struct Outcome {
 }
 
 /// Formats by their place.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Formats {
     /// Of the input.
     pub input: String,
@@ -81,7 +81,7 @@ pub struct Formats {
 }
 
 /// A raw word with its value.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Word {
     /// The integer.
     pub raw: i128,
@@ -90,7 +90,7 @@ pub struct Word {
 }
 
 /// A table's data.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct TableData {
     /// `plain`, `linear`, `quadratic`, `bipartite`, `piecewise`.
     pub kind: &'static str,
@@ -110,7 +110,7 @@ pub struct TableData {
 }
 
 /// Errors in the function's unit.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct ErrorBounds {
     /// Proved over the real domain: approximation + coefficients + evaluation + output rounding.
     pub certified_max_abs: f64,
@@ -128,7 +128,7 @@ pub struct ErrorBounds {
 }
 
 /// How a polynomial's coefficients were found.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Search {
     /// The error of the best real coefficients.
     pub minimax_error: f64,
@@ -152,7 +152,7 @@ pub struct Search {
 }
 
 /// One choice of coefficients.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Compared {
     /// What it is.
     pub name: &'static str,
@@ -168,7 +168,7 @@ pub struct Compared {
 }
 
 /// A form that meets the bound.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Alternative {
     /// `polynomial`, `table` or `piecewise`.
     pub form: &'static str,
@@ -176,7 +176,7 @@ pub struct Alternative {
     pub detail: String,
     /// What it costs.
     #[serde(flatten)]
-    pub cost: Cost,
+    pub cost: FunctionCost,
     /// Proved.
     pub certified_max_abs: f64,
     /// No other one is at least as good in ROM, multiplications, additions and error.
@@ -186,7 +186,7 @@ pub struct Alternative {
 }
 
 /// Coefficients with the least error under ideal evaluation, in the formats of the emitted ones.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Ideal {
     /// From order 0 to the degree; zeros where the monomials have none.
     pub coefficients: Vec<Word>,

@@ -9,7 +9,7 @@ pub const NEGLIGIBLE: f64 = 0.01;
 /// Rounding up to this part of the whole error is small.
 pub const SMALL: f64 = 0.1;
 /// Why coefficients were taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Reason {
     /// Rounding is a negligible part of the error: the best under ideal evaluation.

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// `verify.json` (`gyrogen.verify/1`).
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct Verification {
     /// `gyrogen.verify/1`.
     pub schema: &'static str,
@@ -39,7 +39,7 @@ pub struct Verification {
 }
 
 /// Words compared and inputs that differ.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, schemars::JsonSchema)]
 pub struct Vectors {
     /// Output words.
     pub compared: u64,

@@ -17,7 +17,7 @@ const RANDOM_INPUTS: usize = 1 << 18;
 pub const CHAIN_SAMPLES: usize = 1 << 20;
 
 /// The outcome for one table, function or chain.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Compared {
     /// `c` or `rust`.
     pub language: &'static str,

@@ -4,7 +4,7 @@
 pub const HIGHEST_DEGREE: usize = 24;
 
 /// Which monomials a polynomial has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Monomials {
     /// 1, x, x^2, ..

@@ -26,7 +26,7 @@ const STEPS: [&str; HIGHEST_DEGREE + 1] = [
 const POWERS: [&str; 4] = ["v^2", "v^4", "v^8", "v^16"];
 
 /// The order of the steps.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Scheme {
     /// One step after the other: fewest multiplications.

@@ -16,7 +16,7 @@ use crate::numeric::cast::{Cast, Label, Target};
 use crate::numeric::format::Rounding;
 
 /// A symmetry of the function that halves its table.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
 pub struct Symmetry {
     /// The code about which the function is symmetric, raw.
     pub about_raw: i128,
@@ -25,7 +25,7 @@ pub struct Symmetry {
 }
 
 /// How long segments are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Spacing {
     /// All of 2^bits codes.

@@ -51,7 +51,7 @@ fn report(name: &str, form: Form, reference: &dyn Reference) -> (f64, f64) {
         progress: &|_| (),
     };
     let m = measure(&settled, reference, &effort).unwrap();
-    let cost = crate::tabulate::cost::Cost::of(&settled, crate::design::target::Target::CortexM4);
+    let cost = crate::tabulate::priced::cost(&settled, crate::design::target::Target::CortexM4);
     println!(
         "{name}: data {:.3} LSB, rounding {:.3}, certified {:.3}, observed {:.3} at {}; {} bits, {cost:?}",
         m.data_only / lsb,

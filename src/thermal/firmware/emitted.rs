@@ -12,7 +12,7 @@ use serde::Serialize;
 
 /// What came of the comparison. Where nothing differs, the held-out errors of
 /// [`FirmwareErrors`](crate::verdict::FirmwareErrors) are those of the emitted code.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Emitted {
     /// Readings of the record, held out or not.
     pub readings: u64,

@@ -1,0 +1,115 @@
+//! `gyrogen check`: what can be said of a design before anything is built. Ranges are proved for every ADC code
+//! and state ([`proved`], by the traced program); codes of the design's own simulated gyro say what does
+//! happen ([`crate::nodes::run`]) and what each word's rounding does to the rate ([`budget`]);
+//! [`remarks`] name what could be better, with the change that makes it so.
+
+pub mod budget;
+pub mod outcome;
+pub mod proved;
+pub mod remarks;
+
+use crate::circuit::engine;
+use crate::cosim::stream::stimulus;
+use crate::cost::{self, Target};
+use crate::design::Design;
+use crate::emit::bundle::{Bundle, Part, trace_compensation};
+use crate::equivalence::{overflow, predicted};
+use crate::error::Result;
+use crate::nodes::run;
+use outcome::{Check, NodeCheck, Overflows, Witness};
+use proved::Proved;
+
+/// ADC samples of the design's own gyro that are run if nobody says how many.
+pub const SAMPLES: usize = 1_000_000;
+
+/// Checks a design; `samples` codes of its own gyro are run.
+///
+/// # Errors
+/// A design whose gyro cannot be simulated.
+pub fn check(design: &Design, command: &str, samples: usize) -> Result<Check> {
+    let program = engine::trace(design);
+    let mut all = proved::nodes(design, &program);
+    let by_channel = design
+        .compensation
+        .as_ref()
+        .is_some_and(|c| !c.input.is_of_chain());
+    if by_channel {
+        all.extend(proved::of_casts(&trace_compensation(design)));
+    }
+    let (drive, sense) = stimulus(design, samples)?;
+    let seen = run::run(design, &drive, &sense);
+    let predictions = predicted::predict(design, &seen);
+    let budget = budget::Budget::new(design, &seen, &predictions);
+    let first = seen.first_overflow.as_ref();
+    let nodes: Vec<NodeCheck> = all
+        .iter()
+        .map(|p| {
+            let mut node = node(design, p, &budget);
+            let overflows: u64 = budget.nodes(&p.name).map(|n| n.overflows).sum();
+            if overflows > 0 && node.overflow == Overflows::Possible {
+                node.overflow = Overflows::Certain;
+                let event = first.filter(|e| e.part.starts_with(&p.name));
+                node.witness = Some(Witness {
+                    words: overflows,
+                    sample: event.map(|e| e.sample),
+                    operands: event.map_or(Vec::new(), |e| e.operands.clone()),
+                    value: event.map(|e| e.value),
+                });
+            }
+            node
+        })
+        .collect();
+    let bundle = Bundle::new(design, Part::Chain);
+    let targets = Target::ALL.into_iter().filter(|t| *t != Target::Host);
+    let costs = targets.map(|t| cost::of_bundle(&bundle, t)).collect();
+    let remarks = remarks::remarks(design, &nodes, &budget);
+    let reasons: Vec<String> = nodes.iter().filter_map(NodeCheck::failure).collect();
+    Ok(Check {
+        schema: "gyrogen.check/1",
+        version: env!("CARGO_PKG_VERSION"),
+        design_sha256: design.source.sha256.clone(),
+        command: command.to_owned(),
+        samples: drive.len() as u64,
+        nodes,
+        rate_rms_dps: budget.rate_rms_dps(),
+        predicted_rate_rms_dps: budget.predicted_rate_rms_dps(),
+        costs,
+        remarks,
+        holds: reasons.is_empty(),
+        reasons,
+    })
+}
+
+fn node(design: &Design, p: &Proved, budget: &budget::Budget) -> NodeCheck {
+    let impossible = p.range.is_within(p.limits.low, p.limits.high);
+    let overflow = match (p.by_design, impossible) {
+        (Some(_), _) => Overflows::ByDesign,
+        (None, true) => Overflows::Impossible,
+        (None, false) if p.range.low > p.limits.high || p.range.high < p.limits.low => {
+            Overflows::Certain
+        }
+        (None, false) => Overflows::Possible,
+    };
+    let open = matches!(overflow, Overflows::Possible | Overflows::Certain);
+    NodeCheck {
+        name: p.name.clone(),
+        format: p.format.clone(),
+        rounding: p.rounding,
+        mode: p.by_design.unwrap_or(p.mode),
+        proved: [p.range.low, p.range.high],
+        limits: [p.limits.low, p.limits.high],
+        headroom_bits: (p.by_design.is_none()).then(|| p.headroom_bits()).flatten(),
+        overflow,
+        operands: if open { p.operands.clone() } else { Vec::new() },
+        path: if open {
+            overflow::path(design, &p.name)
+        } else {
+            Vec::new()
+        },
+        witness: None,
+        budget: budget.line(&p.name),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,138 @@
+use super::*;
+use crate::design::{reader, template};
+
+fn checked(changes: &[(&str, &str)]) -> Check {
+    let mut text = template::DEFAULT.to_owned();
+    for (from, to) in changes {
+        assert!(text.contains(from), "{from}");
+        text = text.replacen(from, to, 1);
+    }
+    check(&reader::parse(&text, None).unwrap(), "test", 200_000).unwrap()
+}
+
+fn node<'a>(check: &'a Check, name: &str) -> &'a NodeCheck {
+    let found = check.nodes.iter().find(|n| n.name == name);
+    found.unwrap_or_else(|| panic!("no {name} in {:?}", names(check)))
+}
+
+fn names(check: &Check) -> Vec<&str> {
+    check.nodes.iter().map(|n| &n.name[..]).collect()
+}
+
+fn codes(check: &Check) -> Vec<(&str, &str)> {
+    check
+        .remarks
+        .iter()
+        .map(|r| (r.code, &r.node[..]))
+        .collect()
+}
+
+const PRODUCT: &str =
+    "product = { format = \"Q2.22\", rounding = \"half_up\", overflow = \"saturate\" }";
+
+#[test]
+fn every_word_of_the_default_is_proved_or_has_its_path() {
+    let c = checked(&[]);
+    assert!(c.holds, "{:?}", c.reasons);
+    let product = node(&c, "circuit.demodulator.product sense_i");
+    assert_eq!(product.overflow, Overflows::Impossible);
+    // 2^15 * (2^15 - 1), rounded to 22 bits.
+    assert_eq!(product.proved, [-4_194_176, 4_194_176]);
+    assert!((product.headroom_bits.unwrap() - 1.0).abs() < 1e-4);
+    assert_eq!(
+        node(&c, "circuit.cordic.width").overflow,
+        Overflows::Impossible
+    );
+    assert_eq!(
+        node(&c, "circuit.cordic phase").overflow,
+        Overflows::ByDesign
+    );
+    let bias = node(&c, "compensation.output bias");
+    assert_eq!(bias.overflow, Overflows::Possible);
+    assert_eq!(bias.path.last().unwrap(), "column rate");
+    assert!(!bias.operands.is_empty() && bias.witness.is_none());
+    // Rounded at every sample of a tone: a line of its own, near LSB / sqrt(12).
+    let line = node(&c, "circuit.decimator.output sense_i")
+        .budget
+        .as_ref()
+        .unwrap();
+    let lsb = line.measured_rms_lsb.unwrap();
+    assert!((0.25..0.35).contains(&lsb), "{line:?}");
+    let rate = line.rate_rms_dps.unwrap();
+    assert!(
+        (rate / (lsb * 2048.0 / 4_194_304.0) - 1.0).abs() < 0.1,
+        "{line:?}"
+    );
+    assert!(c.remarks.iter().all(|r| !r.mend.is_empty()));
+    assert_eq!(c.costs.len(), 5);
+}
+
+#[test]
+fn a_vector_that_is_too_narrow_overflows_for_certain_and_says_so() {
+    let c = checked(&[("width = 32", "width = 27")]);
+    let vector = node(&c, "circuit.cordic.width");
+    assert_eq!(vector.overflow, Overflows::Certain, "{vector:?}");
+    assert!(vector.witness.as_ref().unwrap().words > 0);
+    assert!(
+        !c.holds && c.reasons[0].starts_with("circuit.cordic.width overflows 27 bits"),
+        "{:?}",
+        c.reasons
+    );
+}
+
+#[test]
+fn biased_rounding_is_named_with_its_bias_and_mend() {
+    let to = "product = { format = \"Q2.12\", rounding = \"floor\", overflow = \"saturate\" }";
+    let c = checked(&[(PRODUCT, to)]);
+    let code = ("biased_rounding", "circuit.demodulator.product sense_i");
+    assert!(codes(&c).contains(&code), "{:?}", codes(&c));
+    let line = node(&c, code.1).budget.as_ref().unwrap();
+    // Half an LSB of Q2.12 in 2048 deg/s: measured as -0.313 deg/s with the drive's share.
+    let mean = line.rate_mean_dps.unwrap();
+    assert!((-0.30..-0.2).contains(&mean), "{mean}");
+    let c = checked(&[]);
+    assert!(
+        codes(&c).iter().all(|(code, _)| *code != "biased_rounding"),
+        "{:?}",
+        codes(&c)
+    );
+}
+
+#[test]
+fn idle_bits_and_a_coarse_output_are_named() {
+    let c = checked(&[
+        (PRODUCT, "product = \"Q4.20\""),
+        (
+            "output = { format = \"Q12.12\"",
+            "output = { format = \"Q12.1\"",
+        ),
+    ]);
+    let product = ("idle_bits", "circuit.demodulator.product drive_q");
+    assert!(codes(&c).contains(&product), "{:?}", codes(&c));
+    let remark = c.remarks.iter().find(|r| r.node == product.1).unwrap();
+    assert_eq!(remark.mend, "Q1.20 holds every value");
+    assert!(
+        codes(&c).contains(&("output_hides_fit", "compensation.output")),
+        "{:?}",
+        codes(&c)
+    );
+}
+
+#[test]
+fn a_detuned_coarse_table_has_spurs_in_band() {
+    let c = checked(&[
+        ("tuning_word = 134217728", "tuning_word = 134230000"),
+        ("table_address_bits = 12", "table_address_bits = 6"),
+    ]);
+    assert!(
+        codes(&c).iter().any(|(code, _)| *code == "spurs_in_band"),
+        "{:?}",
+        codes(&c)
+    );
+    let c = checked(&[]);
+    assert!(
+        codes(&c).iter().all(|(code, _)| *code != "spurs_in_band"),
+        "{:?}",
+        codes(&c)
+    );
+}

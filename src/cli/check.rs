@@ -1,0 +1,185 @@
+//! `gyrogen check`: what is proved of a design, what it costs, what could be better.
+
+use super::OutputFormat;
+use super::recorded::Recorded;
+use crate::check::outcome::{Check, NodeCheck, Overflows};
+use crate::check::{self, SAMPLES};
+use crate::error::{Error, Result};
+use crate::output::Results;
+use crate::timing::{self, Stopwatch};
+use comfy_table::CellAlignment;
+use std::path::PathBuf;
+
+/// Prove the range of every word of a design, say what overflows, what each rounding and each part costs.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Design file (TOML); the embedded default if left out.
+    design: Option<PathBuf>,
+    /// ADC samples of the design's own gyro that are run, 1000 to 100000000; 1000000 if left out.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1_000..=100_000_000))]
+    samples: Option<u64>,
+    /// Folder for check.json; made if it does not exist. Nothing is written if left out.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// How the result is printed on stdout.
+    #[arg(long, value_enum, default_value = "text")]
+    format: OutputFormat,
+}
+
+/// What it writes.
+const PLANNED: [&str; 2] = ["check.json", timing::NAME];
+
+/// Runs the command.
+///
+/// # Errors
+/// An unusable design (exit 2); a word that overflows for certain (exit 1).
+pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
+    let watch = Stopwatch::start("proving and running");
+    let design = super::design(arguments.design.as_deref())?;
+    let claim = |out: &PathBuf| Results::claim(out, &PLANNED, &recorded.inputs);
+    let results = arguments.out.as_ref().map(claim).transpose()?;
+    let samples = arguments.samples.map_or(SAMPLES, |n| n as usize);
+    let check = check::check(&design, &recorded.command, samples)?;
+    let json = super::json(&check);
+    if let Some(mut results) = results {
+        results.write(PLANNED[0], json.as_bytes())?;
+        watch.write(&mut results, &check.design_sha256, &recorded.command)?;
+        results.finish()?;
+    }
+    match arguments.format {
+        OutputFormat::Json => say!("{}", json.trim_end()),
+        OutputFormat::Text => print(&check),
+    }
+    if check.holds {
+        return Ok(());
+    }
+    Err(Error::Check(check.reasons.join("; ")))
+}
+
+fn print(check: &Check) {
+    for reason in &check.reasons {
+        say!("{reason}");
+    }
+    let mut table = super::table(&[
+        "word",
+        "format",
+        "proved range, raw",
+        "headroom, bits",
+        "overflow",
+        "own rounding, LSB rms",
+        "in the rate, deg/s rms",
+        "mean, deg/s",
+    ]);
+    for node in &check.nodes {
+        table.add_row(row(node));
+    }
+    for column in table.column_iter_mut().skip(2) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    say!("{table}");
+    for node in check
+        .nodes
+        .iter()
+        .filter(|n| n.overflow == Overflows::Possible)
+    {
+        let operands: Vec<String> = node
+            .operands
+            .iter()
+            .map(|[low, high]| format!("{low} to {high}"))
+            .collect();
+        say!(
+            "{} can {} from operands {}; path {}",
+            node.name,
+            node.mode,
+            operands.join(" and "),
+            node.path.join(" > ")
+        );
+    }
+    if let Some(rms) = check.rate_rms_dps {
+        let predicted = check.predicted_rate_rms_dps;
+        let predicted =
+            predicted.map_or("no prediction".to_owned(), |v| format!("predicted {v:.2e}"));
+        say!(
+            "rate, fixed less float: {rms:.2e} deg/s rms over {} samples ({predicted})",
+            check.samples
+        );
+    }
+    let mut table = super::table(&[
+        "processor",
+        "instructions a row",
+        "cycles a row",
+        "code, bytes",
+        "tables, bytes",
+        "state, bytes",
+    ]);
+    for cost in &check.costs {
+        let numbers = [
+            cost.instructions_per_row,
+            cost.cycles_per_row,
+            cost.code_bytes,
+            cost.rom_bytes,
+            cost.ram_bytes,
+        ];
+        let mut row = vec![cost.target.name().to_owned()];
+        row.extend(numbers.map(|n| n.to_string()));
+        table.add_row(row);
+    }
+    for column in table.column_iter_mut().skip(1) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    say!("{table}");
+    if let Some(cost) = check.costs.first() {
+        let f = &cost.fabric;
+        say!(
+            "FPGA: {} multipliers of 25 x 18 bits, {} adder bits, {} bits of selections and shifters, {} register \
+             bits, {} bits of tables",
+            f.multiplier_tiles,
+            f.adder_bits,
+            f.logic_bits,
+            f.register_bits,
+            f.rom_bits
+        );
+    }
+    for remark in &check.remarks {
+        say!(
+            "{} [{}]: {}; {}",
+            remark.node,
+            remark.code,
+            remark.message,
+            remark.mend
+        );
+    }
+    say!(
+        "{}",
+        if check.holds {
+            "holds"
+        } else {
+            "does not hold"
+        }
+    );
+}
+
+fn row(n: &NodeCheck) -> Vec<String> {
+    let overflow = match n.overflow {
+        Overflows::Impossible => "impossible (proved)".to_owned(),
+        Overflows::Possible => format!("possible ({})", n.mode),
+        Overflows::Certain => format!("CERTAIN ({})", n.mode),
+        Overflows::ByDesign => n.mode.to_owned(),
+    };
+    let some = |v: Option<f64>| v.map_or("-".to_owned(), |v| format!("{v:.2e}"));
+    let line = n.budget.as_ref();
+    vec![
+        n.name.clone(),
+        n.format.clone(),
+        format!("{} .. {}", n.proved[0], n.proved[1]),
+        n.headroom_bits
+            .map_or("-".to_owned(), |b| format!("{b:.2}")),
+        overflow,
+        line.map_or("-".to_owned(), |l| {
+            let rms = l.predicted_rms_lsb.or(l.measured_rms_lsb);
+            rms.map_or("-".to_owned(), |v| format!("{v:.3} {}", l.source))
+        }),
+        some(line.and_then(|l| l.rate_rms_dps)),
+        some(line.and_then(|l| l.rate_mean_dps)),
+    ]
+}

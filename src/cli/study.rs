@@ -1,0 +1,190 @@
+//! `gyrogen study`: what each bit of the circuit buys.
+
+use super::OutputFormat;
+use super::recorded::Recorded;
+use crate::design::Limits;
+use crate::error::{Error, Result, io_error};
+use crate::output::Results;
+use crate::study::job::{self, Request};
+use crate::study::journal;
+use crate::study::outcome::{Point, Study};
+use crate::study::shard::Part;
+use crate::timing::{self, Stopwatch};
+use std::io::IsTerminal;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Study the word lengths: the cheapest designs for each error, verified bit for bit, and what each bit does.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Design file (TOML); the embedded default if left out.
+    design: Option<PathBuf>,
+    /// What the word lengths may add, as "bias_dps<=0.01 arw_deg_rth<=0.01", in place of the design's `[requirements]`.
+    #[arg(long = "for", value_name = "LIMITS")]
+    limits: Option<String>,
+    /// Run only this part of the designs that are known beforehand, K of N, and write it for `--merge`.
+    #[arg(long, value_name = "K/N", conflicts_with_all = ["merge", "limits"])]
+    shard: Option<Part>,
+    /// Folders with all parts of a study; go on from them.
+    #[arg(long, value_name = "DIR", num_args = 1..)]
+    merge: Vec<PathBuf>,
+    /// Threads, 1 to 1024; as many as the machine has if left out. The result does not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// Folder for the results; made if it does not exist.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// How the result is printed on stdout.
+    #[arg(long, value_enum, default_value = "text")]
+    format: OutputFormat,
+}
+
+/// What it writes beside the designs.
+const PLANNED: [&str; 3] = ["study.json", "report.html", timing::NAME];
+
+/// Runs the command.
+///
+/// # Errors
+/// An unusable design, words that it does not have, an incomplete study (exit 2); a design that overflows, a
+/// requirement that cannot be met (exit 1).
+pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
+    let started = Instant::now();
+    let watch = Stopwatch::start("searching and verifying");
+    let design = super::design(arguments.design.as_deref())?;
+    let limits = match &arguments.limits {
+        Some(text) => Limits::parse(text)?,
+        None => design.requirements.clone(),
+    };
+    let threads = super::threads(arguments.threads);
+    // The journal of a study that was stopped stands in the folder itself.
+    std::fs::create_dir_all(&arguments.out)
+        .map_err(|e| io_error(&arguments.out, "make the folder", &e))?;
+    let mut results = Results::claim(&arguments.out, &PLANNED, &recorded.inputs)?;
+    let loud = std::io::stderr().is_terminal();
+    let said = |count: usize| {
+        if loud {
+            let seconds = started.elapsed().as_secs_f64();
+            eprint!("\r{count} designs run, {seconds:.0} s ");
+        }
+    };
+    if let Some(part) = arguments.shard {
+        let path = job::part(&design, part, threads, &arguments.out, &said)?;
+        say!("{}", path.display());
+        return Ok(());
+    }
+    let request = Request {
+        limits,
+        command: &recorded.command,
+        threads,
+        folder: Some(&arguments.out),
+        merged: &arguments.merge,
+        heuristic: false,
+    };
+    let done = job::study(&design, &request, &said)?;
+    if loud {
+        eprintln!();
+    }
+    let json = super::json(&done.study);
+    let html = crate::report::study::html(&done.study)?;
+    let files = done
+        .files
+        .iter()
+        .map(|(name, text)| (name, text.as_bytes()));
+    results.write_all(files)?;
+    results.write(PLANNED[0], json.as_bytes())?;
+    results.write(PLANNED[1], html.as_bytes())?;
+    watch.write(&mut results, &done.study.design_sha256, &recorded.command)?;
+    results.finish()?;
+    journal::remove(&arguments.out)?;
+    match arguments.format {
+        OutputFormat::Json => say!("{}", json.trim_end()),
+        OutputFormat::Text => print(&done.study),
+    }
+    let unmet = done.study.chosen.iter().filter(|c| c.point.is_none());
+    let unmet: Vec<String> = unmet
+        .map(|c| format!("{}: {}", c.target, c.reason))
+        .collect();
+    if !request.limits.is_empty() && !unmet.is_empty() {
+        return Err(Error::Check(unmet.join("; ")));
+    }
+    Ok(())
+}
+
+fn print(s: &Study) {
+    let mut header = vec!["point", "on the front of"];
+    let targets: Vec<String> = s.reference.price.keys().cloned().collect();
+    let titles: Vec<String> = targets.iter().map(|t| format!("{t}, %")).collect();
+    header.extend(titles.iter().map(String::as_str));
+    header.extend([
+        "bias, deg/s",
+        "drift, deg/s",
+        "noise, deg/s/rtHz",
+        "ARW, deg/rth",
+        "SF, ppm",
+        "line, deg/s",
+        "merit",
+        "by",
+    ]);
+    let mut table = super::table(&header);
+    for p in std::iter::once(&s.reference).chain(&s.front) {
+        table.add_row(row(p, &targets));
+    }
+    for column in table.column_iter_mut().skip(2) {
+        column.set_cell_alignment(comfy_table::CellAlignment::Right);
+    }
+    say!("{table}");
+    say!(
+        "merit 1: {}; {} designs considered, {} run bit for bit ({}), {} points verified",
+        s.limits_from,
+        s.designs_considered,
+        s.designs_simulated,
+        s.method,
+        s.front.len()
+    );
+    let mut words = super::table(&["word", "given", "first that hurts", "last that helps"]);
+    let shown = |l: Option<u32>| l.map_or("-".to_owned(), |l| l.to_string());
+    for (sweep, parameter) in s.sweeps.iter().zip(&s.parameters) {
+        words.add_row([
+            sweep.name.to_owned(),
+            parameter.given.to_string(),
+            shown(sweep.first_that_hurts),
+            shown(sweep.last_that_helps),
+        ]);
+    }
+    say!("{words}");
+    for chosen in &s.chosen {
+        match chosen.point {
+            Some(point) => say!("{}: point {point}, {}", chosen.target, chosen.reason),
+            None => say!("{}: {}", chosen.target, chosen.reason),
+        }
+    }
+    for note in &s.notes {
+        say!("note: {note}");
+    }
+}
+
+fn row(p: &Point, targets: &[String]) -> Vec<String> {
+    let mut row = vec![
+        if p.number == 0 {
+            "given".to_owned()
+        } else {
+            p.number.to_string()
+        },
+        p.targets.join(", "),
+    ];
+    for target in targets {
+        let part = p.price_of_given.get(target).copied().unwrap_or(f64::NAN);
+        row.push(format!("{:.1}", 100.0 * part));
+    }
+    row.extend([
+        format!("{:.2e}", p.bias_error_dps),
+        format!("{:.2e}", p.drift_residual_dps),
+        format!("{:.2e}", p.noise_dps_rthz),
+        format!("{:.2e}", p.arw_deg_rth),
+        format!("{:.1}", p.scale_factor_ppm),
+        format!("{:.2e}", p.spur_dps),
+        format!("{:.3}", p.merit),
+        p.limited_by.to_owned(),
+    ]);
+    row
+}

@@ -1,0 +1,219 @@
+//! The page of `study`: front, budget, what each word does, sensitivity, all points at once.
+
+mod figures;
+
+use super::figures::Figure;
+use super::text::significant;
+use crate::error::{InputError, Result};
+use crate::study::outcome::{Point, Study};
+use askama::Template;
+
+/// The page.
+#[derive(Debug, Template)]
+#[template(path = "report/study.html")]
+struct Page {
+    headline: String,
+    finding: String,
+    chosen: Vec<[String; 2]>,
+    required: Vec<[String; 5]>,
+    targets: Vec<String>,
+    points: Vec<Row>,
+    fronts: Vec<Figure>,
+    budget: Figure,
+    budget_rows: Vec<[String; 9]>,
+    words: Vec<Figure>,
+    word_rows: Vec<[String; 5]>,
+    tornados: Vec<Figure>,
+    parallel: Figure,
+    notes: Vec<String>,
+    provenance: Vec<[String; 2]>,
+}
+
+/// A point in the table.
+#[derive(Debug)]
+struct Row {
+    name: String,
+    fronts: String,
+    prices: Vec<String>,
+    figures: Vec<String>,
+    limited_by: String,
+    file: String,
+    changes: String,
+}
+
+/// The report as one HTML file.
+///
+/// # Errors
+/// A page that cannot be rendered, which would be a fault of this program.
+pub fn html(s: &Study) -> Result<String> {
+    let targets: Vec<String> = s.reference.price.keys().cloned().collect();
+    let all = std::iter::once(&s.reference).chain(&s.front);
+    let page = Page {
+        headline: headline(s),
+        finding: format!(
+            "{} designs were considered and {} run bit for bit ({}); {} undominated points were run again with other noise \
+             over {} temperatures, and their ranges proved. A merit of 1: {}.",
+            s.designs_considered,
+            s.designs_simulated,
+            s.method,
+            s.front.len(),
+            s.conditions.temperatures[1],
+            s.limits_from
+        ),
+        chosen: s
+            .chosen
+            .iter()
+            .map(|c| [c.target.clone(), answer(c.point, &c.reason)])
+            .collect(),
+        required: s.required.iter().map(required).collect(),
+        points: all.map(|p| row(p, &targets)).collect(),
+        fronts: targets.iter().map(|t| figures::front(s, t)).collect(),
+        targets,
+        budget: figures::budget(s),
+        budget_rows: budget_rows(s),
+        words: figures::words(s),
+        word_rows: word_rows(s),
+        tornados: s
+            .chosen
+            .iter()
+            .filter_map(|c| figures::tornado(s, c))
+            .collect(),
+        parallel: figures::parallel(s),
+        notes: s.notes.clone(),
+        provenance: vec![
+            ["command".to_owned(), s.command.clone()],
+            ["version".to_owned(), s.version.to_owned()],
+            ["design's SHA-256".to_owned(), s.design_sha256.clone()],
+            [
+                "combinations of lengths".to_owned(),
+                significant(s.space, 3),
+            ],
+            [
+                "largest rate applied, deg/s".to_owned(),
+                significant(s.conditions.full_rate_dps, 4),
+            ],
+            [
+                "detuned oscillator, Hz".to_owned(),
+                s.conditions
+                    .detuned_hz
+                    .map_or("–".to_owned(), |hz| significant(hz, 3)),
+            ],
+        ],
+    };
+    page.render()
+        .map_err(|e| InputError::new(format!("the report cannot be rendered: {e}")).into())
+}
+
+fn answer(point: Option<usize>, reason: &str) -> String {
+    match point {
+        Some(point) => format!("point {point}: {reason}"),
+        None => reason.to_owned(),
+    }
+}
+
+fn headline(s: &Study) -> String {
+    let said: Vec<String> = s
+        .chosen
+        .iter()
+        .filter_map(|c| {
+            let point = s.front.iter().find(|p| Some(p.number) == c.point)?;
+            let part = point.price_of_given.get(&c.target)?;
+            Some(format!(
+                "{}: {} % of the given design's cost",
+                c.target,
+                significant(100.0 * part, 3)
+            ))
+        })
+        .collect();
+    if said.is_empty() {
+        return "No design meets what is required.".to_owned();
+    }
+    format!(
+        "The cheapest design that holds what is asked costs, on {}.",
+        said.join(", on ")
+    )
+}
+
+fn required(r: &crate::study::outcome::Required) -> [String; 5] {
+    [
+        r.name.to_owned(),
+        significant(r.limit, 3),
+        significant(r.best, 3),
+        if r.can_be_met { "yes" } else { "no" }.to_owned(),
+        r.limited_by.unwrap_or("–").to_owned(),
+    ]
+}
+
+fn row(p: &Point, targets: &[String]) -> Row {
+    let prices = targets.iter().map(|t| {
+        let part = p.price_of_given.get(t).copied().unwrap_or(f64::NAN);
+        significant(100.0 * part, 3)
+    });
+    let changes: Vec<String> = p
+        .changes
+        .iter()
+        .map(|(k, v)| format!("{k} = {v}"))
+        .collect();
+    Row {
+        name: name(p),
+        fronts: p.targets.join(", "),
+        prices: prices.collect(),
+        figures: [
+            p.bias_error_dps,
+            p.drift_residual_dps,
+            p.noise_dps_rthz,
+            p.arw_deg_rth,
+            p.scale_factor_ppm,
+            p.spur_dps,
+            p.merit,
+        ]
+        .map(|v| significant(v, 3))
+        .to_vec(),
+        limited_by: p.limited_by.to_owned(),
+        file: p.design.clone().unwrap_or_default(),
+        changes: changes.join("\n"),
+    }
+}
+
+fn name(p: &Point) -> String {
+    if p.number == 0 {
+        "given".to_owned()
+    } else {
+        p.number.to_string()
+    }
+}
+
+fn budget_rows(s: &Study) -> Vec<[String; 9]> {
+    let shown = |v: Option<f64>| v.map_or("–".to_owned(), |v| significant(v, 3));
+    let rows = s.budget.lines.iter().map(|l| {
+        let on = l.alone_on;
+        [
+            l.name.to_owned(),
+            l.length.to_string(),
+            shown(l.predicted_rms_dps),
+            shown(l.measured_rms_dps),
+            shown(on.map(|f| f.bias_dps)),
+            shown(on.map(|f| f.drift_dps)),
+            shown(on.map(|f| f.noise_dps_rthz)),
+            shown(l.alone_off.map(|f| f.noise_dps_rthz)),
+            l.flags.join(", "),
+        ]
+    });
+    rows.collect()
+}
+
+fn word_rows(s: &Study) -> Vec<[String; 5]> {
+    let shown = |l: Option<u32>| l.map_or("–".to_owned(), |l| l.to_string());
+    let pairs = s.sweeps.iter().zip(&s.parameters);
+    pairs
+        .map(|(sweep, p)| {
+            [
+                sweep.name.to_owned(),
+                p.given.to_string(),
+                format!("{} to {}", p.low, p.high),
+                shown(sweep.first_that_hurts),
+                shown(sweep.last_that_helps),
+            ]
+        })
+        .collect()
+}

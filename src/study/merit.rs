@@ -1,0 +1,128 @@
+//! How good a design is, as one number: the largest figure in parts of its limit.
+//!
+//! Where the user requires nothing, a figure counts as 1 where it makes the data sheet's own figure one percent
+//! worse: bias and drift one percent of the instrument's drift over temperature, noise and lines so much that they
+//! add one percent to the instrument's noise (in squares), the scale factor one percent of its change. What the given
+//! design adds itself is no worsening.
+
+use super::figures::Figures;
+use crate::circuit::scale::full_scale_dps;
+use crate::design::{Design, LimitName, Limits};
+use serde::Serialize;
+
+/// What each figure that words add counts against; infinite = not at all.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
+pub struct Scale {
+    /// deg/s.
+    pub bias_dps: Option<f64>,
+    /// deg/s.
+    pub drift_dps: Option<f64>,
+    /// deg/s/sqrt(Hz).
+    pub noise_dps_rthz: Option<f64>,
+    /// ppm.
+    pub scale_factor_ppm: Option<f64>,
+    /// deg/s.
+    pub spur_dps: Option<f64>,
+}
+
+/// A figure's worsening that counts as 1.
+const WORSE: f64 = 0.01;
+
+/// As [`crate::study::figures::arw_deg_rth`] has it.
+const ARW: f64 = 60.0 / std::f64::consts::SQRT_2;
+
+impl Scale {
+    /// From the figures of the instrument without quantisation.
+    pub fn of_instrument(design: &Design, whole: &Figures, bandwidth_hz: f64) -> Scale {
+        // Nothing is finer than a thousandth of the output's LSB, or of a billionth of full scale without one.
+        let lsb = design.compensation.as_ref().map(|c| c.output.format.lsb());
+        let least = lsb.map_or(1e-9 * full_scale_dps(design), |l| 1e-3 * l);
+        let row_hz = design.circuit.sample_rate_hz / f64::from(design.circuit.decimator.ratio);
+        let in_squares = ((1.0 + WORSE).powi(2) - 1.0).sqrt();
+        let density = whole.noise_dps_rthz.max(least / row_hz.sqrt()) * in_squares;
+        let drift = (WORSE * whole.drift_dps).max(least);
+        Scale {
+            bias_dps: Some(drift),
+            drift_dps: Some(drift),
+            noise_dps_rthz: Some(density),
+            scale_factor_ppm: Some((WORSE * whole.scale_factor_ppm).max(1e-3)),
+            spur_dps: Some(density * (2.0 * bandwidth_hz).sqrt()),
+        }
+    }
+
+    /// No limit below what a design adds itself.
+    pub fn at_least(self, f: &Figures) -> Scale {
+        let more = |limit: Option<f64>, own: f64| limit.map(|l| l.max(own.abs()));
+        Scale {
+            bias_dps: more(self.bias_dps, f.bias_dps),
+            drift_dps: more(self.drift_dps, f.drift_dps),
+            noise_dps_rthz: more(self.noise_dps_rthz, f.noise_dps_rthz),
+            scale_factor_ppm: more(self.scale_factor_ppm, f.scale_factor_ppm),
+            spur_dps: more(self.spur_dps, f.spur_dps),
+        }
+    }
+
+    /// From what the user requires; the figures that nobody named do not count.
+    pub fn of_limits(limits: &Limits) -> Scale {
+        let noise = [
+            limits.get(LimitName::Noise),
+            limits.get(LimitName::Arw).map(|a| a / ARW),
+        ];
+        Scale {
+            bias_dps: limits.get(LimitName::Bias),
+            drift_dps: limits.get(LimitName::Drift),
+            noise_dps_rthz: noise.into_iter().flatten().reduce(f64::min),
+            scale_factor_ppm: limits.get(LimitName::ScaleFactor),
+            spur_dps: limits.get(LimitName::Spur),
+        }
+    }
+
+    /// True if no figure counts.
+    pub fn is_empty(&self) -> bool {
+        let all = [
+            self.bias_dps,
+            self.drift_dps,
+            self.noise_dps_rthz,
+            self.scale_factor_ppm,
+            self.spur_dps,
+        ];
+        all.iter().all(Option::is_none)
+    }
+
+    /// Each figure's name and its part of its limit.
+    pub fn parts(&self, f: &Figures) -> [(&'static str, f64); 5] {
+        let part = |value: f64, limit: Option<f64>| limit.map_or(0.0, |l| value.abs() / l);
+        [
+            ("bias_dps", part(f.bias_dps, self.bias_dps)),
+            ("drift_dps", part(f.drift_dps, self.drift_dps)),
+            (
+                "noise_dps_rthz",
+                part(f.noise_dps_rthz, self.noise_dps_rthz),
+            ),
+            (
+                "scale_factor_ppm",
+                part(f.scale_factor_ppm, self.scale_factor_ppm),
+            ),
+            ("spur_dps", part(f.spur_dps, self.spur_dps)),
+        ]
+    }
+
+    /// The largest part: at most 1 = within every limit.
+    pub fn merit(&self, f: &Figures) -> f64 {
+        self.parts(f)
+            .into_iter()
+            .map(|(_, p)| p)
+            .fold(0.0, f64::max)
+    }
+
+    /// The figure with the largest part.
+    pub fn worst(&self, f: &Figures) -> &'static str {
+        let mut worst = ("bias_dps", f64::NEG_INFINITY);
+        for part in self.parts(f) {
+            if part.1 > worst.1 {
+                worst = part;
+            }
+        }
+        worst.0
+    }
+}

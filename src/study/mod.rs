@@ -1,0 +1,27 @@
+//! Word-length studies: what each bit of the circuit buys, in the figures of a gyro's data sheet.
+//!
+//! [`space`] says which words vary, [`retune`] makes a design with other lengths. [`scenario`] is what every design
+//! runs, [`measure`] runs it, [`figures`] are what comes out, [`merit`] is one number of them. [`bench`] runs and
+//! prices designs, each once, [`journal`] keeps that. [`front`] and [`search`] look for the cheapest. [`verify`] runs
+//! again what is reported, [`budget`] says what each word adds, [`job`] does all of it, [`outcome`] is `study.json`, [`shard`] divides the work.
+
+mod additive;
+mod answer;
+pub mod bandwidth;
+pub mod bench;
+pub mod budget;
+pub mod design_text;
+pub mod figures;
+pub mod front;
+pub mod job;
+pub mod journal;
+pub mod measure;
+pub mod merit;
+pub mod outcome;
+pub mod overflow;
+pub mod retune;
+pub mod scenario;
+pub mod search;
+pub mod shard;
+pub mod space;
+pub mod verify;

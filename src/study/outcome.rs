@@ -1,0 +1,216 @@
+//! `study.json`: what a study found.
+
+use super::budget::Budget;
+use super::figures::Figures;
+use super::merit::Scale;
+use crate::cost::Cost;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Lengths by key.
+pub type WordLengths = BTreeMap<&'static str, u32>;
+
+/// A word that was varied.
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
+pub struct Parameter {
+    /// The dotted key.
+    pub name: &'static str,
+    /// Words that go with it.
+    pub tied: Vec<&'static str>,
+    /// What its number counts: `bits` (of a format all of them), `micro-rotations`, `fraction bits`.
+    pub unit: &'static str,
+    /// The least length.
+    pub low: u32,
+    /// The largest.
+    pub high: u32,
+    /// The given design's.
+    pub given: u32,
+}
+
+/// A design of the front, or the given one.
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
+pub struct Point {
+    /// 1, 2, ... by rising merit number; 0 = the given design.
+    pub number: usize,
+    /// The file that makes it, beside `study.json`; the given design has its own.
+    pub design: Option<String>,
+    /// The targets on whose front it is.
+    pub targets: Vec<String>,
+    /// Lengths of all words that were varied.
+    pub word_lengths: WordLengths,
+    /// What it costs, by target.
+    pub cost: BTreeMap<String, Cost>,
+    /// The one number that the search made small, by target.
+    pub price: BTreeMap<String, f64>,
+    /// The same in parts of the given design's.
+    pub price_of_given: BTreeMap<String, f64>,
+    /// What the words add to the bias, deg/s.
+    pub bias_error_dps: f64,
+    /// To the drift over temperature, deg/s.
+    pub drift_residual_dps: f64,
+    /// To the noise, deg/s/sqrt(Hz).
+    pub noise_dps_rthz: f64,
+    /// To the angle random walk, deg/sqrt(h).
+    pub arw_deg_rth: f64,
+    /// To the scale factor, ppm.
+    pub scale_factor_ppm: f64,
+    /// Amplitude of the largest line, deg/s.
+    pub spur_dps: f64,
+    /// Its frequency, Hz.
+    pub spur_hz: f64,
+    /// It is in the run with the detuned oscillator.
+    pub spur_detuned: bool,
+    /// A smaller line would not have been seen, deg/s.
+    pub spur_floor_dps: f64,
+    /// The largest figure in parts of its limit.
+    pub merit: f64,
+    /// That figure.
+    pub limited_by: &'static str,
+    /// Each figure in parts of its limit.
+    pub parts: BTreeMap<&'static str, f64>,
+    /// Each figure of the data sheet is at most one percent worse than the given design's.
+    pub as_good_as_given: bool,
+    /// Run bit for bit with other noise than the search's, started from power-on, ranges proved.
+    pub verified: bool,
+    /// Mean error after a start from power-on less that of the settled circuit, deg/s.
+    pub startup_error_dps: Option<f64>,
+    /// Keys with another value than in the given design.
+    pub changes: BTreeMap<String, String>,
+    /// Designs that the noise of the measurement does not tell from this one: dearer, and hardly better.
+    pub alternatives: Vec<WordLengths>,
+}
+
+/// A word's curve.
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
+pub struct Sweep {
+    /// The dotted key.
+    pub name: &'static str,
+    /// The longest length below the given one that makes the design worse; null = none in the range.
+    pub first_that_hurts: Option<u32>,
+    /// The longest length above the given one that makes it better; null = none in the range.
+    pub last_that_helps: Option<u32>,
+    /// Point by point.
+    pub curve: Vec<Swept>,
+}
+
+/// One length of a word, the others as given.
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
+pub struct Swept {
+    /// The length.
+    pub length: u32,
+    /// What all words then add; null = there is no such design.
+    pub figures: Option<Figures>,
+    /// The largest figure in parts of its limit.
+    pub merit: Option<f64>,
+    /// By target.
+    pub price: BTreeMap<String, f64>,
+}
+
+/// One word more or less at the chosen point.
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
+pub struct Step {
+    /// The dotted key.
+    pub name: &'static str,
+    /// -1 or 1.
+    pub by: i32,
+    /// The length that it then has.
+    pub length: u32,
+    /// What the words then add; null = there is no such design.
+    pub figures: Option<Figures>,
+    /// The largest figure in parts of its limit.
+    pub merit: Option<f64>,
+    /// By target.
+    pub price: BTreeMap<String, f64>,
+}
+
+/// The point that is chosen for a target.
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
+pub struct Chosen {
+    /// The target.
+    pub target: String,
+    /// Number in `front`; null = none meets what is required.
+    pub point: Option<usize>,
+    /// Why this one, or what is in the way.
+    pub reason: String,
+    /// One bit more or less of each word.
+    pub sensitivity: Vec<Step>,
+}
+
+/// A limit and whether it can be met.
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
+pub struct Required {
+    /// The figure.
+    pub name: &'static str,
+    /// As required.
+    pub limit: f64,
+    /// The best value of any design that ran.
+    pub best: f64,
+    /// It can be met by itself.
+    pub can_be_met: bool,
+    /// If not: the word that limits it.
+    pub limited_by: Option<&'static str>,
+}
+
+/// `study.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
+pub struct Study {
+    /// `gyrogen.study/1`.
+    pub schema: &'static str,
+    /// Of gyrogen.
+    pub version: &'static str,
+    /// Of the given design's text.
+    pub design_sha256: String,
+    /// What makes this again.
+    pub command: String,
+    /// Words and ranges.
+    pub parameters: Vec<Parameter>,
+    /// The design as given.
+    pub reference: Point,
+    /// Undominated, verified designs, the finest last.
+    pub front: Vec<Point>,
+    /// The points that are chosen.
+    pub chosen: Vec<Chosen>,
+    /// What was required; empty without requirements.
+    pub required: Vec<Required>,
+    /// The limits that a merit of 1 stands for.
+    pub limits: Scale,
+    /// Where they come from.
+    pub limits_from: &'static str,
+    /// The figures of the instrument without quantisation.
+    pub instrument: Figures,
+    /// -3 dB of the decimator, Hz.
+    pub bandwidth_hz: f64,
+    /// `search` or `exhaustive`.
+    pub method: &'static str,
+    /// Combinations of lengths.
+    pub space: f64,
+    /// Designs that were priced or run.
+    pub designs_considered: usize,
+    /// Designs that were run bit for bit.
+    pub designs_simulated: usize,
+    /// Points of the search's front that their verification did not confirm.
+    pub points_dropped: usize,
+    /// By word.
+    pub sweeps: Vec<Sweep>,
+    /// What each word of the given design adds.
+    pub budget: Budget,
+    /// The same of the chosen designs, by target.
+    pub chosen_budgets: BTreeMap<String, Budget>,
+    /// What was run.
+    pub conditions: Conditions,
+    /// What else is to be known.
+    pub notes: Vec<String>,
+}
+
+/// What every design ran.
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
+pub struct Conditions {
+    /// Temperatures at rest, heating and cooling, in search and verification.
+    pub temperatures: [usize; 2],
+    /// The largest rate applied, both ways, deg/s.
+    pub full_rate_dps: f64,
+    /// The detuned oscillator is off by so much, Hz; null where a phase loop sets it.
+    pub detuned_hz: Option<f64>,
+    /// ADC samples of a run in search and verification.
+    pub samples: [u64; 2],
+}
