@@ -50,7 +50,10 @@ fn order() -> Vec<String> {
 #[test]
 fn imports_go_one_way_between_rooms() {
     let (sources, order) = (sources(), order());
-    let there: BTreeSet<&str> = sources.iter().map(|(path, _)| rooms::room(path)).collect();
+    let built = sources
+        .iter()
+        .filter(|(path, _)| !path.ends_with("_tests.rs"));
+    let there: BTreeSet<&str> = built.map(|(path, _)| rooms::room(path)).collect();
     let listed: BTreeSet<&str> = order.iter().map(String::as_str).collect();
     assert_eq!(there, listed, "the rooms, and those in ARCHITECTURE.md");
     assert_eq!(listed.len(), order.len(), "a room is listed twice");

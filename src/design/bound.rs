@@ -1,6 +1,7 @@
 //! `compensation.bound_dps`, `form` and `target`: what the compensation's fixed-point error is asked to be; and
 //! `[compensation.evaluation]`, the form that was chosen for it.
 
+pub use super::schema::BiasBound;
 use super::schema::{Circuit, Compensation, Outside};
 use super::table::{Real, Table, Value};
 use crate::approx::form::polynomial::Monomials;
@@ -10,17 +11,6 @@ use crate::approx::form::table::Kind;
 use crate::design::target::Target;
 use crate::error::{Error, Result};
 use crate::numeric::format::{Overflow, Rounding};
-
-/// What the compensation's fixed-point error is asked to be.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BiasBound {
-    /// The most that bias and rate may be from the fitted polynomial, at every calibrated input code, deg/s.
-    pub bound_dps: f64,
-    /// `form = "auto"`: the cheapest form that keeps to it; otherwise the polynomial by Horner's rule.
-    pub auto: bool,
-    /// The processor that "cheapest" is meant for.
-    pub target: Target,
-}
 
 /// The keys that say what is asked, and not how it is done.
 const ASKED: [&str; 3] = ["bound_dps", "form", "target"];

@@ -100,7 +100,7 @@ const BROKEN: &[Case] = &[
     ("drive_amplitude = 0.5", "drive_amplitude = ¦1.5", "it has to be 0.000001 to 1", "fraction"),
     ("seed = 20040024", "seed = ¦-1", "0..=18446744073709551615", "seed"),
     ("[record]", "[record]\nthermometer = ¦\"die_deg\"", "`die_deg`", "did you mean `die_degc`?"),
-    ("instance = 0", "instance = ¦-1", "0..=255", "number of the gyro"),
+    ("#instance = 0", "instance = ¦-1", "0..=255", "number of the gyro"),
     ("axis = \"z\"", "axis = ¦\"w\"", "`w`", "`x`"),
     ("[record]", "[record]\naverage_s = ¦0", "0", "0.001"),
     ("[record]", "[record]\ncolumns.agc = ¦\" \"", "names no column", "header"),

@@ -1,12 +1,12 @@
 //! The design as the program sees it. The keys of `[circuit]` and `[compensation]` are those of
 //! `docs/manual.md`; their meaning is stated there and only summarised here.
 
-use super::bound::BiasBound;
 use super::correction::Planned;
 use super::effects::Effects;
 pub use super::log_axis::LogAxis;
 pub use super::record_mapping::RecordMapping;
 use super::study_tables::{Limits, StudyOptions};
+use super::target::Target;
 use super::user_effects::UserEffect;
 use crate::approx::form::Codes;
 use crate::approx::form::stored::Stored;
@@ -330,6 +330,17 @@ impl Compensation {
         let slope = orders.fold(0.0, |t, (k, c)| t * p + k as f64 * *c as f64);
         (slope + 0.5).floor() as i128
     }
+}
+
+/// What the compensation's fixed-point error is asked to be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BiasBound {
+    /// The most that bias and rate may be from the fitted polynomial, at every calibrated input code, deg/s.
+    pub bound_dps: f64,
+    /// `form = "auto"`: the cheapest form that keeps to it; otherwise the polynomial by Horner's rule.
+    pub auto: bool,
+    /// The processor that "cheapest" is meant for.
+    pub target: Target,
 }
 
 /// The polynomial's variable.

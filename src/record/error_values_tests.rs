@@ -23,9 +23,12 @@ fn found(dt_s: f64, kind: Kind, value: impl Fn(usize) -> f64) -> Vec<usize> {
     (0..200).filter(|i| marks[*i]).collect()
 }
 
+/// A name, and a reading by row.
+type Course = (&'static str, fn(usize) -> f64);
+
 #[test]
 fn error_values_of_any_kind_and_share_are_found_in_a_ramp() {
-    let ramps: [(&str, fn(usize) -> f64); 4] = [
+    let ramps: [Course; 4] = [
         ("exact", |k| 20.0 + 0.2 * k as f64),
         ("noisy", |k| 20.0 + 0.2 * k as f64 + 0.3 * noise(k)),
         ("coarse", |k| (20.0 + 0.2 * k as f64).round()),
@@ -79,7 +82,7 @@ fn several_values_and_single_glitches_are_found_together() {
 
 #[test]
 fn what_a_chamber_does_is_no_error() {
-    let none: [(&str, fn(usize) -> f64); 8] = [
+    let none: [Course; 8] = [
         ("set points at random", |k| {
             [0.0, 70.0, 5.0, 65.0, 10.0][(k * 7 / 3) % 5]
         }),
@@ -121,9 +124,12 @@ fn record(column: &str, value: impl Fn(usize) -> f64) -> (Vec<f64>, Vec<Warning>
     (r.columns[column].clone(), w)
 }
 
+/// A column, its reading by row, and its error values.
+type Abscissa = (&'static str, fn(usize) -> f64, &'static [f64]);
+
 #[test]
 fn every_abscissa_loses_its_error_values_and_says_so() {
-    let columns: [(&str, fn(usize) -> f64, &[f64]); 6] = [
+    let columns: [Abscissa; 6] = [
         (
             "phase_rad",
             |k| -1.6 + 1e-3 * k as f64,

@@ -188,6 +188,9 @@ const LARGEST_BIAS_DPS: f64 = 500.0;
 /// Noise that no gyro has, deg/s/sqrt(Hz): the worst parts are specified to 0.1.
 const NOISIEST_DPS_RTHZ: f64 = 3.0;
 
+/// Differences of rows that are further apart than this are of the bias as much as of the noise, s (convention).
+const LONGEST_ROW_S: f64 = 10.0;
+
 /// No gyro that is made in silicon is quieter, deg/s/sqrt(Hz): the best are specified to ten times as much.
 const QUIETEST_DPS_RTHZ: f64 = 2e-4;
 
@@ -208,7 +211,9 @@ fn at_rest(c: &Column<'_>) -> Option<Warning> {
     let period_s = stats::median(&steps);
     let noise_dps = stats::difference_noise(c.values);
     let density = noise_dps * period_s.min(1.0).sqrt();
-    if middle.abs() > LARGEST_BIAS_DPS || density > NOISIEST_DPS_RTHZ {
+    // Between readings that are far apart in time the bias moves as well.
+    let is_noisy = period_s <= LONGEST_ROW_S && density > NOISIEST_DPS_RTHZ;
+    if middle.abs() > LARGEST_BIAS_DPS || is_noisy {
         return c.warn(
             "rate_in_millidegrees",
             format!(

@@ -95,7 +95,7 @@ pub(super) fn build(target: Target, folder: &Path, sources: &[String]) -> Result
     command.args(c_files.map(|path| folder.join(path)));
     command.arg(made.path().join("runtime.c"));
     command.arg("-lgcc").arg("-o").arg(&program);
-    toolchain::compile(command, "the emitted C")?;
+    toolchain::compile(command, "the emitted C", made.path())?;
     let flags = [&C_FLAGS[..], &freestanding, cross.flags].concat();
     let toolchain = format!(
         "{}; {}; {}",

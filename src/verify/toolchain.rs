@@ -55,7 +55,7 @@ pub fn build(
             let c_files = sources.iter().filter(|path| path.ends_with(".c"));
             command.args(c_files.map(|path| folder.join(path)));
             command.arg("-o").arg(&program);
-            compile(command, "the emitted C")?;
+            compile(command, "the emitted C", made.path())?;
             format!("{}; {}", version(&compiler), C_FLAGS.join(" "))
         }
         Language::Rust => {
@@ -68,7 +68,7 @@ pub fn build(
                 .arg(folder.join("src/lib.rs"))
                 .arg("-o")
                 .arg(&library);
-            compile(command, "the emitted Rust")?;
+            compile(command, "the emitted Rust", made.path())?;
             let mut command = Command::new(&compiler);
             let mut library_argument = std::ffi::OsString::from(format!("{prefix}="));
             library_argument.push(&library);
@@ -80,7 +80,7 @@ pub fn build(
                 .arg(folder.join("src/bin/harness.rs"))
                 .arg("-o")
                 .arg(&program);
-            compile(command, "the emitted Rust")?;
+            compile(command, "the emitted Rust", made.path())?;
             format!("{}; {}", version(&compiler), RUST_FLAGS.join(" "))
         }
     };
@@ -136,8 +136,9 @@ pub(super) fn version(compiler: &str) -> String {
     }
 }
 
-pub(super) fn compile(mut command: Command, what: &str) -> Result<()> {
-    let output = leftovers::output(&mut command)
+/// Runs a compiler; what it puts aside goes into `scratch`, which is removed with all that is in it.
+pub(super) fn compile(mut command: Command, what: &str, scratch: &Path) -> Result<()> {
+    let output = leftovers::output(command.env("TMPDIR", scratch))
         .map_err(|e| InputError::new(format!("cannot run the compiler: {e}")))?;
     if output.status.success() {
         return Ok(());
