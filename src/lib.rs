@@ -2,8 +2,8 @@
 //!
 //! In reading order: [`numeric`] (formats and arithmetics), [`circuit`] (the detection circuit,
 //! written once), [`design`] (what a user writes), [`plant`] (the simulated gyro), [`cosim`] (both in closed loop),
-//! [`record`] (what was measured), [`closure`] (what a record says), [`job`] (the main job), [`emit`] and [`verify`]
-//! (C and Rust, and that they are the model), [`report`]; [`selftest`] says what [`closure`] finds and what not.
+//! [`record`] (what was measured), [`thermal`] and [`capture`] (what a record and a capture say), [`job`] (the main job), [`emit`] and [`verify`]
+//! (C and Rust, and that they are the model), [`report`]; [`selftest`] says what [`thermal`] finds and what not.
 
 pub mod approx;
 pub mod base_name;

@@ -1,8 +1,7 @@
 //! Functions in fixed point: approximations with a proved error.
 //!
 //! [`real`] encloses the function that is wanted, [`minimax`] finds coefficients, [`form`] has the fixed-point
-//! forms; [`coefficients`] puts them together for a polynomial, [`choice`] among all forms; [`job`] does what
-//! `gyrogen approx` is asked, [`bundle`] emits it.
+//! forms. What `gyrogen approx` makes of them is in [`crate::tabulate`].
 
 #[cfg(test)]
 pub(crate) mod draws;

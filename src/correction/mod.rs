@@ -2,7 +2,7 @@
 //!
 //! [`Plan`] says in real numbers what is subtracted (declared bias, lags, slopes, decays, curves, steps, laws of
 //! the rate); [`Formats`] chooses the words; [`Correction`] runs the one step that both make, [`block::Step`],
-//! bit-accurately and without quantisation; [`firmware`] emits it as C and Rust and compares.
+//! bit-accurately and without quantisation; [`crate::firmware::correction`] emits it, [`crate::verify::correction`] compares.
 
 pub mod block;
 mod bound;

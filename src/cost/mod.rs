@@ -3,7 +3,7 @@
 //! Everything is counted from the program that is emitted: the typed operations of [`crate::emit::lower`] (casts
 //! that cannot act are gone, widths are those of the operands), times how often each function runs for a row: the
 //! sample rate's R times, a loop's body as often as it counts. [`sequences`] has the instructions of each
-//! operation, [`walk`] adds them up, [`uses`] knows what a compiler drops; [`fabric`] counts an FPGA's parts;
+//! operation, [`walk`] adds them up, `uses` knows what a compiler drops; [`fabric`] counts an FPGA's parts;
 //! [`price`] makes one number of it.
 //!
 //! What the model predicts is the number of instructions that the emitted C executes for a row at GCC's `-O2`,

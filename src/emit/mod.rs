@@ -1,6 +1,5 @@
 //! Firmware from the traced circuit: [`lower`] makes typed [`machine`] operations of the program,
-//! [`bundle`] gathers what is printed, [`c`] and [`rust`] spell it, [`files`] writes the bundle with
-//! its self-test, vectors and manifest.
+//! [`bundle`] gathers what is printed, [`c`] and [`rust`] spell it, [`crate::firmware`] makes the bundle.
 
 pub mod bundle;
 pub mod c;

@@ -5,7 +5,7 @@
 //! [`own_run`] is the design's own thermal run through the circuit, [`from_record`] a measured
 //! record through the compensation alone; [`calibration`] fits, [`formats`] chooses formats that the design leaves open,
 //! [`coefficients`] rounds the fit into them, [`bound`] keeps to the error that was asked for, [`budget`] adds up what each step of it costs,
-//! [`word_lengths`] measures what those of the whole circuit do; [`firmware`]
+//! [`word_lengths`] measures what those of the whole circuit do; [`crate::verify::firmware`]
 //! emits, builds and compares; [`fitted_design`] is the
 //! design that reproduces it; [`outcome`] is what comes of it.
 

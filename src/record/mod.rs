@@ -3,8 +3,7 @@
 //! [`thermal`] reads a thermal record; `cells` cuts its lines and reads its numbers, [`columns`]
 //! says which column plays which part, `clock` puts the rows in time, `plausibility` (with `scale`
 //! and `timing`) and `frozen` look for what is readable but unlikely; `ulog` and `dataflash` read
-//! autopilots' logs, which `averager` makes rows of; `shorten` averages rows; [`read_any`] takes whatever a file is; [`stats`]
-//! holds the few robust statistics that all of them share. [`capture`] streams captured ADC codes
+//! autopilots' logs, which `averager` makes rows of; `shorten` averages rows; [`read_any`] takes whatever a file is. [`capture`] streams captured ADC codes
 //! from CSV or NPY; [`capture_meta`] is what a capture says of itself, [`capture_places`] where; [`rows`] writes one row a
 //! decimated sample.
 

@@ -27,7 +27,7 @@ impl ThermalRecord {
         self.time_s.len()
     }
 
-    /// True without rows; [`read`] gives no such record.
+    /// True without rows; [`super::read`] gives no such record.
     pub fn is_empty(&self) -> bool {
         self.time_s.is_empty()
     }

@@ -1,7 +1,7 @@
 //! Word-length studies: what each bit of the circuit buys, in the figures of a gyro's data sheet.
 //!
 //! [`space`] says which words vary, [`retune`] makes a design with other lengths. [`scenario`] is what every design
-//! runs, [`measure`] runs it, [`figures`] are what comes out, [`merit`] is one number of them. [`bench`] runs and
+//! runs, [`measure`] runs it, [`figures`] are what comes out, [`merit`] is one number of them. [`mod@bench`] runs and
 //! prices designs, each once, [`journal`] keeps that. [`front`] and [`search`] look for the cheapest. [`verify`] runs
 //! again what is reported, [`budget`] says what each word adds, [`job`] does all of it, [`outcome`] is `study.json`, [`shard`] divides the work.
 

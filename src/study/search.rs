@@ -1,7 +1,7 @@
 //! The cheapest designs for each merit, by real runs.
 //!
 //! 1. One-word sweeps: every variable over its range, all others as given.
-//! 2. From the sums that these make ([`Additive`]): a ladder of designs from the cheapest to the finest, the
+//! 2. From the sums that these make (`Additive`): a ladder of designs from the cheapest to the finest, the
 //!    shortest-length corner at its one end. All of them run.
 //! 3. Bit removal and exchange: from every point of the front found so far one and two bits less or more of a word,
 //!    and pairs of such moves. A move runs unless the sums say that it is far from the front. Again and again, until no front

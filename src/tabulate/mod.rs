@@ -1,7 +1,7 @@
 //! What `gyrogen approx` does: a function in fixed point, by the form that was asked for or the cheapest that keeps a bound.
 //!
 //! [`coefficients`] puts the mathematics of [`crate::approx`] together for a polynomial, [`choice`] among all forms at their
-//! [`cost`]; [`job`] does what is asked, [`outcome`] is what comes of it.
+//! [`crate::cost`]; [`job`] does what is asked, [`outcome`] is what comes of it.
 
 mod check;
 pub mod choice;

@@ -42,7 +42,7 @@ pub struct BaselineFit {
     /// Lowest first, in powers of x = (T - centre) / half_span, deg/s.
     pub coefficients_scaled: Vec<f64>,
     /// Of `coefficients_scaled`, (deg/s)^2: weighted least squares under noise with the
-    /// residuals' own memory ([`noise`]).
+    /// residuals' own memory ([`correlation`]).
     pub covariance: DMatrix<f64>,
     /// The noise that the covariance stands for.
     pub noise: NoiseModel,

@@ -130,7 +130,7 @@ impl<'a> Intake<'a> {
     /// Takes a record in; `warnings` are what its reader said of it.
     ///
     /// # Errors
-    /// As [`channels_of`].
+    /// No thermometer of the name that the design gives; a column without a reading.
     pub fn of(
         record: &'a ThermalRecord,
         design: &Design,

@@ -1,13 +1,13 @@
-//! The closure: what a measured record says about the declared model.
+//! What a thermal record says about the declared model.
 //!
-//! [`baseline`] fits the bias model, a polynomial in the thermometer's reading. It is made of
-//! [`polynomial`] (algebra and least squares), [`weights`] (spikes, dwells), [`noise`] (its
-//! correlation, and the coefficients' covariance), [`folds`] (held-out blocks), [`order`] (its
-//! choice), [`sweep`] (heating against cooling) and [`checks`] (what a user should know of before
-//! believing the fit). [`likelihood`] is what tells an effect from noise with a memory. [`capture`] does the
-//! same for ADC codes. [`close`] answers for a thermal record: [`intake`] ([`quantised`], [`staircase`]: coarse thermometers; [`repeated`]: slow ones; [`adc_rows`], [`adc_rounding`]: coarse ADCs; [`quadrature`]: one that contains the output), [`channels`],
-//! candidate [`effects`] and their [`search`], [`firmware`]; [`verdict`] is the form of the answer. Nothing here knows the plant
-//! (law 4).
+//! [`baseline`] fits the bias model, a polynomial in the thermometer's reading; [`order`] chooses its order, [`sweep`] compares
+//! heating with cooling, [`checks`] say what a user should know of before believing the fit. Weights, folds and the noise's
+//! correlation are in [`crate::statistics`], and so is what tells an effect from noise with a memory.
+//!
+//! [`close`] answers for a record: [`intake`] takes it in ([`quantised`], [`staircase`]: coarse thermometers; [`repeated`]: slow
+//! ones; [`adc_rows`], [`adc_rounding`]: coarse ADCs; [`quadrature`]: one that contains the output) as [`channels`]; candidate
+//! [`effects`] and their [`search`] name causes; [`firmware`] carries them. [`crate::verdict`] is the form of the answer,
+//! [`crate::capture`] does the same for ADC codes. Nothing here knows the plant (law 4).
 
 pub mod adc_rounding;
 pub mod adc_rows;

@@ -1,6 +1,5 @@
-//! Model against emitted code: [`model`] evaluates the bit-accurate blocks one call at a time,
-//! [`stimulus`] makes inputs, [`toolchain`] builds a bundle, [`compare`] runs it and finds the first
-//! difference, [`bundle`] does all that from a bundle's own files.
+//! Model against emitted code: [`toolchain`] builds a bundle, [`compare`] runs it beside [`crate::vectors`] and finds the first
+//! difference; [`firmware`] and [`correction`] emit, build and compare, [`bundle`] does it from a bundle's own files.
 
 pub mod bundle;
 pub mod compare;
