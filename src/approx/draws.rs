@@ -1,5 +1,7 @@
 //! Numbers for the random designs of tests, each a function of seed and place alone.
 
+use crate::numeric::splitmix::{GOLDEN, mix};
+
 /// Of one design.
 #[derive(Clone, Copy)]
 pub(crate) struct Draws {
@@ -14,10 +16,7 @@ impl Draws {
     /// Evenly spread over 0 .. 1 (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", 2014).
     pub(crate) fn uniform(self, place: u64) -> f64 {
         let k = self.seed * 1000 + place;
-        let mut z = (k + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+        (mix((k + 1).wrapping_mul(GOLDEN)) >> 11) as f64 / (1u64 << 53) as f64
     }
 
     /// One of the whole numbers `from` ..= `to`.

@@ -1,10 +1,9 @@
 //! What the theory of quantisation needs to know of a run: second moments of the signals, no error.
 
+use crate::numeric::splitmix::GOLDEN;
+
 /// Bins of the drive phase.
 pub const PHASE_BINS: usize = 4096;
-
-/// 2^64 divided by the golden ratio: spreads words over a sketch (Knuth).
-const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// Counts different words, about (linear counting: Whang et al. 1990).
 #[derive(Debug, Clone)]
