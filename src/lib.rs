@@ -35,6 +35,7 @@ pub mod simulation;
 pub mod spectrum;
 pub mod statistics;
 pub mod tabulate;
+pub mod text;
 pub mod thermal;
 pub mod timing;
 pub mod trace_file;

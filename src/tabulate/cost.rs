@@ -127,7 +127,7 @@ fn count(function: &Function, weights: &Weights, cost: &mut Cost) {
         let widest = operands.iter().map(|a| function.nodes[*a].range);
         let range = widest.fold(node.range, |r, other| r.join(other));
         let width = match Width::of_range(range) {
-            Width::W32 => 0,
+            Width::W8 | Width::W16 | Width::W32 => 0,
             Width::W64 => 1,
             Width::W128 => 2,
         };
