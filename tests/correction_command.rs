@@ -115,7 +115,7 @@ fn a_design_with_a_correction_emits_it_or_says_that_it_is_missing() {
         assert!(said.contains("--part correction"), "{said}");
     }
     let (status, said) = emitted(&["design.toml"], &["--part", "correction"], at);
-    assert_eq!((status, said.as_str()), (Some(0), "wrote 10 files to c\n"));
+    assert_eq!((status, said.as_str()), (Some(0), "wrote 11 files to c\n"));
 }
 
 /// A polynomial that no record was fitted for is said to be one; a fitted one goes without a word.

@@ -4,209 +4,194 @@
 
 gyro_nco_out_t gyro_nco(gyro_oscillator_t *s)
 {
-    const uint32_t t0 = s->phase;
-    const uint32_t t1 = s->tuning_word;
-    const uint32_t t2 = (uint32_t)(t0 + t1);
-    const uint32_t t3 = (uint32_t)(t2 + UINT32_C(1073741824));
-    const uint32_t t4 = (uint32_t)(t2 + UINT32_C(524288));
-    const uint32_t t5 = (uint32_t)(t4 >> 20U);
-    const uint32_t t6 = t5 & UINT32_C(4095);
-    const int32_t t7 = (int32_t)gyro_sine_0[t6]; /* -32767 .. 32767 */
-    const uint32_t t8 = (uint32_t)(t3 + UINT32_C(524288));
-    const uint32_t t9 = (uint32_t)(t8 >> 20U);
-    const uint32_t t10 = t9 & UINT32_C(4095);
-    const int32_t t11 = (int32_t)gyro_sine_0[t10]; /* -32767 .. 32767 */
-    s->phase = t2;
+    const uint32_t phase = s->phase;
+    const uint32_t tuning_word = s->tuning_word;
+    const uint32_t new_phase = (uint32_t)(phase + tuning_word);
+    const uint32_t sum = (uint32_t)(new_phase + UINT32_C(1073741824));
+    const uint32_t half_step_on = (uint32_t)(new_phase + UINT32_C(524288));
+    const uint32_t top_bits = (uint32_t)(half_step_on >> 20U);
+    const uint32_t address = top_bits & UINT32_C(4095);
+    const int32_t sine = (int32_t)gyro_sine_0[address]; /* -32767 .. 32767 */
+    const uint32_t half_step_on_2 = (uint32_t)(sum + UINT32_C(524288));
+    const uint32_t top_bits_2 = (uint32_t)(half_step_on_2 >> 20U);
+    const uint32_t address_2 = top_bits_2 & UINT32_C(4095);
+    const int32_t cosine = (int32_t)gyro_sine_0[address_2]; /* -32767 .. 32767 */
+    s->phase = new_phase;
     gyro_nco_out_t out;
-    out.sine = t7;
-    out.cosine = t11;
+    out.sine = sine;
+    out.cosine = cosine;
     return out;
 }
 
-int32_t gyro_demodulate(int32_t code, int32_t carrier)
+int32_t gyro_demodulate(int16_t code, int16_t carrier)
 {
-    const int32_t t0 = code * carrier; /* -1073709056 .. 1073709056 */
-    const int32_t t1 = t0 + INT32_C(128);
-    const int32_t t2 = gyro_asr_32(t1, 8U); /* -4194176 .. 4194176 */
-    return t2;
+    const int32_t exact = (int32_t)code * (int32_t)carrier; /* -1073709056 .. 1073709056 */
+    const int32_t biased = exact + INT32_C(128);
+    const int32_t product = gyro_asr_32(biased, 8U); /* Q2.22, half_up, saturate; -4194176 .. 4194176 */
+    return product;
 }
 
 void gyro_integrate(gyro_cic_t *s, int32_t product)
 {
-    const uint64_t t0 = s->integrator[0];
-    const uint64_t t1 = s->integrator[1];
-    const uint64_t t2 = s->integrator[2];
-    const uint64_t t6 = (uint64_t)product;
-    const uint64_t t7 = (uint64_t)(t0 + t6);
-    const uint64_t t8 = (uint64_t)(t1 + t7);
-    const uint64_t t9 = (uint64_t)(t2 + t8);
-    s->integrator[0] = t7;
-    s->integrator[1] = t8;
-    s->integrator[2] = t9;
+    const uint64_t integrator_0 = s->integrator[0];
+    const uint64_t integrator_1 = s->integrator[1];
+    const uint64_t integrator_2 = s->integrator[2];
+    const uint64_t new_integrator_0 = (uint64_t)(integrator_0 + (uint64_t)product);
+    const uint64_t new_integrator_1 = (uint64_t)(integrator_1 + new_integrator_0);
+    const uint64_t new_integrator_2 = (uint64_t)(integrator_2 + new_integrator_1);
+    s->integrator[0] = new_integrator_0;
+    s->integrator[1] = new_integrator_1;
+    s->integrator[2] = new_integrator_2;
 }
 
-void gyro_sample(gyro_chain_t *s, int32_t drive, int32_t sense)
+/* sample
+ *   in  drive: -32768 .. 32767; ADC code
+ *   in  sense: -32768 .. 32767; ADC code
+ */
+static void gyro_sample(gyro_chain_t *s, int16_t drive, int16_t sense)
 {
     const gyro_nco_out_t c0 = gyro_nco(&s->nco);
-    const int32_t t0 = c0.sine;
-    const int32_t t1 = c0.cosine;
-    const int32_t t2 = gyro_demodulate(drive, t0);
-    const int32_t t3 = gyro_demodulate(drive, t1);
-    const int32_t t4 = gyro_demodulate(sense, t0);
-    const int32_t t5 = gyro_demodulate(sense, t1);
-    gyro_integrate(&s->cic_drive_i, t2);
-    gyro_integrate(&s->cic_drive_q, t3);
-    gyro_integrate(&s->cic_sense_i, t4);
-    gyro_integrate(&s->cic_sense_q, t5);
+    const int32_t sine = c0.sine;
+    const int32_t cosine = c0.cosine;
+    const int32_t product = gyro_demodulate(drive, (int16_t)sine);
+    const int32_t product_2 = gyro_demodulate(drive, (int16_t)cosine);
+    const int32_t product_3 = gyro_demodulate(sense, (int16_t)sine);
+    const int32_t product_4 = gyro_demodulate(sense, (int16_t)cosine);
+    gyro_integrate(&s->cic_drive_i, product);
+    gyro_integrate(&s->cic_drive_q, product_2);
+    gyro_integrate(&s->cic_sense_i, product_3);
+    gyro_integrate(&s->cic_sense_q, product_4);
 }
 
 int32_t gyro_decimate(gyro_cic_t *s)
 {
-    const uint64_t t2 = s->integrator[2];
-    const uint64_t t3 = s->delay_1;
-    const uint64_t t4 = s->delay_2;
-    const uint64_t t5 = s->delay_3;
-    const uint64_t t6 = (uint64_t)(t2 - t3);
-    const uint64_t t7 = (uint64_t)(t6 - t4);
-    const uint64_t t8 = (uint64_t)(t7 - t5);
-    const int64_t t9 = gyro_sign_extend_64(t8, UINT64_C(274877906944)); /* -137434759168 .. 137434759168 */
-    const int64_t t10 = t9 + INT64_C(16384);
-    const int64_t t11 = gyro_asr_64(t10, 15U); /* -4194176 .. 4194176 */
-    const int32_t t12 = (int32_t)t11;
-    s->delay_1 = t2;
-    s->delay_2 = t6;
-    s->delay_3 = t7;
-    return t12;
+    const uint64_t integrator_2 = s->integrator[2];
+    const uint64_t delay_1 = s->delay_1;
+    const uint64_t delay_2 = s->delay_2;
+    const uint64_t delay_3 = s->delay_3;
+    const uint64_t new_delay_2 = (uint64_t)(integrator_2 - delay_1);
+    const uint64_t new_delay_3 = (uint64_t)(new_delay_2 - delay_2);
+    const uint64_t difference = (uint64_t)(new_delay_3 - delay_3);
+    const int64_t comb_sum = gyro_sign_extend_64(difference, UINT64_C(274877906944)); /* -137434759168 .. 137434759168 */
+    const int64_t biased = comb_sum + INT64_C(16384);
+    const int64_t rounded = gyro_asr_64(biased, 15U); /* -4194176 .. 4194176 */
+    s->delay_1 = integrator_2;
+    s->delay_2 = new_delay_2;
+    s->delay_3 = new_delay_3;
+    return (int32_t)rounded;
 }
 
 gyro_cordic_out_t gyro_cordic(int32_t in_phase, int32_t quadrature)
 {
-    const int32_t t0 = in_phase * INT32_C(64); /* -268427264 .. 268427264 */
-    const int32_t t1 = quadrature * INT32_C(64); /* -268427264 .. 268427264 */
-    const bool t2 = (t0 < INT32_C(0));
-    const bool t3 = (t1 < INT32_C(0));
-    const uint32_t t4 = (uint32_t)t0;
-    const uint32_t t5 = (uint32_t)(UINT32_C(0) - t4);
-    const int32_t t6 = gyro_sign_extend_32(t5, UINT32_C(2147483648)); /* -268427264 .. 268427264 */
-    const uint32_t t7 = (uint32_t)t1;
-    const uint32_t t8 = (uint32_t)(UINT32_C(0) - t7);
-    const int32_t t9 = gyro_sign_extend_32(t8, UINT32_C(2147483648)); /* -268427264 .. 268427264 */
-    const int32_t t10 = t3 ? (-INT32_C(4194304)) : INT32_C(4194304); /* -4194304 .. 4194304 */
-    const int32_t t11 = t3 ? t9 : t1; /* -268427264 .. 268427264 */
-    const int32_t t12 = t2 ? t11 : t0; /* -268427264 .. 268427264 */
-    const int32_t t13 = t3 ? t0 : t6; /* -268427264 .. 268427264 */
-    const int32_t t14 = t2 ? t13 : t1; /* -268427264 .. 268427264 */
-    const int32_t t15 = t2 ? t10 : INT32_C(0); /* -4194304 .. 4194304 */
-    int32_t t16 = t12;
-    int32_t t17 = t14;
-    int32_t t18 = t15;
+    const int32_t in_phase_in_range = gyro_clamp_32(in_phase, (-INT32_C(4194176)), INT32_C(4194176)); /* -4194176 .. 4194176 */
+    const int32_t quadrature_in_range = gyro_clamp_32(quadrature, (-INT32_C(4194176)), INT32_C(4194176)); /* -4194176 .. 4194176 */
+    const int32_t wide_i = in_phase_in_range * INT32_C(64); /* Q4.28, wrap; -268427264 .. 268427264 */
+    const int32_t wide_q = quadrature_in_range * INT32_C(64); /* Q4.28, wrap; -268427264 .. 268427264 */
+    const bool wide_i_is_negative = wide_i < INT32_C(0);
+    const bool wide_q_is_negative = wide_q < INT32_C(0);
+    const int32_t negated = -wide_i; /* -268427264 .. 268427264 */
+    const int32_t negated_2 = -wide_q; /* -268427264 .. 268427264 */
+    const int32_t quarter_turn = wide_q_is_negative ? (-INT32_C(4194304)) : INT32_C(4194304); /* -4194304 .. 4194304 */
+    const int32_t turned_i = wide_q_is_negative ? negated_2 : wide_q; /* -268427264 .. 268427264 */
+    const int32_t turned_q = wide_q_is_negative ? wide_i : negated; /* -268427264 .. 268427264 */
+    const int32_t start_x = wide_i_is_negative ? turned_i : wide_i; /* 0 .. 268427264 */
+    const int32_t start_y = wide_i_is_negative ? turned_q : wide_q; /* -268427264 .. 268427264 */
+    const int32_t start_z = wide_i_is_negative ? quarter_turn : INT32_C(0); /* -4194304 .. 4194304 */
+    int32_t x = start_x;
+    int32_t y = start_y;
+    uint32_t z = (uint32_t)start_z;
     for (uint32_t i = UINT32_C(0); i < UINT32_C(20); ++i) {
-        const bool t19 = (t17 < INT32_C(0));
-        const int32_t t20 = gyro_asr_32(t17, i); /* -268427264 .. 268427264 */
-        const int32_t t21 = gyro_asr_32(t16, i); /* -268427264 .. 268427264 */
-        const int32_t t22 = (int32_t)gyro_cordic_angle[i]; /* 5 .. 2097152 */
-        const uint32_t t23 = (uint32_t)t16;
-        const uint32_t t24 = (uint32_t)t20;
-        const uint32_t t25 = (uint32_t)(t23 - t24);
-        const uint32_t t26 = (uint32_t)t16;
-        const uint32_t t27 = (uint32_t)t20;
-        const uint32_t t28 = (uint32_t)(t26 + t27);
-        const uint32_t t29 = t19 ? t25 : t28;
-        const uint32_t t30 = (uint32_t)t17;
-        const uint32_t t31 = (uint32_t)t21;
-        const uint32_t t32 = (uint32_t)(t30 + t31);
-        const uint32_t t33 = (uint32_t)t17;
-        const uint32_t t34 = (uint32_t)t21;
-        const uint32_t t35 = (uint32_t)(t33 - t34);
-        const uint32_t t36 = t19 ? t32 : t35;
-        const uint32_t t37 = (uint32_t)t18;
-        const uint32_t t38 = (uint32_t)t22;
-        const uint32_t t39 = (uint32_t)(t37 - t38);
-        const uint32_t t40 = (uint32_t)t18;
-        const uint32_t t41 = (uint32_t)t22;
-        const uint32_t t42 = (uint32_t)(t40 + t41);
-        const uint32_t t43 = t19 ? t39 : t42;
-        const int32_t t44 = gyro_sign_extend_32(t29, UINT32_C(2147483648)); /* -625132419 .. 625132419 */
-        const int32_t t45 = gyro_sign_extend_32(t36, UINT32_C(2147483648)); /* -625132419 .. 625132419 */
-        const int32_t t46 = gyro_sign_extend_32(t43, UINT32_C(8388608)); /* -8388608 .. 8388607 */
-        t16 = t44;
-        t17 = t45;
-        t18 = t46;
+        const bool y_is_negative = y < INT32_C(0);
+        const int32_t step_x = gyro_asr_by_32(y, i); /* -268427264 .. 268427264 */
+        const int32_t step_y = (int32_t)((uint32_t)x >> i); /* 0 .. 268427264 */
+        const int32_t step_z = (int32_t)gyro_cordic_angle[i]; /* 5 .. 2097152 */
+        const int32_t difference = x - step_x; /* -268427264 .. 805281792 */
+        const int32_t sum = x + step_x; /* -268427264 .. 805281792 */
+        const int32_t next_x = y_is_negative ? difference : sum; /* 0 .. 625132419 */
+        const int32_t sum_2 = y + step_y; /* -625132417 .. 805281792 */
+        const int32_t difference_2 = y - step_y; /* -805281792 .. 625132417 */
+        const int32_t next_y = y_is_negative ? sum_2 : difference_2; /* -625132419 .. 625132419 */
+        const uint32_t difference_3 = (uint32_t)(z - (uint32_t)step_z);
+        const uint32_t sum_3 = (uint32_t)(z + (uint32_t)step_z);
+        const uint32_t next_z = y_is_negative ? difference_3 : sum_3;
+        x = next_x;
+        y = next_y;
+        z = next_z;
     }
-    const int64_t t47 = (int64_t)t16;
-    const int64_t t48 = t47 * INT64_C(10188014); /* -6368857836625866 .. 6368857836625866 */
-    const int64_t t49 = t48 + INT64_C(536870912);
-    const int64_t t50 = gyro_asr_64(t49, 30U); /* -5931461 .. 5931461 */
-    const int32_t t51 = (int32_t)t50;
+    const int32_t phase = gyro_sign_extend_32(z, UINT32_C(8388608)); /* -8388608 .. 8388607 */
+    const int64_t product = (int64_t)x * INT64_C(10188014); /* 0 .. 6368857836625866 */
+    const int64_t biased = product + INT64_C(536870912);
+    const int64_t rounded = (int64_t)((uint64_t)biased >> 30U); /* 0 .. 5931461 */
     gyro_cordic_out_t out;
-    out.phase = t18;
-    out.magnitude = t51;
+    out.phase = phase;
+    out.magnitude = (int32_t)rounded;
     return out;
 }
 
 int32_t gyro_bias(int32_t thermometer)
 {
-    const int64_t t0 = (int64_t)thermometer;
-    const int64_t t1 = INT64_C(1415954326) * t0; /* -11877885786718208 .. 11877884370763882 */
-    const int64_t t2 = t1 + INT64_C(32768);
-    const int64_t t3 = gyro_asr_64(t2, 16U); /* -181242153728 .. 181242132122 */
-    const int64_t t4 = INT64_C(102450105344) + t3; /* -78792048384 .. 283692237466 */
-    const int64_t t5 = (int64_t)thermometer;
-    const int64_t t6 = t4 * t5; /* -2379782972745187328 .. 2379782689052949862 */
-    const int64_t t7 = t6 + INT64_C(4194304);
-    const int64_t t8 = gyro_asr_64(t7, 23U); /* -283692237466 .. 283692203647 */
-    const int64_t t9 = INT64_C(14710263040) + t8; /* -268981974426 .. 298402466687 */
-    const int64_t t10 = t9 + INT64_C(16384);
-    const int64_t t11 = gyro_asr_64(t10, 15U); /* -8208678 .. 9106521 */
-    const int32_t t12 = (int32_t)t11;
-    const int32_t t13 = gyro_clamp_32(t12, (-INT32_C(8388608)), INT32_C(8388607)); /* -8208678 .. 8388607 */
-    return t13;
+    const int32_t thermometer_in_range = gyro_clamp_32(thermometer, (-INT32_C(8388608)), INT32_C(8388607)); /* -8388608 .. 8388607 */
+    const int64_t product = INT64_C(1415954326) * (int64_t)thermometer_in_range; /* -11877885786718208 .. 11877884370763882 */
+    const int64_t biased = product + INT64_C(32768);
+    const int64_t rounded = gyro_asr_64(biased, 16U); /* Q13.27, half_up, saturate; -181242153728 .. 181242132122 */
+    const int64_t partial_sum = INT64_C(102450105344) + rounded; /* -78792048384 .. 283692237466 */
+    const int64_t product_2 = partial_sum * (int64_t)thermometer_in_range; /* -2379782972745187328 .. 2379782689052949862 */
+    const int64_t biased_2 = product_2 + INT64_C(4194304);
+    const int64_t rounded_2 = gyro_asr_64(biased_2, 23U); /* Q13.27, half_up, saturate; -283692237466 .. 283692203647 */
+    const int64_t partial_sum_2 = INT64_C(14710263040) + rounded_2; /* -268981974426 .. 298402466687 */
+    const int64_t biased_3 = partial_sum_2 + INT64_C(16384);
+    const int64_t rounded_3 = gyro_asr_64(biased_3, 15U); /* -8208678 .. 9106521 */
+    const int32_t bias = gyro_clamp_32((int32_t)rounded_3, (-INT32_C(8388608)), INT32_C(8388607)); /* Q12.12, half_up, saturate; -8208678 .. 8388607 */
+    return bias;
 }
 
 int32_t gyro_rate(int32_t raw_rate, int32_t bias)
 {
-    const int32_t t0 = raw_rate * INT32_C(2); /* -8388352 .. 8388352 */
-    const int32_t t1 = t0 - bias; /* -16776959 .. 16597030 */
-    const int32_t t2 = gyro_clamp_32(t1, (-INT32_C(8388608)), INT32_C(8388607)); /* -8388608 .. 8388607 */
-    return t2;
+    const int32_t raw_rate_in_range = gyro_clamp_32(raw_rate, (-INT32_C(4194176)), INT32_C(4194176)); /* -4194176 .. 4194176 */
+    const int32_t bias_in_range = gyro_clamp_32(bias, (-INT32_C(8208678)), INT32_C(8388607)); /* -8208678 .. 8388607 */
+    const int32_t uncompensated = raw_rate_in_range * INT32_C(2); /* 2^-12 units; -8388352 .. 8388352 */
+    const int32_t difference = uncompensated - bias_in_range; /* -16776959 .. 16597030 */
+    const int32_t rate = gyro_clamp_32(difference, (-INT32_C(8388608)), INT32_C(8388607)); /* Q12.12, saturate; -8388608 .. 8388607 */
+    return rate;
 }
 
 int32_t gyro_amplitude_loop(gyro_amplitude_loop_t *s, int32_t magnitude)
 {
-    const int32_t t0 = s->integrator; /* 0 .. 134213632 */
-    const int32_t t1 = INT32_C(1048576) - magnitude; /* -4882885 .. 6980037 */
-    const int32_t t2 = t0 + t1; /* -4882885 .. 141193669 */
-    const int32_t t3 = gyro_clamp_32(t2, INT32_C(0), INT32_C(134213632)); /* 0 .. 134213632 */
-    const int32_t t4 = gyro_asr_32(t1, 7U); /* -38148 .. 54531 */
-    const int32_t t5 = gyro_asr_32(t3, 12U); /* 0 .. 32767 */
-    const int32_t t6 = t4 + t5; /* -38148 .. 87298 */
-    const int32_t t7 = gyro_clamp_32(t6, INT32_C(0), INT32_C(32767)); /* 0 .. 32767 */
-    s->integrator = t3;
-    return t7;
+    const int32_t integrator = s->integrator; /* 0 .. 134213632 */
+    const int32_t magnitude_in_range = gyro_clamp_32(magnitude, INT32_C(0), INT32_C(5931461)); /* 0 .. 5931461 */
+    const int32_t error = INT32_C(1048576) - magnitude_in_range; /* -4882885 .. 1048576 */
+    const int32_t integrated = integrator + error; /* -4882885 .. 135262208 */
+    const int32_t new_integrator = gyro_clamp_32(integrated, INT32_C(0), INT32_C(134213632)); /* 0 .. 134213632 */
+    const int32_t proportional = gyro_asr_32(error, 7U); /* 2^0 units, floor; -38148 .. 8192 */
+    const int32_t integral = (int32_t)((uint32_t)new_integrator >> 12U); /* 2^0 units, floor; 0 .. 32767 */
+    const int32_t unlimited_gain = proportional + integral; /* -38148 .. 40959 */
+    const int32_t gain = gyro_clamp_32(unlimited_gain, INT32_C(0), INT32_C(32767)); /* 0 .. 32767 */
+    s->integrator = new_integrator;
+    return gain;
 }
 
 gyro_period_out_t gyro_period(gyro_chain_t *s)
 {
-    const int32_t t0 = gyro_decimate(&s->cic_drive_i);
-    const int32_t t1 = gyro_decimate(&s->cic_drive_q);
-    const int32_t t2 = gyro_decimate(&s->cic_sense_i);
-    const int32_t t3 = gyro_decimate(&s->cic_sense_q);
-    const gyro_cordic_out_t c4 = gyro_cordic(t0, t1);
-    const int32_t t4 = c4.phase;
-    const int32_t t5 = c4.magnitude;
-    const int32_t t6 = gyro_bias(t4);
-    const int32_t t7 = gyro_rate(t2, t6);
-    const int32_t t8 = gyro_amplitude_loop(&s->amplitude_loop, t5);
+    const int32_t drive_i = gyro_decimate(&s->cic_drive_i);
+    const int32_t drive_q = gyro_decimate(&s->cic_drive_q);
+    const int32_t sense_i = gyro_decimate(&s->cic_sense_i);
+    const int32_t sense_q = gyro_decimate(&s->cic_sense_q);
+    const gyro_cordic_out_t c4 = gyro_cordic(drive_i, drive_q);
+    const int32_t phase = c4.phase;
+    const int32_t magnitude = c4.magnitude;
+    const int32_t bias = gyro_bias(phase);
+    const int32_t rate = gyro_rate(sense_i, bias);
+    const int32_t gain = gyro_amplitude_loop(&s->amplitude_loop, magnitude);
     gyro_period_out_t out;
-    out.drive_i = t0;
-    out.drive_q = t1;
-    out.sense_i = t2;
-    out.sense_q = t3;
-    out.phase = t4;
-    out.magnitude = t5;
-    out.bias = t6;
-    out.rate = t7;
-    out.gain = t8;
+    out.drive_i = drive_i;
+    out.drive_q = drive_q;
+    out.sense_i = sense_i;
+    out.sense_q = sense_q;
+    out.phase = phase;
+    out.magnitude = magnitude;
+    out.bias = bias;
+    out.rate = rate;
+    out.gain = gain;
     return out;
 }
 
@@ -218,7 +203,7 @@ void gyro_init(gyro_t *g)
     g->chain.amplitude_loop.integrator = INT32_C(67108864);
 }
 
-bool gyro_push(gyro_t *g, int32_t drive, int32_t sense, gyro_period_out_t *row)
+bool gyro_push(gyro_t *g, int16_t drive, int16_t sense, gyro_period_out_t *row)
 {
     gyro_sample(&g->chain, drive, sense);
     ++g->count;

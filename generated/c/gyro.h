@@ -21,29 +21,33 @@
 
 #include "gyro_arith.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {
-    uint32_t phase;
-    uint32_t tuning_word;
+    uint32_t phase; /* modulo 2^32 */
+    uint32_t tuning_word; /* modulo 2^32 */
 } gyro_oscillator_t;
 
 typedef struct {
-    uint64_t integrator[3];
-    uint64_t delay_1;
-    uint64_t delay_2;
-    uint64_t delay_3;
+    uint64_t integrator[3]; /* modulo 2^39 */
+    uint64_t delay_1; /* modulo 2^39 */
+    uint64_t delay_2; /* modulo 2^39 */
+    uint64_t delay_3; /* modulo 2^39 */
 } gyro_cic_t;
 
 typedef struct {
-    int32_t integrator;
+    int32_t integrator; /* 0 .. 134213632 */
 } gyro_amplitude_loop_t;
 
 typedef struct {
-    gyro_oscillator_t nco;
-    gyro_cic_t cic_drive_i;
-    gyro_cic_t cic_drive_q;
-    gyro_cic_t cic_sense_i;
-    gyro_cic_t cic_sense_q;
-    gyro_amplitude_loop_t amplitude_loop;
+    gyro_oscillator_t nco; /* of the block `nco` */
+    gyro_cic_t cic_drive_i; /* of the block `cic_drive_i` */
+    gyro_cic_t cic_drive_q; /* of the block `cic_drive_q` */
+    gyro_cic_t cic_sense_i; /* of the block `cic_sense_i` */
+    gyro_cic_t cic_sense_q; /* of the block `cic_sense_q` */
+    gyro_amplitude_loop_t amplitude_loop; /* of the block `amplitude_loop` */
 } gyro_chain_t;
 
 /* What gyro_nco returns. */
@@ -84,19 +88,13 @@ gyro_nco_out_t gyro_nco(gyro_oscillator_t *s);
  *   out product: -4194176 .. 4194176; code * carrier, Q2.22 half_up saturate
  *   error: one rounding to the output's LSB (half an LSB if to nearest), nothing else
  */
-int32_t gyro_demodulate(int32_t code, int32_t carrier);
+int32_t gyro_demodulate(int16_t code, int16_t carrier);
 
 /* integrate
  *   in  product: -4194176 .. 4194176; demodulated, Q2.22
  *   error: none, exact modulo 2^width
  */
 void gyro_integrate(gyro_cic_t *s, int32_t product);
-
-/* sample
- *   in  drive: -32768 .. 32767; ADC code
- *   in  sense: -32768 .. 32767; ADC code
- */
-void gyro_sample(gyro_chain_t *s, int32_t drive, int32_t sense);
 
 /* decimate
  *   out decimated: -4194176 .. 4194176; decimated, Q2.22 half_up saturate
@@ -108,7 +106,7 @@ int32_t gyro_decimate(gyro_cic_t *s);
  *   in  in_phase: -4194176 .. 4194176; decimated, Q2.22
  *   in  quadrature: -4194176 .. 4194176; decimated, Q2.22
  *   out phase: -8388608 .. 8388607; phase in units of 2^-24 turn
- *   out magnitude: -5931461 .. 5931461; magnitude in units of 2^-22
+ *   out magnitude: 0 .. 5931461; magnitude in units of 2^-22
  *   error: residual angle at most atan(2^-(n-1)), and half a unit for each of n table angles
  */
 gyro_cordic_out_t gyro_cordic(int32_t in_phase, int32_t quadrature);
@@ -129,7 +127,7 @@ int32_t gyro_bias(int32_t thermometer);
 int32_t gyro_rate(int32_t raw_rate, int32_t bias);
 
 /* amplitude_loop
- *   in  magnitude: -5931461 .. 5931461; units of 2^-22
+ *   in  magnitude: 0 .. 5931461; units of 2^-22
  *   out gain: 0 .. 32767; drive gain in units of 2^-15
  */
 int32_t gyro_amplitude_loop(gyro_amplitude_loop_t *s, int32_t magnitude);
@@ -140,7 +138,7 @@ int32_t gyro_amplitude_loop(gyro_amplitude_loop_t *s, int32_t magnitude);
  *   out sense_i: -4194176 .. 4194176; decimated, Q2.22 half_up saturate
  *   out sense_q: -4194176 .. 4194176; decimated, Q2.22 half_up saturate
  *   out phase: -8388608 .. 8388607; drive phase in units of 2^-24 turn
- *   out magnitude: -5931461 .. 5931461; drive magnitude in units of 2^-22
+ *   out magnitude: 0 .. 5931461; drive magnitude in units of 2^-22
  *   out bias: -8208678 .. 8388607; bias in deg/s, Q12.12 half_up saturate
  *   out rate: -8388608 .. 8388607; compensated rate in deg/s, Q12.12 half_up saturate
  *   out gain: 0 .. 32767; drive gain in units of 2^-15
@@ -158,10 +156,14 @@ typedef struct {
 void gyro_init(gyro_t *g);
 
 /* One ADC sample of both channels; true when `row` holds a new decimated sample (every 32). */
-bool gyro_push(gyro_t *g, int32_t drive, int32_t sense, gyro_period_out_t *row);
+bool gyro_push(gyro_t *g, int16_t drive, int16_t sense, gyro_period_out_t *row);
 
 /* Start-up check: 0 = every function gives the model's bits on the built-in stimulus; otherwise the
  * number of the first function that does not, counted as in the manifest. Stack only. */
 uint32_t gyro_selftest(void);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -15,23 +15,32 @@
 #endif
 
 
-/* floor(a / 2^n), n < 32: a negative word is shifted as its complement -a - 1. */
+/* The word with these bits. Compilers make nothing of it. */
+static inline int32_t gyro_word_32(uint32_t bits)
+{
+    return (bits <= (uint32_t)INT32_MAX) ? (int32_t)bits
+                                          : ((-(int32_t)(UINT32_MAX - bits)) - 1);
+}
+
+/* floor(a / 2^n), n < 31. Where n is a constant, compilers make one arithmetic shift of it. */
 static inline int32_t gyro_asr_32(int32_t a, uint32_t n)
 {
-    const uint32_t bits = (uint32_t)((a >= 0) ? a : (-(a + 1)));
-    const uint32_t shifted = bits >> n;
-    const int32_t word = (int32_t)shifted;
-    return (a >= 0) ? word : ((-word) - 1);
+    const int32_t unit = (int32_t)(UINT32_C(1) << n);
+    return (a >= 0) ? (a / unit) : ((-1) - (((-1) - a) / unit));
+}
+
+/* The same where n < 32 is not a constant: the word is shifted with 2^31 on it, which comes off again. */
+static inline int32_t gyro_asr_by_32(int32_t a, uint32_t n)
+{
+    const uint32_t lift = UINT32_C(1) << 31U;
+    return gyro_word_32((((uint32_t)a + lift) >> n) - (lift >> n));
 }
 
 /* The bits up to and with `sign` as a two's-complement number. */
 static inline int32_t gyro_sign_extend_32(uint32_t a, uint32_t sign)
 {
-    const uint32_t below = (uint32_t)(sign - UINT32_C(1));
-    const uint32_t low = a & below;
-    const uint32_t complement = below - low;
-    const int32_t word = (int32_t)complement;
-    return ((a & sign) != UINT32_C(0)) ? ((-word) - 1) : (int32_t)low;
+    const uint32_t low = a & ((sign - UINT32_C(1)) | sign);
+    return gyro_word_32((low ^ sign) - sign);
 }
 
 static inline int32_t gyro_clamp_32(int32_t a, int32_t low, int32_t high)
@@ -49,23 +58,32 @@ static inline int32_t gyro_check_32(int32_t a, int32_t low, int32_t high,
     return gyro_clamp_32(a, low, high);
 }
 
-/* floor(a / 2^n), n < 64: a negative word is shifted as its complement -a - 1. */
+/* The word with these bits. Compilers make nothing of it. */
+static inline int64_t gyro_word_64(uint64_t bits)
+{
+    return (bits <= (uint64_t)INT64_MAX) ? (int64_t)bits
+                                          : ((-(int64_t)(UINT64_MAX - bits)) - 1);
+}
+
+/* floor(a / 2^n), n < 63. Where n is a constant, compilers make one arithmetic shift of it. */
 static inline int64_t gyro_asr_64(int64_t a, uint32_t n)
 {
-    const uint64_t bits = (uint64_t)((a >= 0) ? a : (-(a + 1)));
-    const uint64_t shifted = bits >> n;
-    const int64_t word = (int64_t)shifted;
-    return (a >= 0) ? word : ((-word) - 1);
+    const int64_t unit = (int64_t)(UINT64_C(1) << n);
+    return (a >= 0) ? (a / unit) : ((-1) - (((-1) - a) / unit));
+}
+
+/* The same where n < 64 is not a constant: the word is shifted with 2^63 on it, which comes off again. */
+static inline int64_t gyro_asr_by_64(int64_t a, uint32_t n)
+{
+    const uint64_t lift = UINT64_C(1) << 63U;
+    return gyro_word_64((((uint64_t)a + lift) >> n) - (lift >> n));
 }
 
 /* The bits up to and with `sign` as a two's-complement number. */
 static inline int64_t gyro_sign_extend_64(uint64_t a, uint64_t sign)
 {
-    const uint64_t below = (uint64_t)(sign - UINT64_C(1));
-    const uint64_t low = a & below;
-    const uint64_t complement = below - low;
-    const int64_t word = (int64_t)complement;
-    return ((a & sign) != UINT64_C(0)) ? ((-word) - 1) : (int64_t)low;
+    const uint64_t low = a & ((sign - UINT64_C(1)) | sign);
+    return gyro_word_64((low ^ sign) - sign);
 }
 
 static inline int64_t gyro_clamp_64(int64_t a, int64_t low, int64_t high)

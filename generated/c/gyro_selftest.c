@@ -43,8 +43,8 @@ uint32_t gyro_selftest(void)
     {
         uint64_t x = UINT64_C(2004);
         for (uint32_t k = UINT32_C(0); k < UINT32_C(256); ++k) {
-            const int32_t a0 = (int32_t)gyro_stimulus(&x, (-INT64_C(32768)), UINT64_C(65535));
-            const int32_t a1 = (int32_t)gyro_stimulus(&x, (-INT64_C(32767)), UINT64_C(65534));
+            const int16_t a0 = (int16_t)gyro_stimulus(&x, (-INT64_C(32768)), UINT64_C(65535));
+            const int16_t a1 = (int16_t)gyro_stimulus(&x, (-INT64_C(32767)), UINT64_C(65534));
             const int32_t r = gyro_demodulate(a0, a1);
             h = gyro_mix(h, (uint64_t)(int64_t)r);
         }
@@ -102,8 +102,8 @@ uint32_t gyro_selftest(void)
         uint64_t x = UINT64_C(2004);
         gyro_init(&g);
         for (uint32_t k = UINT32_C(0); k < UINT32_C(2048); ++k) {
-            const int32_t drive = (int32_t)gyro_stimulus(&x, (-INT64_C(32768)), UINT64_C(65535));
-            const int32_t sense = (int32_t)gyro_stimulus(&x, (-INT64_C(32768)), UINT64_C(65535));
+            const int16_t drive = (int16_t)gyro_stimulus(&x, (-INT64_C(32768)), UINT64_C(65535));
+            const int16_t sense = (int16_t)gyro_stimulus(&x, (-INT64_C(32768)), UINT64_C(65535));
             if (gyro_push(&g, drive, sense, &row)) {
                 h = gyro_mix(h, (uint64_t)(int64_t)row.drive_i);
                 h = gyro_mix(h, (uint64_t)(int64_t)row.drive_q);

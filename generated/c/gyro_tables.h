@@ -4,10 +4,18 @@
 
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* One turn of a sine, 4096 entries, amplitude 32767 (error at most half an LSB) */
 extern const int16_t gyro_sine_0[4096];
 
 /* atan(2^-i) in units of 2^-24 turn (error at most half a unit) */
 extern const int32_t gyro_cordic_angle[20];
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -28,7 +28,7 @@ static void put(const uint64_t *words, size_t count)
 
 static void call_demodulate(const int64_t *in, uint64_t *out)
 {
-    const int32_t r = gyro_demodulate((int32_t)in[0], (int32_t)in[1]);
+    const int32_t r = gyro_demodulate((int16_t)in[0], (int16_t)in[1]);
     out[0] = (uint64_t)(int64_t)r;
     out[1] = UINT64_C(0);
 }
@@ -129,7 +129,7 @@ static int chain(void)
     uint64_t out[16];
     gyro_init(&g);
     while (get(codes, sizeof codes) == 1U) {
-        if (gyro_push(&g, codes[0], codes[1], &row)) {
+        if (gyro_push(&g, (int16_t)codes[0], (int16_t)codes[1], &row)) {
             out[0] = (uint64_t)(int64_t)row.drive_i;
             out[1] = (uint64_t)(int64_t)row.drive_q;
             out[2] = (uint64_t)(int64_t)row.sense_i;

@@ -20,7 +20,7 @@ fn put(to: &mut impl Write, words: &[u64]) {
 type Call = fn(&[i64], &mut Vec<u64>);
 
 fn call_demodulate(a: &[i64], out: &mut Vec<u64>) {
-    let r = gyro::demodulate(a[0] as i32, a[1] as i32);
+    let r = gyro::demodulate(a[0] as i16, a[1] as i16);
     out.push(r as u64);
     out.push(0);
 }
@@ -65,7 +65,7 @@ fn chain(input: &mut impl Read, output: &mut impl Write) {
         let [a, b, c, d, e, f, h, i] = bytes;
         let drive = i32::from_ne_bytes([a, b, c, d]);
         let sense = i32::from_ne_bytes([e, f, h, i]);
-        if let Some(row) = g.push(drive, sense) {
+        if let Some(row) = g.push(drive as i16, sense as i16) {
             put(output, &[row.drive_i as u64, row.drive_q as u64, row.sense_i as u64, row.sense_q as u64, row.phase as u64, row.magnitude as u64, row.rate as u64, row.gain as u64, u64::from(g.fault)]);
         }
     }
