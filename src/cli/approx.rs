@@ -7,7 +7,7 @@ use crate::design::target::Target;
 use crate::emit::views::Language;
 use crate::error::{Error, InputError, Result};
 use crate::firmware::approximation;
-use crate::firmware::files;
+use crate::firmware::replace;
 use crate::numeric::format::Format;
 use crate::tabulate::job;
 use crate::tabulate::job::{Asked, Request, Weight};
@@ -82,6 +82,9 @@ pub struct Arguments {
     /// Folder for the results; made if it does not exist.
     #[arg(long, value_name = "DIR", default_value = "gyrogen-approx")]
     out: PathBuf,
+    /// Overwrite firmware in the folder that was edited; files that are none of a bundle's stay.
+    #[arg(long)]
+    force: bool,
     /// How the result is printed on stdout.
     #[arg(long, value_enum, default_value = "text")]
     format: OutputFormat,
@@ -94,6 +97,11 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let watch = Stopwatch::start("approximating");
     let request = request(arguments)?;
+    if !arguments.force {
+        for folder in ["c", "rust"] {
+            replace::refuse(&[], &arguments.out.join(folder))?;
+        }
+    }
     let bar = Progress::new();
     let threads = super::threads(arguments.threads);
     let made = job::approximate(&request, &recorded.command, threads, &|total, count| {
@@ -103,12 +111,13 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let made = made?;
     watch.stage("emitting");
     let model = crate::vectors::form::model(&made.settled)?;
-    let vectors = approximation::vectors(&made.settled, &model, threads);
+    let vectors = approximation::vectors(&model);
+    let every = approximation::every(&made.settled, &model, threads);
     let emit = |language| {
         approximation::emit(
             &made.settled,
             &model,
-            &vectors,
+            (&vectors, every),
             &made.outcome,
             &request.name,
             language,
@@ -118,8 +127,13 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let json = super::json(&made.outcome);
     watch.stage("writing");
     super::make_folder(&arguments.out)?;
-    files::write(&c, &arguments.out.join("c"))?;
-    files::write(&rust, &arguments.out.join("rust"))?;
+    for (files, folder) in [(&c, "c"), (&rust, "rust")] {
+        super::common::in_the_way(&replace::write(
+            files,
+            &arguments.out.join(folder),
+            arguments.force,
+        )?);
+    }
     crate::output::write_whole(&arguments.out.join("approx.json"), json.as_bytes())?;
     watch.write(
         &arguments.out,

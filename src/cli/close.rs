@@ -53,6 +53,9 @@ pub struct Arguments {
     /// writes no files.
     #[arg(long, value_name = "DIR")]
     pub(super) out: Option<PathBuf>,
+    /// Overwrite firmware in the folder that was edited; files that are none of a bundle's stay.
+    #[arg(long, conflicts_with_all = ["capture", "self_test"])]
+    force: bool,
     /// How the result is printed on stdout.
     #[arg(long, value_enum, default_value = "text")]
     pub(super) format: OutputFormat,
@@ -94,6 +97,9 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         crate::output::write_whole(&out.join("report.html"), page.as_bytes())?;
         (closed.closure, None, None)
     } else if let Some(path) = &arguments.record {
+        if !arguments.force {
+            crate::verify::firmware::refuse_edited(out)?;
+        }
         let (record, warnings) = crate::record::read_any(path, &design.record)?;
         closing(path);
         let mut closed = close::close(
@@ -122,7 +128,14 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
             controls: controls.as_ref(),
             diff: None,
         };
-        write(&closed, path, &design, &sources, beside, out)?;
+        write(
+            &closed,
+            path,
+            &design,
+            &sources,
+            beside,
+            (out, arguments.force),
+        )?;
         (closed.closure, compared, controls)
     } else {
         return Ok(());
@@ -230,7 +243,7 @@ fn write(
     design: &Design,
     sources: &Option<[Vec<EmittedFile>; 2]>,
     beside: Beside<'_>,
-    out: &Path,
+    (out, force): (&Path, bool),
 ) -> Result<()> {
     let augmented = closed.correction.as_ref().map(|correction| {
         let planned = Planned {
@@ -261,7 +274,7 @@ fn write(
         .flatten()
         .zip(["firmware/c", "firmware/rust"])
     {
-        crate::firmware::files::write(files, &out.join(folder))?;
+        super::common::in_the_way(&crate::firmware::replace::write(files, &out.join(folder), force)?);
     }
     crate::thermal::residuals::write(closed, &out.join("residuals.csv"))?;
     crate::output::write_whole(&out.join("report.html"), page.as_bytes())?;

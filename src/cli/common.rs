@@ -1,5 +1,6 @@
 //! What the subcommands share: lines and tables on the terminal, progress, JSON, the design that was named.
 
+use crate::emit::views::Language;
 use crate::error::Result;
 use crate::verify::compare::Compared;
 use clap::ValueEnum;
@@ -63,6 +64,25 @@ pub(super) fn with_bar<T>(work: impl FnOnce(crate::selftest::Progress<'_>) -> T)
 pub(super) fn json<T: serde::Serialize>(value: &T) -> String {
     // Structures of strings and finite numbers always have a JSON form.
     serde_json::to_string_pretty(value).unwrap_or_default() + "\n"
+}
+
+/// The languages that emitted code is built in, of those asked for; says for which there is no compiler.
+pub(super) fn languages(asked: Option<Language>) -> Result<Vec<Language>> {
+    let (found, lacking) = crate::verify::toolchain::languages(asked)?;
+    for why in lacking {
+        let other = found.first().map_or("", |l| crate::verify::compare::language_name(*l));
+        eprintln!(
+            "note: only the emitted code of one language ({other}) is built and compared: {why}"
+        );
+    }
+    Ok(found)
+}
+
+/// Says which files were in the way of a bundle that was written all the same.
+pub(super) fn in_the_way(files: &[String]) {
+    if !files.is_empty() {
+        eprintln!("in the way: {}", crate::firmware::replace::listed(files));
+    }
 }
 
 /// Makes a folder for results.

@@ -7,11 +7,13 @@ use super::recorded::Recorded;
 use crate::design::{Compensation, Design};
 use crate::emit::bundle::Part;
 use crate::emit::views::Language;
+
 use crate::error::{InputError, Result};
 use crate::firmware::correction;
 use crate::firmware::correction::Origin;
 use crate::firmware::files;
 use crate::firmware::files::EmittedFile;
+use crate::firmware::{manifest, replace};
 use std::path::PathBuf;
 
 /// Write a firmware bundle: sources, self-test, test vectors and a manifest of its files.
@@ -28,6 +30,9 @@ pub struct Arguments {
     /// Folder for the bundle; made if it does not exist.
     #[arg(long, value_name = "DIR", default_value = "gyrogen-emit")]
     out: PathBuf,
+    /// Overwrite a bundle's files that were edited; files that are none of a bundle's stay.
+    #[arg(long)]
+    force: bool,
 }
 
 /// Runs the command.
@@ -40,11 +45,12 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         Some(_) => Part::Correction,
         None => Part::Chain,
     });
-    let bundle = match part {
-        Part::Correction => correction(&design, arguments.lang, &recorded.command)?,
-        part => files::emit(&design, part, arguments.lang, &recorded.command)?,
-    };
-    files::write(&bundle, &arguments.out)?;
+    if !arguments.force {
+        replace::refuse(&[], &arguments.out)?;
+    }
+    let bundle = emitted(&design, part, arguments.lang, &recorded.command)?;
+    let forced = replace::write(&bundle, &arguments.out, arguments.force)?;
+    super::common::in_the_way(&forced);
     for remark in remarks(&design, part, arguments.part.is_some()) {
         eprintln!("{remark}");
     }
@@ -53,7 +59,24 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         bundle.len(),
         arguments.out.display()
     );
+    eprintln!("digest {}", manifest::digest(&bundle));
     Ok(())
+}
+
+/// The bundle of a part of a design, as files in memory.
+///
+/// # Errors
+/// A design without what the part needs.
+pub(super) fn emitted(
+    design: &Design,
+    part: Part,
+    language: Language,
+    command: &str,
+) -> Result<Vec<EmittedFile>> {
+    match part {
+        Part::Correction => correction(design, language, command),
+        part => files::emit(design, part, language, command),
+    }
 }
 
 /// A part as the command line names it.

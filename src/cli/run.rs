@@ -2,6 +2,7 @@
 
 use super::recorded::Recorded;
 use super::{OutputFormat, alternatives};
+use crate::emit::views::Language;
 use crate::error::{Error, Result};
 use crate::job;
 use crate::job::bound::Line;
@@ -22,6 +23,13 @@ pub struct Arguments {
     /// Folder for the results; made if it does not exist.
     #[arg(long, value_name = "DIR", default_value = "gyrogen-out")]
     out: PathBuf,
+    /// Language of the emitted code that is built and compared (both are written); both if left out, or that for
+    /// which there is a compiler.
+    #[arg(long, value_enum)]
+    lang: Option<Language>,
+    /// Overwrite firmware in the folder that was edited; files that are none of a bundle's stay.
+    #[arg(long)]
+    force: bool,
     /// How the result is printed on stdout.
     #[arg(long, value_enum, default_value = "text")]
     format: OutputFormat,
@@ -34,6 +42,10 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let watch = Stopwatch::start("reading the design");
     let design = super::design(arguments.design.as_deref())?;
+    if !arguments.force {
+        crate::verify::firmware::refuse_edited(&arguments.out)?;
+    }
+    let languages = super::common::languages(arguments.lang)?;
     let loud = std::io::stderr().is_terminal();
     let say = |step: &str| {
         watch.stage(step);
@@ -45,6 +57,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         &design,
         arguments.record.as_deref(),
         &recorded.command,
+        &languages,
         &say,
     )?;
     watch.stage("writing");
@@ -52,7 +65,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let json = super::json(&outcome.summary);
     let out = &arguments.out;
     super::make_folder(out)?;
-    outcome.parts.firmware.write(out)?;
+    super::common::in_the_way(&outcome.parts.firmware.write(out, arguments.force)?);
     if let Some(record) = &outcome.parts.record_csv {
         crate::output::write_whole(&out.join("record.csv"), record.as_bytes())?;
     }
@@ -104,8 +117,14 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
     row("before compensation", s.before);
     row("after, float model", s.after.float);
     row("after, fixed-point model", s.after.fixed);
-    row("after, emitted C", s.after.c);
-    row("after, emitted Rust", s.after.rust);
+    for (name, drift) in [
+        ("after, emitted C", s.after.c),
+        ("after, emitted Rust", s.after.rust),
+    ] {
+        if let Some(drift) = drift {
+            row(name, drift);
+        }
+    }
     for column in table.column_iter_mut().skip(1) {
         column.set_cell_alignment(comfy_table::CellAlignment::Right);
     }

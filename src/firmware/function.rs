@@ -1,23 +1,14 @@
 //! The bundle of one function that stands alone: no chain, no state, one word in, one word out.
 
-use super::files::{self, EmittedFile, View, csv_line};
+use super::files::{self, EmittedFile, View};
 use super::manifest::{self, Header, Manifest};
+use super::vectors::{self, Checked};
 use crate::emit::bundle::{Bundle, Part};
 use crate::emit::lower::lower;
-use crate::emit::views;
-use crate::emit::views::{Language, mix};
+use crate::emit::views::Language;
 use crate::error::Result;
-use crate::numeric::trace::ir::{Interval, Program};
+use crate::numeric::trace::ir::Program;
 use crate::vectors::model::Model;
-use crate::vectors::stimulus::EXHAUSTIVE_BITS;
-use crate::vectors::stimulus::{self, SEED};
-
-/// Random vectors.
-const VECTORS: usize = 1024;
-/// Words among which the vectors that show damage are searched.
-const CANDIDATES: usize = 1 << 16;
-/// Inputs that share a checksum where every input is compared.
-const BLOCK: u64 = 1 << 12;
 
 /// What is emitted, and where it comes from.
 pub struct Standalone<'a> {
@@ -35,6 +26,8 @@ pub struct Standalone<'a> {
     pub command: &'a str,
     /// From [`vectors`]: the same in every language.
     pub vectors: &'a [EmittedFile],
+    /// From [`every`].
+    pub every: Option<Checked>,
 }
 
 /// Emits the function in one language, as files in memory.
@@ -47,10 +40,10 @@ pub fn emit(what: &Standalone, language: Language) -> Result<Vec<EmittedFile>> {
     let models = std::slice::from_ref(what.model);
     let mut facts = what.facts.clone();
     facts.push("words are two's complement; ranges beside them are proved, not observed".into());
-    let view = View::new(&bundle, models, language, banner, facts);
+    let view = View::new(&bundle, models, &[what.every], language, banner, facts);
     let mut emitted = files::sources(&view, Part::Compensation, language)?;
     emitted.extend_from_slice(what.vectors);
-    emitted.push(files::table_vectors(&view.tables));
+    emitted.push(vectors::of_tables(&view.tables));
     let header = Header {
         design_sha256: what.request_sha256,
         command: what.command,
@@ -59,7 +52,7 @@ pub fn emit(what: &Standalone, language: Language) -> Result<Vec<EmittedFile>> {
         has_code: true,
         columns: &[],
     };
-    let manifest = Manifest::new(&header, &bundle, &view.tables, &view.functions, &emitted);
+    let manifest = Manifest::new(&header, &bundle, &view, &emitted);
     emitted.push(EmittedFile {
         path: manifest::NAME.into(),
         text: manifest.to_json(),
@@ -81,82 +74,19 @@ pub fn bundle(what: &Standalone) -> Bundle {
     }
 }
 
-/// Vectors, and checksums over every input there is if these have few enough bits. `run` is the model's
-/// only output for its only input, computed on `threads` threads.
-pub fn vectors(
-    program: &Program,
+/// Vectors of the function: ends, random words, and words that show damage.
+pub fn vectors(model: &Model) -> Vec<EmittedFile> {
+    vec![vectors::function(model, Vec::new())]
+}
+
+/// Number and checksum of every input there is, if they have few enough bits. `run` is the model's only output
+/// for its only input, computed on `threads` threads.
+pub fn every(
     model: &Model,
     run: &(dyn Fn(i128) -> i128 + Sync),
     threads: usize,
-) -> Vec<EmittedFile> {
-    let mut all = vec![chosen(program, model)];
-    all.extend(every_input(model, run, threads));
-    all
-}
-
-/// Inputs with the model's outputs: corners, random words, and words that show a rounding constant or a
-/// coefficient that is off by one.
-fn chosen(program: &Program, model: &Model) -> EmittedFile {
-    let mut text = String::new();
-    if let Some(f) = program.function(&model.name) {
-        let names = f.inputs.iter().map(|(port, _)| port.name);
-        let names = names.chain(f.outputs.iter().map(|(port, _)| port.name));
-        text = names.chain(["fault"]).collect::<Vec<_>>().join(",") + "\n";
-    }
-    let mut inputs = stimulus::inputs(&model.inputs, VECTORS, SEED);
-    let candidates = stimulus::inputs(&model.inputs, CANDIDATES, SEED + 4);
-    inputs.extend(model.near_ties(&candidates));
-    let mut outputs = vec![0; model.outputs];
-    for input in inputs {
-        let fault = model.call(&input, &mut outputs);
-        let mut line = input;
-        line.extend(&outputs);
-        line.push(i128::from(fault));
-        text += &csv_line(&line);
-    }
-    EmittedFile {
-        path: format!("vectors/{}.csv", model.name),
-        text,
-    }
-}
-
-/// Checksums of the outputs over every input there is, block by block, if it has few enough bits.
-fn every_input(
-    model: &Model,
-    run: &(dyn Fn(i128) -> i128 + Sync),
-    threads: usize,
-) -> Option<EmittedFile> {
-    let [range] = model.inputs.as_slice() else {
-        return None;
-    };
-    if range.high - range.low >= 1 << EXHAUSTIVE_BITS {
-        return None;
-    }
-    // Of the output and of the fault, which is none.
-    let checksum = |block: &Interval| {
-        let inputs = block.low..=block.high;
-        let h = inputs.fold(views::BASIS, |h, x| mix(mix(h, run(x) as u64), 0));
-        [block.low, block.high - block.low + 1, i128::from(h)]
-    };
-    let blocks: Vec<Interval> = blocks(*range).collect();
-    let share = blocks.len().div_ceil(threads.max(1)).max(1);
-    let lines = std::thread::scope(|scope| {
-        let parts = blocks.chunks(share).map(|part| {
-            scope.spawn(move || part.iter().map(checksum).map(|l| csv_line(&l)).collect())
-        });
-        let parts: Vec<_> = parts.collect();
-        let joined: Option<Vec<String>> = parts.into_iter().map(|p| p.join().ok()).collect();
-        joined
-    })?;
-    Some(EmittedFile {
-        path: format!("vectors/{}.every.csv", model.name),
-        text: "low,count,checksum\n".to_owned() + &lines.concat(),
-    })
-}
-
-/// The range in blocks of at most [`BLOCK`] inputs.
-fn blocks(range: Interval) -> impl Iterator<Item = Interval> {
-    (range.low..=range.high)
-        .step_by(BLOCK as usize)
-        .map(move |low| Interval::new(low, (low + BLOCK as i128 - 1).min(range.high)))
+) -> Option<Checked> {
+    // The last word is the fault, which is none.
+    let record = |input: &[i128]| vec![run(input[0]), 0];
+    vectors::every(&model.inputs, &record, threads)
 }

@@ -3,8 +3,11 @@
 //! difference, [`bundle`] does all that from a bundle's own files.
 
 pub mod bundle;
+pub mod chain;
 pub mod compare;
 pub mod correction;
+mod expected;
 pub mod firmware;
+pub mod process;
 pub mod target;
 pub mod toolchain;

@@ -4,10 +4,11 @@
 //! C library; `RUNTIME` has the few functions that the test driver needs. qemu's user mode executes them: the
 //! instructions are the processor's, its clock and memory are not, and cycles are not counted.
 
+use super::process;
 use super::toolchain::{self, C_FLAGS, Harness};
 use crate::error::{InputError, Result, io_error};
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 /// Files of the test driver's runtime where there is no C library.
 const RUNTIME: [(&str, &str); 5] = [
@@ -117,8 +118,7 @@ fn first(
     let answers = |name: &&&str| {
         let mut command = Command::new(name);
         command.arg("--version");
-        command.stdout(Stdio::null()).stderr(Stdio::null());
-        command.status().is_ok_and(|status| status.success())
+        process::output(command, "it").is_ok_and(|said| said.status.success())
     };
     names.iter().find(answers).copied().ok_or_else(|| {
         InputError::new(format!(
