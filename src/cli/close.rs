@@ -274,7 +274,11 @@ fn write(
         .flatten()
         .zip(["firmware/c", "firmware/rust"])
     {
-        super::common::in_the_way(&crate::firmware::replace::write(files, &out.join(folder), force)?);
+        super::common::in_the_way(&crate::firmware::replace::write(
+            files,
+            &out.join(folder),
+            force,
+        )?);
     }
     crate::thermal::residuals::write(closed, &out.join("residuals.csv"))?;
     crate::output::write_whole(&out.join("report.html"), page.as_bytes())?;

@@ -70,7 +70,9 @@ pub(super) fn json<T: serde::Serialize>(value: &T) -> String {
 pub(super) fn languages(asked: Option<Language>) -> Result<Vec<Language>> {
     let (found, lacking) = crate::verify::toolchain::languages(asked)?;
     for why in lacking {
-        let other = found.first().map_or("", |l| crate::verify::compare::language_name(*l));
+        let other = found
+            .first()
+            .map_or("", |l| crate::verify::compare::language_name(*l));
         eprintln!(
             "note: only the emitted code of one language ({other}) is built and compared: {why}"
         );

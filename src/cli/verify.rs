@@ -83,10 +83,12 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
 /// A result in a bundle's folder, which may be anybody's, replaces a plain file or nothing.
 fn refuse_link(path: &Path) -> Result<()> {
     if path.symlink_metadata().is_ok_and(|found| !found.is_file()) {
-        return Err(InputError::new("the result is not written here: this is a link, or no regular file")
-            .in_file(path)
-            .help("remove it, or name another folder: `--out DIR`")
-            .into());
+        return Err(InputError::new(
+            "the result is not written here: this is a link, or no regular file",
+        )
+        .in_file(path)
+        .help("remove it, or name another folder: `--out DIR`")
+        .into());
     }
     Ok(())
 }

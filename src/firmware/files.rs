@@ -10,7 +10,7 @@ use crate::design::Design;
 use crate::emit::bundle::{Bundle, Part};
 use crate::emit::machine::{Type, Width};
 use crate::emit::views;
-use crate::emit::views::{FunctionView, Language, StateView, StructView, TableView, mix};
+use crate::emit::views::{FunctionView, Language, StateView, StructView, TableView};
 use crate::emit::{c, rust};
 use crate::error::{InputError, Result, io_error};
 use crate::numeric::trace::ir::Interval;

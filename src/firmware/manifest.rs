@@ -4,7 +4,7 @@ use super::files::{EmittedFile, View};
 use crate::design::{CompensationInput, Design, Outside};
 use crate::digest::sha256;
 use crate::emit::bundle::Bundle;
-use crate::emit::views::{FunctionView, Language, TableView};
+use crate::emit::views::Language;
 use crate::numeric::format::Overflow;
 use serde::{Deserialize, Serialize};
 

@@ -6,7 +6,7 @@ use super::files::{self, EmittedFile, View};
 use super::manifest::{self, Header, Manifest};
 use super::tested;
 use super::vectors::{self, csv_line};
-use crate::correction::run::Calls;
+use crate::correction::Calls;
 use crate::emit::bundle::{Bundle, Part, states};
 use crate::emit::lower::lower;
 use crate::emit::views;

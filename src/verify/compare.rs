@@ -3,13 +3,13 @@
 use super::toolchain::Harness;
 use crate::design::Design;
 use crate::emit::bundle::Bundle;
-use crate::firmware::manifest::{EveryEntry, LongEntry};
-use crate::vectors::chain;
-use crate::vectors::search;
 use crate::emit::views::{self, Language};
 use crate::error::Result;
+use crate::firmware::manifest::{EveryEntry, LongEntry};
+use crate::vectors::chain;
 use crate::vectors::model;
 use crate::vectors::model::Model;
+use crate::vectors::search;
 use crate::vectors::stimulus::{self, EXHAUSTIVE_BITS, SEED};
 use serde::Serialize;
 

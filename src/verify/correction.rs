@@ -60,7 +60,9 @@ impl Firmware {
                 all.push(compare::table(language, harness, &table.name, &entries)?);
             }
             let name = crate::correction::block::STEP;
-            all.push(compare::sequence(language, harness, name, &calls, &expected)?);
+            all.push(compare::sequence(
+                language, harness, name, &calls, &expected,
+            )?);
             Ok(all)
         })
     }

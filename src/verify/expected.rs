@@ -2,10 +2,10 @@
 //! what its manifest asks for.
 
 use crate::emit::views::Language;
+use crate::error::Result;
 use crate::firmware::files;
 use crate::firmware::folder::{Folder, is_plain};
 use crate::firmware::manifest::{self, Manifest};
-use crate::error::Result;
 
 /// Functions without which there is no such part.
 const FUNCTIONS: [(&str, &[&str]); 5] = [

@@ -2,11 +2,11 @@
 
 use crate::design::Design;
 use crate::emit::bundle::{Bundle, Part};
-use crate::firmware::replace;
 use crate::emit::views::Language;
 use crate::error::{Result, io_error};
 use crate::firmware::files;
 use crate::firmware::files::EmittedFile;
+use crate::firmware::replace;
 use crate::parallel::both;
 use crate::verify::compare::{self, Compared};
 use crate::verify::toolchain::{self, Harness};

@@ -1,9 +1,8 @@
-//! Model against emitted code: [`model`] evaluates the bit-accurate blocks one call at a time,
-//! [`stimulus`] makes inputs, [`toolchain`] builds a bundle, [`compare`] runs it and finds the first
-//! difference, [`bundle`] does all that from a bundle's own files.
+//! Model against emitted code: [`toolchain`] builds a bundle, [`compare`] runs it and finds the first difference,
+//! [`bundle`] does all that from a bundle's own files, which it holds against what such a bundle must have; [`process`]
+//! ends what hangs.
 
 pub mod bundle;
-pub mod chain;
 pub mod compare;
 pub mod correction;
 mod expected;
