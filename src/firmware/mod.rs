@@ -11,6 +11,7 @@ pub mod files;
 pub mod folder;
 pub mod function;
 pub mod manifest;
+pub mod paths;
 pub mod replace;
 pub mod stepped;
 pub mod tested;

@@ -118,7 +118,7 @@ pub fn verify(
             .prefix("gyrogen-verify-")
             .tempdir()
             .map_err(|e| io_error(std::env::temp_dir(), "make a folder for the build", &e))?;
-        let sources = crate::firmware::files::paths(&manifest.prefix, false, language);
+        let sources = crate::firmware::paths::sources(&manifest.prefix, false, language);
         for source in &sources {
             let to = made.path().join(source);
             if let Some(parent) = to.parent() {
@@ -208,6 +208,9 @@ fn other_than(due: &[EmittedFile], folder: &Folder) -> Vec<String> {
         .collect()
 }
 
+/// Lines of vectors.
+type Lines = Vec<Vec<i128>>;
+
 /// The comparisons of one bundle.
 struct Run<'a> {
     language: Language,
@@ -290,10 +293,7 @@ impl Run<'_> {
     }
 
     /// The vectors of a function: inputs and outputs.
-    fn split(
-        &self,
-        function: &manifest::FunctionEntry,
-    ) -> Result<(Vec<Vec<i128>>, Vec<Vec<i128>>)> {
+    fn split(&self, function: &manifest::FunctionEntry) -> Result<(Lines, Lines)> {
         let columns = function
             .inputs
             .saturating_add(function.outputs)
