@@ -219,7 +219,3 @@ fn spurs(spectra: &[(Spectrum, bool)], figures: &mut Figures) {
         figures.spur_floor_dps = figures.spur_floor_dps.max((factor * mean).sqrt());
     }
 }
-
-#[cfg(test)]
-#[path = "figures_tests.rs"]
-mod tests;
