@@ -94,8 +94,6 @@ fn every_record_is_readable_and_plausible() {
                 "scale_not_nominal" | "rate_sign_reversed" => {
                     deviation(&r.truth.clean_dps) > 0.3 * rms(&column(&r.csv, "rate_dps"))
                 }
-                // The bank draws noises that no gyro at rest has.
-                "rate_in_millidegrees" => rms(&column(&r.csv, "rate_out_dps")) > 3.0,
                 _ => false,
             };
             *warned.entry(w.code.to_owned()).or_default() += 1;
