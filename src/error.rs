@@ -1,6 +1,7 @@
 //! What can go wrong, in the two kinds that a user has to tell apart: an input that cannot be
 //! used (exit status 2) and a check that does not hold (exit status 1).
 
+use crate::text::{Place, lines, shown};
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -14,7 +15,7 @@ pub enum Error {
     #[error(transparent)]
     Input(#[from] Box<InputError>),
     /// Everything was done and a check does not hold: exit status 1. The text says which.
-    #[error("{0}")]
+    #[error("{}", lines(.0, Place::Screen))]
     Check(String),
     /// Nobody reads the output any more (`| head`), which is no failure: exit status 0.
     #[error("nobody reads the output any more")]
@@ -122,7 +123,7 @@ impl std::error::Error for InputError {}
 impl fmt::Display for InputError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(file) = &self.file {
-            write!(f, "{}:", file.display())?;
+            write!(f, "{}:", shown(&file.to_string_lossy(), Place::Screen))?;
         }
         if let Some(line) = self.line {
             write!(f, "{line}:")?;
@@ -133,15 +134,21 @@ impl fmt::Display for InputError {
         if self.file.is_some() || self.line.is_some() {
             write!(f, " ")?;
         }
-        write!(f, "error: {}", self.message)?;
+        write!(f, "error: {}", lines(&self.message, Place::Screen))?;
         if let (Some(text), Some(column)) = (&self.source_line, self.column) {
             // A very long line (a capture, a coefficient list) is cut around the caret.
             let skip = column.saturating_sub(60);
-            let shown: String = text.chars().skip(skip).take(100).collect();
-            write!(f, "\n  | {shown}\n  | {}^", " ".repeat(column - 1 - skip))?;
+            let cut: String = text.chars().skip(skip).take(100).collect();
+            let before: String = cut.chars().take(column - 1 - skip).collect();
+            let indent = shown(&before, Place::Screen).chars().count() + column
+                - 1
+                - skip
+                - before.chars().count();
+            let cut = shown(&cut, Place::Screen);
+            write!(f, "\n  | {cut}\n  | {}^", " ".repeat(indent))?;
         }
         if let Some(help) = &self.help {
-            write!(f, "\n  help: {help}")?;
+            write!(f, "\n  help: {}", lines(help, Place::Screen))?;
         }
         Ok(())
     }

@@ -39,6 +39,7 @@ pub mod spectrum;
 pub mod statistics;
 pub mod study;
 pub mod tabulate;
+pub mod text;
 pub mod thermal;
 pub mod timing;
 pub mod trace_file;

@@ -107,13 +107,13 @@ impl<A: Arithmetic> Block<A, 1, 1> for AmplitudeLoop {
         [magnitude]: [A::Word; 1],
     ) -> [A::Word; 1] {
         let counts = ar.read_as(magnitude, self.magnitude_fraction_bits);
-        let error = ar.sub(ar.constant(self.setpoint, 0), counts);
-        let sum = ar.add(state.integrator, error);
+        let error = ar.named(ar.sub(ar.constant(self.setpoint, 0), counts), "error");
+        let sum = ar.named(ar.add(state.integrator, error), "integrated");
         state.integrator = ar.limit(sum, 0, self.integrator_limit, 0);
-        let gain = ar.add(
-            ar.cast(error, &self.error_shift, &[]),
-            ar.cast(state.integrator, &self.integrator_shift, &[]),
-        );
+        let proportional = ar.named(ar.cast(error, &self.error_shift, &[]), "proportional");
+        let integral = ar.cast(state.integrator, &self.integrator_shift, &[]);
+        let gain = ar.add(proportional, ar.named(integral, "integral"));
+        let gain = ar.named(gain, "unlimited_gain");
         [ar.limit(gain, 0, self.gain_limit, 0)]
     }
 

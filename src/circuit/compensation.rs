@@ -211,7 +211,8 @@ impl Horner {
             let inner = ar.cast(ar.mul(t, p), cast, &[reported, p]);
             // Exact: the accumulator has at least the coefficients' fraction bits.
             let c = ar.constant(coefficient << (fine - coarse), fine);
-            t = ar.cast(ar.add(c, inner), &self.outer, &[c, inner]);
+            let partial_sum = ar.named(ar.add(c, inner), "partial_sum");
+            t = ar.cast(partial_sum, &self.outer, &[c, inner]);
             reported = t;
         }
         if let Some(tangent) = &self.tangent {
@@ -274,7 +275,10 @@ impl<A: Arithmetic> Block<A, 1, 1> for Bias {
         };
         let from_centre = match self.offset {
             0 => limited,
-            offset => ar.sub(limited, ar.constant(offset, self.input_fraction_bits)),
+            offset => {
+                let centre = ar.constant(offset, self.input_fraction_bits);
+                ar.named(ar.sub(limited, centre), "from_centre")
+            }
         };
         let p = ar.read_as(from_centre, self.read_exponent);
 
@@ -364,7 +368,8 @@ impl<A: Arithmetic> Block<A, 2, 1> for Rate {
 
     #[inline(always)]
     fn step(&self, ar: &A, _state: &mut (), [raw_rate, bias]: [A::Word; 2]) -> [A::Word; 1] {
-        let q = ar.cast(raw_rate, &self.scale, &[raw_rate]);
-        [ar.cast(ar.sub(q, bias), &self.output, &[q, bias])]
+        let q = ar.named(ar.cast(raw_rate, &self.scale, &[raw_rate]), "uncompensated");
+        let difference = ar.named(ar.sub(q, bias), "difference");
+        [ar.cast(difference, &self.output, &[q, bias])]
     }
 }

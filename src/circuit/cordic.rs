@@ -92,14 +92,20 @@ impl<A: Arithmetic> Block<A, 2, 2> for Vectoring {
         if let Some(polar) = ar.ideal_polar(i, q) {
             return polar;
         }
-        let x = ar.cast(i, &self.widen, &[i]);
-        let y = ar.cast(q, &self.widen, &[q]);
+        let x = ar.named(ar.cast(i, &self.widen, &[i]), "wide_i");
+        let y = ar.named(ar.cast(q, &self.widen, &[q]), "wide_q");
         let radius = ar.radius(x, y);
 
         // Into the right half plane by a quarter turn.
         let (left, below) = (ar.is_negative(x), ar.is_negative(y));
-        let minus_x = ar.wrap(ar.neg(x), self.width, self.fraction_bits);
-        let minus_y = ar.wrap(ar.neg(y), self.width, self.fraction_bits);
+        let minus_x = ar.named(
+            ar.wrap(ar.neg(x), self.width, self.fraction_bits),
+            "minus_i",
+        );
+        let minus_y = ar.named(
+            ar.wrap(ar.neg(y), self.width, self.fraction_bits),
+            "minus_q",
+        );
         let angle = self.angle_bits as i32;
         let quarter = 1i128 << (self.angle_bits - 2);
         let z_left = ar.select(
@@ -107,10 +113,15 @@ impl<A: Arithmetic> Block<A, 2, 2> for Vectoring {
             ar.constant(-quarter, angle),
             ar.constant(quarter, angle),
         );
+        let z_left = ar.named(z_left, "quarter_turn");
+        let x_left = ar.named(ar.select(below, minus_y, y), "turned_i");
+        let y_left = ar.named(ar.select(below, x, minus_x), "turned_q");
+        // Left of it stands |y|: not below zero, unless -y wraps.
+        let start_x = ar.named(ar.select(left, x_left, x), "start_x");
         let start = [
-            ar.select(left, ar.select(below, minus_y, y), x),
-            ar.select(left, ar.select(below, x, minus_x), y),
-            ar.select(left, z_left, ar.constant(0, angle)),
+            ar.not_negative(start_x, radius, self.width),
+            ar.named(ar.select(left, y_left, y), "start_y"),
+            ar.named(ar.select(left, z_left, ar.constant(0, angle)), "start_z"),
         ];
 
         let [x, _, phase] = ar.repeat(self.iterations, start, radius, self);
@@ -130,16 +141,22 @@ impl<A: Arithmetic> LoopBody<A, 3> for Vectoring {
         [x, y, z]: [A::Word; 3],
         radius: &mut A::Radius,
     ) -> [A::Word; 3] {
+        let (x, y, z) = (ar.named(x, "x"), ar.named(y, "y"), ar.named(z, "z"));
         let below = ar.is_negative(y);
-        let dx = ar.shift_right_by(y, index);
-        let dy = ar.shift_right_by(x, index);
-        let dz = ar.entry(&self.angles, index);
+        let dx = ar.named(ar.shift_right_by(y, index), "step_x");
+        let dy = ar.named(ar.shift_right_by(x, index), "step_y");
+        let dz = ar.named(ar.entry(&self.angles, index), "step_z");
         let next_x = ar.select(below, ar.sub(x, dx), ar.add(x, dx));
         let next_y = ar.select(below, ar.add(y, dy), ar.sub(y, dy));
         let next_z = ar.select(below, ar.sub(z, dz), ar.add(z, dz));
+        let next_y = ar.named(next_y, "next_y");
+        let next_z = ar.named(next_z, "next_z");
         let longer = ar.rotated(*radius, index);
+        // Toward y = 0 means that x grows by |y|, floored: from x >= 0 it stays there, unless it wraps.
+        let next_x = ar.not_negative(ar.bounded(next_x, longer), longer, self.width);
+        let next_x = ar.named(next_x, "next_x");
         let next = [
-            ar.wrap(ar.bounded(next_x, longer), self.width, self.fraction_bits),
+            ar.wrap(next_x, self.width, self.fraction_bits),
             ar.wrap(ar.bounded(next_y, longer), self.width, self.fraction_bits),
             ar.wrap(next_z, self.angle_bits, self.angle_bits as i32),
         ];

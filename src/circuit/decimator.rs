@@ -161,7 +161,10 @@ impl<A: Arithmetic, const N: usize> Block<A, 0, 1> for Decimate<'_, N> {
             delays[0] = input;
         }
         let sum = ar.centered(carried, &cic.ring);
-        let sum = ar.within(sum, cic.sum_range.low, cic.sum_range.high);
+        let sum = ar.named(
+            ar.within(sum, cic.sum_range.low, cic.sum_range.high),
+            "comb_sum",
+        );
         [ar.cast(sum, &cic.output, &[sum])]
     }
 

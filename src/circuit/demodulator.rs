@@ -72,7 +72,7 @@ impl<A: Arithmetic> Block<A, 2, 1> for Mixer {
 
     #[inline(always)]
     fn step(&self, ar: &A, _state: &mut (), [code, carrier]: [A::Word; 2]) -> [A::Word; 1] {
-        let exact = ar.mul(code, carrier);
+        let exact = ar.named(ar.mul(code, carrier), "exact");
         [ar.cast(exact, &self.product, &[code, carrier])]
     }
 }

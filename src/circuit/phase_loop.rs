@@ -109,11 +109,18 @@ impl<A: Arithmetic> Block<A, 1, 1> for PhaseLoop {
         [phase]: [A::Word; 1],
     ) -> [A::Word; 1] {
         let angle = self.angle_bits as i32;
-        let off = ar.sub(phase, self.setpoint(ar));
-        let error = ar.read_as(ar.wrap(off, self.angle_bits, angle), angle);
+        let off = ar.named(ar.sub(phase, self.setpoint(ar)), "difference");
+        let error = ar.named(ar.wrap(off, self.angle_bits, angle), "error");
+        let error = ar.read_as(error, angle);
         state.integral = ar.cast(ar.add(state.integral, error), &self.accumulate, &[]);
-        let p = ar.mul(error, ar.constant(self.proportional, 0));
-        let i = ar.mul(state.integral, ar.constant(self.integral, 0));
+        let p = ar.named(
+            ar.mul(error, ar.constant(self.proportional, 0)),
+            "proportional",
+        );
+        let i = ar.named(
+            ar.mul(state.integral, ar.constant(self.integral, 0)),
+            "weighted_integral",
+        );
         [ar.add(
             ar.cast(p, &self.proportional_shift, &[]),
             ar.cast(i, &self.integral_shift, &[]),

@@ -124,9 +124,10 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
             Effort::default(),
         )?;
         watch.stage("emitting and verifying");
-        let sources = sources(&closed, &design.name)?;
+        let prefix = correction::prefix(&design.name);
+        let sources = sources(&closed, &prefix)?;
         let compared = if arguments.verify {
-            compared(&mut closed, &record, &sources, &design.name)?
+            compared(&mut closed, &record, &sources, &prefix)?
         } else {
             None
         };

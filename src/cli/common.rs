@@ -96,8 +96,7 @@ pub(super) fn with_bar<T>(work: impl FnOnce(crate::selftest::Progress<'_>) -> T)
 
 /// Indented JSON with a final newline: what is written and what `--format json` prints.
 pub(super) fn json<T: serde::Serialize>(value: &T) -> String {
-    // Structures of strings and finite numbers always have a JSON form.
-    serde_json::to_string_pretty(value).unwrap_or_default() + "\n"
+    crate::text::json(value)
 }
 
 /// Emitted code among the results, below a folder.

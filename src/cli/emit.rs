@@ -106,7 +106,7 @@ fn correction(design: &Design, language: Language, command: &str) -> Result<Vec<
             .help("take the design.toml that `gyrogen close` writes, or emit another part")
     })?;
     let origin = Origin {
-        prefix: &design.name,
+        prefix: &correction::prefix(&design.name),
         sha256: &design.source.sha256,
         command,
     };

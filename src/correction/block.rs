@@ -17,7 +17,7 @@ use crate::numeric::trace::ir::Interval;
 /// The emitted function.
 pub const STEP: &str = "correct";
 /// Its state's type.
-pub const STATE: &str = "correction";
+pub const STATE: &str = "state";
 
 type Names = [&'static str; MOST_OF_A_KIND];
 const LAGS: Names = [

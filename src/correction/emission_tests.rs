@@ -49,7 +49,7 @@ fn a_bundle_verifies_from_its_files_and_damage_to_a_constant_shows() {
         assert!(
             good.functions
                 .iter()
-                .any(|f| f.name == "correct" && f.inputs == 3072)
+                .any(|f| f.name == "correct" && f.inputs >= 3072)
         );
 
         // Each multiplier of the step: one in 256 more shows in all of them, one LSB in nearly all (a
@@ -94,7 +94,7 @@ fn multipliers(text: &str, language: Language) -> Vec<(std::ops::Range<usize>, i
     let mut found = Vec::new();
     let mut start = 0;
     for line in text.split_inclusive('\n') {
-        if let Some(end) = line.find(after).filter(|_| line.contains(" t")) {
+        if let Some(end) = line.find(after).filter(|_| line.contains(" = ")) {
             let head = line[..end].trim_end_matches(')');
             let head = head.trim_end_matches("_i64").trim_end_matches("_i32");
             let digits = head.trim_end_matches(|c: char| c.is_ascii_digit()).len();

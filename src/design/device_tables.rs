@@ -9,47 +9,63 @@ use super::units;
 use crate::error::Result;
 use std::collections::BTreeMap;
 
-/// Words that C or Rust keep for themselves.
+/// Words that C, C++ or Rust keep for themselves.
 const KEYWORDS: &str = " \
-    abstract alignas alignof as asm async auto await become bool box break case char class const \
-    constexpr continue crate default do double dyn else enum extern false final float fn for gen \
-    goto if impl in inline int let long loop macro match mod move mut nullptr override priv pub \
-    ref register restrict return self short signed sizeof static static_assert struct super \
-    switch thread_local trait true try type typedef typeof typeof_unqual union unsafe unsigned \
-    unsized use virtual void volatile where while yield ";
+    abstract alignas alignof and and_eq as asm async auto await become bitand bitor bool box break case catch char \
+    class compl concept const consteval constexpr constinit continue crate decltype default delete do double dyn else \
+    enum explicit export extern false final float fn for friend gen goto if impl in inline int let long loop macro \
+    match mod move mut mutable namespace new noexcept not not_eq nullptr operator or or_eq override priv private \
+    protected pub public ref register requires restrict return self short signed sizeof static static_assert struct \
+    super switch template this thread_local throw trait true try type typedef typeid typename typeof typeof_unqual \
+    union unsafe unsigned unsized use using virtual void volatile where while xor xor_eq yield ";
 
 /// Names whose C type `NAME_t`, or whose Rust crate, exists already.
 const TAKEN: &str = " \
-    alloc clock core div double_ fenv float_ imaxdiv int16 int32 int64 int8 int_fast16 int_fast32 \
-    int_fast64 int_fast8 int_least16 int_least32 int_least64 int_least8 intmax intptr ldiv lldiv \
-    max_align mbstate off proc_macro ptrdiff size ssize std test time uint16 uint32 uint64 uint8 \
-    uint_fast16 uint_fast32 uint_fast64 uint_fast8 uint_least16 uint_least32 uint_least64 \
-    uint_least8 uintmax uintptr wchar wint ";
+    alloc blkcnt blksize clock clockid core daddr dev div errno fenv fexcept fpos fsblkcnt fsfilcnt fsid gid id imaxdiv \
+    ino int16 int32 int64 int8 int_fast16 int_fast32 int_fast64 int_fast8 int_least16 int_least32 int_least64 \
+    int_least8 intmax intptr key ldiv lldiv loff max_align mbstate mode nlink off pid proc_macro ptrdiff quad rsize sig_atomic size ssize std suseconds test time timer u_int16 u_int32 u_int64 u_int8 u_quad uid uint16 uint32 \
+    uint64 uint8 uint_fast16 uint_fast32 uint_fast64 uint_fast8 uint_least16 uint_least32 uint_least64 uint_least8 \
+    uintmax uintptr useconds va_list wchar wctrans wctype wint ";
 
-/// Reads `name`: a C identifier, as it is the prefix of everything that is emitted.
+/// Reads `name`: the prefix of everything that is emitted, in C and in C++, and the name of a crate in Rust.
 pub(super) fn name(value: Value) -> Result<String> {
     let name = value.text("the design's name")?;
-    let reason = if name.is_empty() {
-        "is empty"
+    match unfit(name) {
+        None => Ok(name.to_owned()),
+        Some(reason) => Err(value
+            .error(format!("= {} {reason}", value.shown()))
+            .help(NAME_HELP)
+            .into()),
+    }
+}
+
+/// What a name has to look like.
+pub const NAME_HELP: &str = "start with a lower-case ASCII letter, go on with such letters, digits and single `_`, such as \"gyro_a\"";
+
+/// Why a name cannot be the prefix of emitted code, if it cannot.
+pub fn unfit(name: &str) -> Option<&'static str> {
+    let is_letter = |b: u8| b.is_ascii_alphanumeric() || b == b'_';
+    if name.is_empty() {
+        Some("is empty")
     } else if name.len() > 63 {
-        "has more than 63 characters"
+        Some("has more than 63 characters")
     } else if name.starts_with('_') {
-        "begins with an underscore, which C reserves"
+        Some("begins with an underscore, which C reserves")
     } else if KEYWORDS.contains(&format!(" {name} ")) {
-        "is a keyword of C or Rust"
+        Some("is a keyword of C, C++ or Rust")
     } else if TAKEN.contains(&format!(" {name} ")) {
-        "is the name of a standard type or crate"
-    } else if name.starts_with(|c: char| c.is_ascii_digit())
-        || !name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_')
-    {
-        "is no C identifier"
+        Some("is the name of a standard type or crate")
+    } else if name.starts_with(|c: char| c.is_ascii_digit()) || !name.bytes().all(is_letter) {
+        Some("is no C identifier")
+    } else if name.bytes().any(|b| b.is_ascii_uppercase()) {
+        Some("has capitals, and the name of a crate in Rust has none")
+    } else if name.contains("__") {
+        Some("has two underscores in a row, which C++ reserves")
+    } else if name.ends_with('_') {
+        Some("ends with an underscore")
     } else {
-        return Ok(name.to_owned());
-    };
-    Err(value
-        .error(format!("= {} {reason}", value.shown()))
-        .help("start with an ASCII letter, go on with letters, digits and `_`, such as \"gyro_a\"")
-        .into())
+        None
+    }
 }
 
 /// Reads `[gyro]`.

@@ -10,6 +10,10 @@ use std::fmt::Write as _;
 /// The C type.
 pub fn type_name(prefix: &str, ty: Type) -> String {
     match ty {
+        Type::Signed(Width::W8) => "int8_t".into(),
+        Type::Signed(Width::W16) => "int16_t".into(),
+        Type::Unsigned(Width::W8) => "uint8_t".into(),
+        Type::Unsigned(Width::W16) => "uint16_t".into(),
         Type::Signed(Width::W32) => "int32_t".into(),
         Type::Signed(Width::W64) => "int64_t".into(),
         Type::Unsigned(Width::W32) => "uint32_t".into(),
@@ -39,6 +43,9 @@ pub fn constant(prefix: &str, raw: i128, ty: Type) -> String {
             (raw as u128 >> 64) as u64,
             raw as u64
         ),
+        Type::Signed(Width::W8 | Width::W16) | Type::Unsigned(Width::W8 | Width::W16) => {
+            format!("({}){raw}", type_name(prefix, ty))
+        }
         Type::Bool => if raw == 0 { "false" } else { "true" }.into(),
     }
 }
@@ -117,10 +124,18 @@ struct Printer<'a> {
 impl Printer<'_> {
     fn value(&self, v: &Typed) -> String {
         match v.value {
-            Value::Temp(k) => format!("t{k}"),
+            Value::Temp(k) => match self.lowered.written_out.get(&k) {
+                // A cast binds closer than any operator.
+                Some((ty, expr)) => self.expression(expr, *ty),
+                None => self.lowered.names[k].clone(),
+            },
             Value::Constant(raw) => constant(self.prefix, raw, v.ty),
             Value::Input(k) => self.function.inputs[k].0.name.to_owned(),
         }
+    }
+
+    fn name(&self, k: usize) -> &str {
+        &self.lowered.names[k]
     }
 
     fn state(&self, slot: usize, element: usize) -> String {
@@ -139,12 +154,17 @@ impl Printer<'_> {
                 Statement::Let(k, ty, expr, range) => {
                     let ty_name = type_name(self.prefix, *ty);
                     let expr = self.expression(expr, *ty);
-                    let comment = comment(*range);
-                    _ = writeln!(text, "{indent}const {ty_name} t{k} = {expr};{comment}");
+                    let comment = comment(self.lowered.notes.get(k), *range);
+                    _ = writeln!(
+                        text,
+                        "{indent}const {ty_name} {} = {expr};{comment}",
+                        self.name(*k)
+                    );
                 }
                 Statement::Carry(k, ty, init) => {
                     let ty_name = type_name(self.prefix, *ty);
-                    _ = writeln!(text, "{indent}{ty_name} t{k} = {};", self.value(init));
+                    let name = self.name(*k);
+                    _ = writeln!(text, "{indent}{ty_name} {name} = {};", self.value(init));
                 }
                 Statement::Loop(count, inner) => {
                     _ = writeln!(
@@ -156,7 +176,7 @@ impl Printer<'_> {
                 }
                 Statement::Next(values) => {
                     for (k, v) in values {
-                        _ = writeln!(text, "{indent}t{k} = {};", self.value(v));
+                        _ = writeln!(text, "{indent}{} = {};", self.name(*k), self.value(v));
                     }
                 }
                 Statement::Call(number, arguments, results) => {
@@ -194,14 +214,15 @@ impl Printer<'_> {
             [] => _ = writeln!(text, "{indent}{call};"),
             [(k, ty)] => {
                 let ty = type_name(self.prefix, *ty);
-                _ = writeln!(text, "{indent}const {ty} t{k} = {call};");
+                _ = writeln!(text, "{indent}const {ty} {} = {call};", self.name(*k));
             }
             several => {
                 let ty = result_type(self.bundle, site.function);
                 _ = writeln!(text, "{indent}const {ty} c{number} = {call};");
                 for ((k, ty), (name, _)) in several.iter().zip(&lowered.outputs) {
                     let ty = type_name(self.prefix, *ty);
-                    _ = writeln!(text, "{indent}const {ty} t{k} = c{number}.{name};");
+                    let result = self.name(*k);
+                    _ = writeln!(text, "{indent}const {ty} {result} = c{number}.{name};");
                 }
             }
         }
@@ -251,8 +272,24 @@ impl Printer<'_> {
             Expr::Neg(a) => format!("-{}", v(a)),
             Expr::Asr(a, n) if wide => format!("{p}_w128_asr({}, {n}U)", v(a)),
             Expr::Asr(a, n) => format!("{p}_asr_{}({}, {n}U)", bits(a), v(a)),
+            Expr::ShrPositive(a, n) if wide => format!("{p}_w128_shr({}, {n}U)", v(a)),
+            Expr::ShrPositive(a, n) => {
+                let unsigned = match a.ty {
+                    Type::Signed(width) => type_name(p, Type::Unsigned(width)),
+                    ty => type_name(p, ty),
+                };
+                cast(format!("(({unsigned}){} >> {n}U)", v(a)))
+            }
+            Expr::ShrIndex(a) if wide => format!("{p}_w128_shr({}, i)", v(a)),
+            Expr::ShrIndex(a) => {
+                let unsigned = match a.ty {
+                    Type::Signed(width) => type_name(p, Type::Unsigned(width)),
+                    ty => type_name(p, ty),
+                };
+                cast(format!("(({unsigned}){} >> i)", v(a)))
+            }
             Expr::AsrIndex(a) if wide => format!("{p}_w128_asr({}, i)", v(a)),
-            Expr::AsrIndex(a) => format!("{p}_asr_{}({}, i)", bits(a), v(a)),
+            Expr::AsrIndex(a) => format!("{p}_asr_by_{}({}, i)", bits(a), v(a)),
             Expr::Shl(a, n) if wide => format!("{p}_w128_shl({}, {n}U)", v(a)),
             Expr::Shl(a, n) => cast(format!("({} << {n}U)", v(a))),
             Expr::Shr(a, n) if wide => format!("{p}_w128_shr({}, {n}U)", v(a)),
@@ -269,7 +306,7 @@ impl Printer<'_> {
             Expr::ToSigned(a) if bits(a) == 128 => cast(format!("{}.lo", v(a))),
             Expr::ToSigned(a) => cast(v(a)),
             Expr::IsNegative(a) if bits(a) == 128 => format!("{p}_w128_is_negative({})", v(a)),
-            Expr::IsNegative(a) => format!("({} < {})", v(a), constant(p, 0, a.ty)),
+            Expr::IsNegative(a) => format!("{} < {}", v(a), constant(p, 0, a.ty)),
             Expr::Select(t, a, b) => format!("{} ? {} : {}", v(t), v(a), v(b)),
             Expr::Clamp(a, low, high) => format!(
                 "{p}_clamp_{}({}, {}, {})",
@@ -299,10 +336,12 @@ impl Printer<'_> {
     }
 }
 
-/// The range of a word, as a comment.
-fn comment(range: Option<Interval>) -> String {
-    match range {
-        Some(r) => format!(" /* {} .. {} */", r.low, r.high),
-        None => String::new(),
+/// What a word is and its range, as a comment.
+fn comment(note: Option<&String>, range: Option<Interval>) -> String {
+    let range = range.map(|r| format!("{} .. {}", r.low, r.high));
+    let words: Vec<String> = note.cloned().into_iter().chain(range).collect();
+    match words.as_slice() {
+        [] => String::new(),
+        words => format!(" /* {} */", words.join("; ")),
     }
 }

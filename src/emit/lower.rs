@@ -5,46 +5,65 @@
 //! has to spell the operations.
 
 use super::machine::{
-    Expr, Lowered, Statement, Type, Typed, Value, Width, residue_type, visit_operands, word_type,
+    Expr, Lowered, Statement, Type, Typed, Value, Width, parameter_type, residue_type, word_type,
 };
+use super::{guard, modular, names, tidy};
 use crate::numeric::trace::ir::{Function, Id, Interval, Op, Program, SlotKind};
 use crate::numeric::trace::lanes::is_word;
+use std::collections::BTreeMap;
 
 /// Lowers every function of a program, callees first.
 pub fn lower(program: &Program) -> Vec<Lowered> {
     let mut lowered: Vec<Lowered> = Vec::new();
     for function in &program.functions {
-        let mut lowering = Lowering::new(program, function);
-        lowering.body();
         let called = function.calls.iter().any(|c| lowered[c.function].may_fault);
-        lowered.push(lowering.finish(called));
+        let of = |guarded: bool| {
+            let mut lowering = Lowering::new(program, function, guarded);
+            lowering.body();
+            lowering.finish(called)
+        };
+        // Inputs are limited to their ranges where words outside could overflow.
+        let plain = of(false);
+        lowered.push(match guard::is_safe(program, function, &plain) {
+            true => plain,
+            false => of(true),
+        });
     }
     lowered
 }
 
 /// A function being lowered.
 pub(super) struct Lowering<'a> {
-    program: &'a Program,
+    pub(super) program: &'a Program,
     pub(super) function: &'a Function,
     /// The lowered value of each node.
     values: Vec<Option<Typed>>,
     /// Residue width of modular nodes.
-    modular: Vec<Option<Width>>,
+    pub(super) modular: Vec<Option<Width>>,
     /// Open statement lists: the function's, and a loop's inside it.
     blocks: Vec<Vec<Statement>>,
-    temps: usize,
+    /// The name that each temporary asks for.
+    pub(super) wishes: Vec<String>,
+    notes: BTreeMap<usize, String>,
+    /// What each conversion converts.
+    converted: BTreeMap<usize, Typed>,
+    /// Inputs are limited to their ranges.
+    pub(super) guarded: bool,
     pub(super) may_fault: bool,
 }
 
 impl<'a> Lowering<'a> {
-    fn new(program: &'a Program, function: &'a Function) -> Self {
+    fn new(program: &'a Program, function: &'a Function, guarded: bool) -> Self {
         Lowering {
             program,
             function,
             values: vec![None; function.nodes.len()],
-            modular: modular_widths(function),
+            modular: modular::widths(function),
             blocks: vec![Vec::new()],
-            temps: 0,
+            wishes: Vec::new(),
+            notes: BTreeMap::new(),
+            converted: BTreeMap::new(),
+            guarded,
             may_fault: false,
         }
     }
@@ -69,17 +88,22 @@ impl<'a> Lowering<'a> {
             self.emit(Statement::Store(*slot, *element, store));
         }
         let mut body = self.blocks.pop().unwrap_or_default();
-        drop_unused(&mut body, &outputs);
+        tidy::drop_unused(&mut body, &outputs);
+        let written_out = tidy::write_out_conversions(&mut body, &outputs);
         Lowered {
             inputs: self
                 .function
                 .inputs
                 .iter()
-                .map(|(_, r)| word_type(*r))
+                .map(|(_, r)| parameter_type(*r))
                 .collect(),
+            names: names::distinct(self.program, self.function, &body, &self.wishes),
             outputs,
             body,
             may_fault: self.may_fault || called,
+            guarded: self.guarded,
+            notes: self.notes,
+            written_out,
         }
     }
 
@@ -89,13 +113,29 @@ impl<'a> Lowering<'a> {
         }
     }
 
-    fn temp(&mut self) -> usize {
-        self.temps += 1;
-        self.temps - 1
+    fn temp(&mut self, wish: impl Into<String>) -> usize {
+        self.wishes.push(wish.into());
+        self.wishes.len() - 1
+    }
+
+    /// Gives the temporary a name.
+    pub(super) fn call_it(&mut self, v: Typed, name: &str) -> Typed {
+        if let Value::Temp(k) = v.value {
+            name.clone_into(&mut self.wishes[k]);
+        }
+        v
+    }
+
+    /// Says what the temporary is, in words.
+    pub(super) fn note(&mut self, v: Typed, what: String) {
+        if let Value::Temp(k) = v.value {
+            self.notes.entry(k).or_insert(what);
+        }
     }
 
     pub(super) fn bind(&mut self, ty: Type, expr: Expr, range: Option<Interval>) -> Typed {
-        let temp = self.temp();
+        let wish = names::of_operation(self.program, self.function, &expr);
+        let temp = self.temp(wish);
         self.emit(Statement::Let(temp, ty, expr, range));
         Typed {
             value: Value::Temp(temp),
@@ -116,7 +156,16 @@ impl<'a> Lowering<'a> {
         match v.value {
             _ if v.ty == ty => v,
             Value::Constant(_) => Typed { value: v.value, ty },
-            _ => self.bind(ty, Expr::Convert(v), None),
+            Value::Temp(k) if self.converted.get(&k).is_some_and(|from| from.ty == ty) => {
+                self.converted[&k]
+            }
+            _ => {
+                let converted = self.bind(ty, Expr::Convert(v), None);
+                if let Value::Temp(k) = converted.value {
+                    self.converted.insert(k, v);
+                }
+                converted
+            }
         }
     }
 
@@ -174,27 +223,42 @@ impl<'a> Lowering<'a> {
             let range = self.function.nodes[phi]
                 .range
                 .join(self.function.nodes[out].range);
-            let ty = word_type(range);
+            let deferred = modular::deferred(self.function, number, k);
             let init = self.value(*init);
-            let init = self.convert(init, ty);
-            let temp = self.temp();
+            let (init, ty) = match deferred {
+                Some(d) => {
+                    let width = Width::of_bits(d.bits);
+                    (self.low(init, width), Type::Unsigned(width))
+                }
+                None => (self.convert(init, word_type(range)), word_type(range)),
+            };
+            let temp =
+                self.temp(names::of_node(self.function, phi).unwrap_or_else(|| "carried".into()));
             self.emit(Statement::Carry(temp, ty, init));
             let variable = Typed {
                 value: Value::Temp(temp),
                 ty,
             };
             self.values[phi] = Some(variable);
-            carried.push((temp, ty));
+            carried.push((temp, ty, deferred));
         }
         self.blocks.push(Vec::new());
         for id in l.start + l.inits.len()..l.end {
             self.node(id);
         }
         let mut next = Vec::new();
-        for ((temp, ty), out) in carried.iter().zip(&l.outs) {
-            let value = self.value(*out);
-            let mut value = self.convert(value, *ty);
-            let is_variable = carried.iter().any(|(t, _)| value.value == Value::Temp(*t));
+        for ((temp, ty, deferred), out) in carried.iter().zip(&l.outs) {
+            let mut value = match deferred {
+                Some(d) => {
+                    let value = self.value(d.before);
+                    self.low(value, Width::of_bits(d.bits))
+                }
+                None => {
+                    let value = self.value(*out);
+                    self.convert(value, *ty)
+                }
+            };
+            let is_variable = carried.iter().any(|(t, ..)| value.value == Value::Temp(*t));
             if is_variable && value.value != Value::Temp(*temp) {
                 // Assigned one after the other: keep the old value of another variable.
                 value = self.bind(*ty, Expr::Convert(value), None);
@@ -209,11 +273,21 @@ impl<'a> Lowering<'a> {
             if let Op::LoopOut(n, k) = self.function.nodes[id].op
                 && n == number
             {
-                let (temp, ty) = carried[k];
-                self.values[id] = Some(Typed {
+                let (temp, ty, deferred) = carried[k];
+                let mut last = Typed {
                     value: Value::Temp(temp),
                     ty,
-                });
+                };
+                if let Some(d) = deferred {
+                    let range = self.function.nodes[id].range;
+                    last = self.sign_extend(last, d.bits, word_type(range), range);
+                    if let (Value::Temp(t), Some(name)) =
+                        (last.value, names::of_node(self.function, id))
+                    {
+                        self.wishes[t] = name;
+                    }
+                }
+                self.values[id] = Some(last);
             }
         }
     }
@@ -230,11 +304,9 @@ impl<'a> Lowering<'a> {
             Type::Bool
         };
         let comment = Some(range);
+        let before = self.wishes.len();
         let lowered = match node.op.clone() {
-            Op::Input(k) => Typed {
-                value: Value::Input(k),
-                ty: word_type(self.function.inputs[k].1),
-            },
+            Op::Input(k) => self.input(k),
             Op::Constant(raw) => Self::constant(raw, ty),
             Op::LoadWord(slot, element) => self.bind(ty, Expr::Load(slot, element), comment),
             Op::LoadResidue(slot, element) => {
@@ -263,7 +335,14 @@ impl<'a> Lowering<'a> {
                     self.bind(ty, Expr::Neg(a), comment)
                 }
             },
-            Op::Cast(a, number) => self.cast(a, &self.program.casts[number], ty, range),
+            Op::Cast(a, number) => {
+                let cast = &self.program.casts[number];
+                let v = self.cast(a, cast, ty, range);
+                if matches!(v.value, Value::Temp(k) if k >= before) {
+                    self.note(v, names::of_cast(cast));
+                }
+                v
+            }
             Op::Wrap(a, bits) => {
                 let before = self.function.nodes[a].range;
                 let v = self.value(a);
@@ -281,7 +360,13 @@ impl<'a> Lowering<'a> {
             }
             Op::IsNegative(a) => {
                 let a = self.value(a);
-                self.bind(Type::Bool, Expr::IsNegative(a), None)
+                let name = match a.value {
+                    Value::Temp(k) => self.wishes[k].clone(),
+                    Value::Input(k) => self.function.inputs[k].0.name.to_owned(),
+                    Value::Constant(_) => "constant".to_owned(),
+                };
+                let test = self.bind(Type::Bool, Expr::IsNegative(a), None);
+                self.call_it(test, &format!("{name}_is_negative"))
             }
             Op::Select(t, a, b) => {
                 let (t, a, b) = (self.value(t), self.value(a), self.value(b));
@@ -320,10 +405,15 @@ impl<'a> Lowering<'a> {
                 self.bind(ty, Expr::Lookup(table, index), comment)
             }
             Op::ShiftByIndex(a) => {
-                let before = word_type(self.function.nodes[a].range);
+                let operand = self.function.nodes[a].range;
+                let before = word_type(operand);
                 let a = self.value(a);
                 let a = self.convert(a, before);
-                let shifted = self.bind(before, Expr::AsrIndex(a), comment);
+                let shifted = match operand.low >= 0 {
+                    true => Expr::ShrIndex(a),
+                    false => Expr::AsrIndex(a),
+                };
+                let shifted = self.bind(before, shifted, comment);
                 self.convert(shifted, ty)
             }
             Op::Entry(table) => self.bind(ty, Expr::Entry(table), comment),
@@ -336,87 +426,12 @@ impl<'a> Lowering<'a> {
             Op::CallOut(..) => return,
         };
         self.values[id] = Some(lowered);
-    }
-
-    fn sum(&mut self, id: Id, a: Id, b: Id, make: fn(Typed, Typed) -> Expr) -> Typed {
-        let (a, b) = (self.value(a), self.value(b));
-        if let Some(width) = self.modular[id] {
-            let (a, b) = (self.low(a, width), self.low(b, width));
-            return self.bind(Type::Unsigned(width), make(a, b), None);
+        // What was made for this node has the node's name.
+        if let (Value::Temp(k), Some(name)) = (lowered.value, names::of_node(self.function, id))
+            && k >= before
+        {
+            self.wishes[k] = name;
         }
-        self.in_common(a, b, self.function.nodes[id].range, make)
-    }
-
-    /// Computes in a type that holds both operands and the result: a range narrowed by a proof and a
-    /// product with zero may be smaller than the operands'.
-    fn in_common(
-        &mut self,
-        a: Typed,
-        b: Typed,
-        range: Interval,
-        make: fn(Typed, Typed) -> Expr,
-    ) -> Typed {
-        let width = [a.ty, b.ty]
-            .iter()
-            .fold(Width::of_range(range), |w, ty| match ty {
-                Type::Signed(x) => w.max(*x),
-                _ => w,
-            });
-        let working = Type::Signed(width);
-        let (a, b) = (self.convert(a, working), self.convert(b, working));
-        let result = self.bind(working, make(a, b), Some(range));
-        self.convert(result, word_type(range))
-    }
-
-    /// The low `bits` bits of a value as a two's-complement number of type `ty`.
-    pub(super) fn sign_extend(&mut self, v: Typed, bits: u32, ty: Type, range: Interval) -> Typed {
-        let width = match v.ty {
-            Type::Unsigned(width) => width,
-            _ => Width::of_bits(bits),
-        };
-        let unsigned = self.low(v, width.min(Width::of_bits(bits)));
-        let signed = Type::Signed(Width::of_bits(bits));
-        let extended = self.bind(signed, Expr::SignExtend(unsigned, bits), Some(range));
-        self.convert(extended, ty)
-    }
-
-    pub(super) fn clamp(
-        &mut self,
-        v: Typed,
-        before: Interval,
-        low: i128,
-        high: i128,
-        ty: Type,
-    ) -> Typed {
-        if before.is_within(low, high) {
-            return self.convert(v, ty);
-        }
-        // Compared in a type that holds the value and both limits.
-        let working = word_type(before.join(Interval::new(low, high)));
-        let v = self.convert(v, working);
-        let range = Interval::new(before.low.clamp(low, high), before.high.clamp(low, high));
-        let limited = self.bind(working, Expr::Clamp(v, low, high), Some(range));
-        self.convert(limited, ty)
-    }
-
-    fn sine(&mut self, phase: Id, number: usize, ty: Type, range: Interval) -> Typed {
-        let table = &self.program.sine_tables[number];
-        let phase = self.value(phase);
-        let dropped = table.phase_bits - table.address_bits;
-        let stepped = if table.half_step && dropped > 0 {
-            let half = Self::constant(1i128 << (dropped - 1), phase.ty);
-            self.bind(phase.ty, Expr::Add(phase, half), None)
-        } else {
-            phase
-        };
-        let shifted = if dropped > 0 {
-            self.bind(phase.ty, Expr::Shr(stepped, dropped), None)
-        } else {
-            stepped
-        };
-        let index = self.low(shifted, Width::W32);
-        let masked = self.bind(index.ty, Expr::Mask(index, table.address_bits), None);
-        self.bind(ty, Expr::Sine(number, masked), Some(range))
     }
 
     fn call(&mut self, id: Id, number: usize) {
@@ -425,12 +440,13 @@ impl<'a> Lowering<'a> {
         let mut arguments = Vec::new();
         for (argument, (_, range)) in site.arguments.iter().zip(&callee.inputs) {
             let value = self.value(*argument);
-            arguments.push(self.convert(value, word_type(*range)));
+            arguments.push(self.convert(value, parameter_type(*range)));
         }
         let mut results = Vec::new();
-        for (k, (_, out)) in callee.outputs.iter().enumerate() {
+        for (k, (port, out)) in callee.outputs.iter().enumerate() {
             let ty = word_type(callee.nodes[*out].range);
-            let temp = self.temp();
+            let name = names::of_node(self.function, id + 1 + k);
+            let temp = self.temp(name.unwrap_or_else(|| port.name.to_owned()));
             results.push((temp, ty));
             self.values[id + 1 + k] = Some(Typed {
                 value: Value::Temp(temp),
@@ -439,61 +455,4 @@ impl<'a> Lowering<'a> {
         }
         self.emit(Statement::Call(number, arguments, results));
     }
-}
-
-/// Removes temporaries that nothing reads; notes of faults and calls stay.
-fn drop_unused(body: &mut Vec<Statement>, outputs: &[(&'static str, Typed)]) {
-    let mut used = std::collections::BTreeSet::new();
-    let mut note = |v: &Typed| {
-        if let Value::Temp(t) = v.value {
-            used.insert(t);
-        }
-    };
-    outputs.iter().for_each(|(_, v)| note(v));
-    visit_operands(body, &mut note);
-    let before = count(body);
-    retain(body, &|s| match s {
-        Statement::Let(t, _, expr, _) => used.contains(t) || matches!(expr, Expr::Check(..)),
-        _ => true,
-    });
-    if count(body) < before {
-        drop_unused(body, outputs);
-    }
-}
-
-fn count(body: &[Statement]) -> usize {
-    body.iter()
-        .map(|s| match s {
-            Statement::Loop(_, inner) => 1 + count(inner),
-            _ => 1,
-        })
-        .sum()
-}
-
-fn retain(body: &mut Vec<Statement>, keep: &dyn Fn(&Statement) -> bool) {
-    body.retain(|s| keep(s));
-    for s in body {
-        if let Statement::Loop(_, inner) = s {
-            retain(inner, keep);
-        }
-    }
-}
-
-/// For each modular node, how many low bits its users look at, as a width.
-fn modular_widths(function: &Function) -> Vec<Option<Width>> {
-    let modular = function.modular();
-    let mut bits = vec![0u32; function.nodes.len()];
-    for id in (0..function.nodes.len()).rev() {
-        let wanted = match function.nodes[id].op {
-            Op::Wrap(_, b) | Op::Residue(_, b) => b,
-            _ if modular[id] => bits[id],
-            _ => continue,
-        };
-        for operand in function.operands(id) {
-            bits[operand] = bits[operand].max(wanted);
-        }
-    }
-    (0..function.nodes.len())
-        .map(|id| modular[id].then(|| Width::of_bits(bits[id])))
-        .collect()
 }

@@ -74,7 +74,8 @@ impl Lowering<'_> {
             let working = word_type(intermediate.join(Interval::point(factor)));
             let v = self.convert(v, working);
             let factor = Self::constant(factor, working);
-            return self.bind(working, Expr::Mul(v, factor), Some(after));
+            let scaled = self.bind(working, Expr::Mul(v, factor), Some(after));
+            return self.call_it(scaled, "scaled");
         }
         let shift = cast.shift as u32;
         if shift >= 127 {
@@ -83,7 +84,7 @@ impl Lowering<'_> {
         let half = 1i128 << (shift - 1);
         let ones = half - 1 + half;
         if cast.rounding == Rounding::Floor {
-            return self.floor_shift(v, word_type(intermediate), shift, after);
+            return self.floor_shift(v, intermediate, shift, after);
         }
         // The constants have to fit too: a range below zero may be narrower than they are.
         let working = word_type(intermediate.join(Interval::new(0, ones)));
@@ -110,22 +111,23 @@ impl Lowering<'_> {
                 self.bind(working, Expr::Add(near, odd), None)
             }
         };
-        self.bind(working, Expr::Asr(biased, shift), Some(after))
+        let rounded = self.shift_right(biased, shift, intermediate, after);
+        self.call_it(rounded, "rounded")
     }
 
     /// Floor of v / 2^shift in a type that holds v, whatever its width: beyond it the sign is left.
-    fn floor_shift(&mut self, v: Typed, working: Type, shift: u32, after: Interval) -> Typed {
-        let Type::Signed(width) = working else {
-            return v;
-        };
-        let x = self.convert(v, working);
+    fn floor_shift(&mut self, v: Typed, before: Interval, shift: u32, after: Interval) -> Typed {
+        let width = Width::of_range(before);
+        let x = self.convert(v, Type::Signed(width));
         let count = shift.min(width.bits() - 1);
-        self.bind(working, Expr::Asr(x, count), Some(after))
+        let floor = self.shift_right(x, count, before, after);
+        self.call_it(floor, "floored")
     }
 
     fn plus(&mut self, x: Typed, constant: i128) -> Typed {
         let c = Self::constant(constant, x.ty);
-        self.bind(x.ty, Expr::Add(x, c), None)
+        let biased = self.bind(x.ty, Expr::Add(x, c), None);
+        self.call_it(biased, "biased")
     }
 
     fn plus_if_negative(&mut self, x: Typed, constant: i128) -> Typed {

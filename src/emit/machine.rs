@@ -1,10 +1,15 @@
 //! The typed machine operations that [`super::lower`] makes of a program and the printers spell.
 
 use crate::numeric::trace::ir::Interval;
+use std::collections::BTreeMap;
 
 /// A machine type.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Width {
+    /// 8 bits: parameters only.
+    W8,
+    /// 16 bits: parameters only.
+    W16,
     /// 32 bits.
     W32,
     /// 64 bits.
@@ -28,6 +33,8 @@ impl Width {
     /// Bits.
     pub fn bits(self) -> u32 {
         match self {
+            Width::W8 => 8,
+            Width::W16 => 16,
             Width::W32 => 32,
             Width::W64 => 64,
             Width::W128 => 128,
@@ -46,6 +53,14 @@ impl Width {
     /// The narrowest for an interval of signed words.
     pub fn of_range(range: Interval) -> Self {
         Width::of_bits(range.bits())
+    }
+
+    /// Every signed word of this width.
+    pub fn interval(self) -> Interval {
+        match self {
+            Width::W128 => Interval::new(i128::MIN, i128::MAX),
+            width => Interval::of_bits(width.bits()),
+        }
     }
 }
 
@@ -90,6 +105,10 @@ pub enum Expr {
     Asr(Typed, u32),
     /// Floor of a signed value / 2^index.
     AsrIndex(Typed),
+    /// A signed value / 2^index, where the value is never below zero.
+    ShrIndex(Typed),
+    /// A signed value / 2^count, where the value is never below zero.
+    ShrPositive(Typed, u32),
     /// Unsigned value * 2^count, modular.
     Shl(Typed, u32),
     /// Unsigned value / 2^count.
@@ -144,6 +163,14 @@ pub struct Lowered {
     pub body: Vec<Statement>,
     /// It (or a callee) may note a fault.
     pub may_fault: bool,
+    /// Its inputs are limited to their ranges.
+    pub guarded: bool,
+    /// The names of the temporaries.
+    pub names: Vec<String>,
+    /// What a temporary is, in words, where its name and its operation do not say it.
+    pub notes: BTreeMap<usize, String>,
+    /// Temporaries that are nothing but another one in another type: written where they are used.
+    pub written_out: BTreeMap<usize, (Type, Expr)>,
 }
 
 impl Lowered {
@@ -158,6 +185,8 @@ impl Lowered {
         };
         self.outputs.iter().for_each(|(_, v)| note(v));
         visit_operands(&self.body, &mut note);
+        let written_out = self.written_out.values();
+        written_out.for_each(|(_, expr)| expr.operands().iter().for_each(&mut note));
         (0..used.len()).filter(|k| !used[*k]).collect()
     }
 }
@@ -165,6 +194,15 @@ impl Lowered {
 /// The type of a state variable of `bits` bits.
 pub fn residue_type(bits: u32) -> Type {
     Type::Unsigned(Width::of_bits(bits))
+}
+
+/// The type of a parameter in `range`: the narrowest there is. Nothing is computed in fewer than 32 bits.
+pub fn parameter_type(range: Interval) -> Type {
+    Type::Signed(match range.bits() {
+        0..=8 => Width::W8,
+        9..=16 => Width::W16,
+        bits => Width::of_bits(bits),
+    })
 }
 
 /// The type of words in `range`.
@@ -194,7 +232,9 @@ impl Expr {
             | Expr::SignExtend(a, _)
             | Expr::Neg(a)
             | Expr::Asr(a, _)
+            | Expr::ShrPositive(a, _)
             | Expr::AsrIndex(a)
+            | Expr::ShrIndex(a)
             | Expr::Shl(a, _)
             | Expr::Shr(a, _)
             | Expr::Mask(a, _)

@@ -3,8 +3,13 @@
 
 pub mod bundle;
 pub mod c;
+mod guard;
 pub mod lower;
 mod lower_cast;
+mod lower_steps;
 pub mod machine;
+mod modular;
+mod names;
 pub mod rust;
+mod tidy;
 pub mod views;

@@ -3,12 +3,16 @@
 
 use super::bundle::Bundle;
 use super::machine::{Expr, Lowered, Statement, Type, Typed, Value, Width};
-use crate::numeric::trace::ir::Function;
+use crate::numeric::trace::ir::{Function, Interval};
 use std::fmt::Write as _;
 
 /// The Rust type.
 pub fn type_name(ty: Type) -> &'static str {
     match ty {
+        Type::Signed(Width::W8) => "i8",
+        Type::Signed(Width::W16) => "i16",
+        Type::Unsigned(Width::W8) => "u8",
+        Type::Unsigned(Width::W16) => "u16",
         Type::Signed(Width::W32) => "i32",
         Type::Signed(Width::W64) => "i64",
         Type::Signed(Width::W128) => "i128",
@@ -24,6 +28,7 @@ pub fn constant(raw: i128, ty: Type) -> String {
     match ty {
         Type::Unsigned(Width::W128) => format!("{}_u128", raw as u128),
         Type::Unsigned(Width::W64) => format!("{}_u64", raw as u64),
+        Type::Unsigned(width @ (Width::W8 | Width::W16)) => format!("{raw}_u{}", width.bits()),
         Type::Unsigned(Width::W32) => format!("{}_u32", raw as u32),
         Type::Signed(_) => format!("{raw}_{}", type_name(ty)),
         Type::Bool => (raw != 0).to_string(),
@@ -73,7 +78,13 @@ pub fn definition(bundle: &Bundle, number: usize) -> String {
     }
     let result = result_type(bundle, number).map_or(String::new(), |t| format!(" -> {t}"));
     let name = &function.name;
-    let mut text = format!("pub fn {name}({}){result} {{\n", parameters.join(", "));
+    // Of no use but for its result.
+    let must_use = match function.state.is_empty() && !lowered.outputs.is_empty() {
+        true => "#[must_use]\n",
+        false => "",
+    };
+    let mut text = must_use.to_owned();
+    text += &format!("pub fn {name}({}){result} {{\n", parameters.join(", "));
     for k in lowered.unused_inputs() {
         _ = writeln!(text, "    let _ = {};", function.inputs[k].0.name);
     }
@@ -102,10 +113,17 @@ struct Printer<'a> {
 impl Printer<'_> {
     fn value(&self, v: &Typed) -> String {
         match v.value {
-            Value::Temp(k) => format!("t{k}"),
+            Value::Temp(k) => match self.lowered.written_out.get(&k) {
+                Some((ty, expr)) => self.expression(expr, *ty),
+                None => self.lowered.names[k].clone(),
+            },
             Value::Constant(raw) => constant(raw, v.ty),
             Value::Input(k) => self.function.inputs[k].0.name.to_owned(),
         }
+    }
+
+    fn name(&self, k: usize) -> &str {
+        &self.lowered.names[k]
     }
 
     fn state(&self, slot: usize, element: usize) -> String {
@@ -123,19 +141,18 @@ impl Printer<'_> {
             match statement {
                 Statement::Let(k, ty, expr, range) => {
                     let expr = self.expression(expr, *ty);
-                    let comment = match range {
-                        Some(r) => format!(" // {} .. {}", r.low, r.high),
-                        None => String::new(),
-                    };
+                    let comment = comment(self.lowered.notes.get(k), *range);
                     _ = writeln!(
                         text,
-                        "{indent}let t{k}: {} = {expr};{comment}",
+                        "{indent}let {}: {} = {expr};{comment}",
+                        self.name(*k),
                         type_name(*ty)
                     );
                 }
                 Statement::Carry(k, ty, init) => {
                     let init = self.value(init);
-                    _ = writeln!(text, "{indent}let mut t{k}: {} = {init};", type_name(*ty));
+                    let name = self.name(*k);
+                    _ = writeln!(text, "{indent}let mut {name}: {} = {init};", type_name(*ty));
                 }
                 Statement::Loop(count, inner) => {
                     _ = writeln!(text, "{indent}for i in 0_u32..{count} {{");
@@ -144,7 +161,7 @@ impl Printer<'_> {
                 }
                 Statement::Next(values) => {
                     for (k, v) in values {
-                        _ = writeln!(text, "{indent}t{k} = {};", self.value(v));
+                        _ = writeln!(text, "{indent}{} = {};", self.name(*k), self.value(v));
                     }
                 }
                 Statement::Call(number, arguments, results) => {
@@ -180,12 +197,16 @@ impl Printer<'_> {
         let call = format!("{}({})", callee.name, passed.join(", "));
         match results {
             [] => _ = writeln!(text, "{indent}{call};"),
-            [(k, ty)] => _ = writeln!(text, "{indent}let t{k}: {} = {call};", type_name(*ty)),
+            [(k, ty)] => {
+                let name = self.name(*k);
+                _ = writeln!(text, "{indent}let {name}: {} = {call};", type_name(*ty));
+            }
             several => {
                 _ = writeln!(text, "{indent}let c{number} = {call};");
                 for ((k, ty), (name, _)) in several.iter().zip(&lowered.outputs) {
                     let ty = type_name(*ty);
-                    _ = writeln!(text, "{indent}let t{k}: {ty} = c{number}.{name};");
+                    let result = self.name(*k);
+                    _ = writeln!(text, "{indent}let {result}: {ty} = c{number}.{name};");
                 }
             }
         }
@@ -196,6 +217,9 @@ impl Printer<'_> {
         // `-1.f()` is `-(1.f())`.
         let receiver = |t: &Typed| match t.value {
             Value::Constant(raw) if raw < 0 => format!("({})", self.value(t)),
+            Value::Temp(k) if self.lowered.written_out.contains_key(&k) => {
+                format!("({})", self.value(t))
+            }
             _ => self.value(t),
         };
         let name = type_name(ty);
@@ -219,14 +243,14 @@ impl Printer<'_> {
             Expr::Sub(a, b) => format!("{}.wrapping_sub({})", receiver(a), v(b)),
             Expr::Mul(a, b) => format!("{}.wrapping_mul({})", receiver(a), v(b)),
             Expr::Neg(a) => format!("{}.wrapping_neg()", receiver(a)),
-            Expr::Asr(a, n) => format!("{} >> {n}", v(a)),
-            Expr::AsrIndex(a) => format!("{}.wrapping_shr(i)", receiver(a)),
-            Expr::Shl(a, n) => format!("{} << {n}", v(a)),
+            Expr::Asr(a, n) | Expr::ShrPositive(a, n) => format!("{} >> {n}", v(a)),
+            Expr::AsrIndex(a) | Expr::ShrIndex(a) => format!("{}.wrapping_shr(i)", receiver(a)),
+            Expr::Shl(a, n) => format!("{} << {n}", receiver(a)),
             Expr::Shr(a, n) => format!("{} >> {n}", v(a)),
             Expr::Mask(a, n) => {
                 format!("{} & {}", v(a), constant(((1u128 << n) - 1) as i128, a.ty))
             }
-            Expr::IsNegative(a) => format!("{} < 0", v(a)),
+            Expr::IsNegative(a) => format!("{} < 0", receiver(a)),
             Expr::Select(t, a, b) => format!("if {} {{ {} }} else {{ {} }}", v(t), v(a), v(b)),
             Expr::Clamp(a, low, high) => format!(
                 "{}.max({}).min({})",
@@ -257,5 +281,15 @@ impl Printer<'_> {
             }
             Expr::Load(slot, element) => self.state(*slot, *element),
         }
+    }
+}
+
+/// What a word is and its range, as a comment.
+fn comment(note: Option<&String>, range: Option<Interval>) -> String {
+    let range = range.map(|r| format!("{} .. {}", r.low, r.high));
+    let words: Vec<String> = note.cloned().into_iter().chain(range).collect();
+    match words.as_slice() {
+        [] => String::new(),
+        words => format!(" // {}", words.join("; ")),
     }
 }

@@ -3,7 +3,8 @@
 use super::bundle::{Bundle, StateType};
 use super::machine::{Type, Width};
 use super::{c, rust};
-use crate::numeric::trace::ir::Interval;
+use crate::numeric::trace::ir::{Interval, SlotKind};
+use crate::text::{self, Place};
 
 /// A language to print.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,6 +47,8 @@ pub struct StateView {
     pub camel: String,
     /// Declarations without `;` or `,`.
     pub variables: Vec<String>,
+    /// What each of them holds.
+    pub meanings: Vec<String>,
 }
 
 /// A structure that a function returns.
@@ -85,6 +88,8 @@ pub struct FunctionView {
     pub result: String,
     /// It may note a fault.
     pub faults: bool,
+    /// In C it is called by `push` alone and has no declaration in the header: compilers make one function of both.
+    pub internal: bool,
     /// It has no state and inputs of at most 64 bits: the self-test and the harness call it.
     pub tested: bool,
     /// Its inputs.
@@ -191,7 +196,7 @@ fn table(
             rust_type
         },
         len: entries.len(),
-        note,
+        note: text::shown(&note, Place::Source),
         lines: entries.chunks(10).map(line).collect(),
         number: k as u32 + 1,
         checksum: format!(
@@ -213,8 +218,9 @@ pub fn states(bundle: &Bundle, language: Language) -> Vec<StateView> {
 
 fn state(bundle: &Bundle, s: &StateType, language: Language) -> StateView {
     let p = &bundle.prefix;
-    let mut variables = Vec::new();
+    let (mut variables, mut meanings) = (Vec::new(), Vec::new());
     for (name, len, ty) in &s.variables {
+        meanings.push(kept(bundle, s.name, name));
         variables.push(match (language, len) {
             (Language::C, 1) => format!("{} {name}", c::type_name(p, *ty)),
             (Language::C, n) => format!("{} {name}[{n}]", c::type_name(p, *ty)),
@@ -223,6 +229,7 @@ fn state(bundle: &Bundle, s: &StateType, language: Language) -> StateView {
         });
     }
     for (name, ty) in &s.members {
+        meanings.push(format!("of the block `{name}`"));
         variables.push(match language {
             Language::C => format!("{p}_{ty}_t {name}"),
             Language::Rust => format!("{name}: {}", rust::camel(ty)),
@@ -232,6 +239,23 @@ fn state(bundle: &Bundle, s: &StateType, language: Language) -> StateView {
         name: s.name.to_owned(),
         camel: rust::camel(s.name),
         variables,
+        meanings,
+    }
+}
+
+/// What a variable of a state holds: the words that are proved for it.
+fn kept(bundle: &Bundle, state: &str, variable: &str) -> String {
+    let functions = bundle.program.functions.iter();
+    let mut slots = functions
+        .filter(|f| f.state == state)
+        .flat_map(|f| &f.slots);
+    match slots
+        .find(|slot| slot.name == variable)
+        .map(|slot| slot.kind)
+    {
+        Some(SlotKind::Word(range)) => format!("{} .. {}", range.low, range.high),
+        Some(SlotKind::Residue(bits)) => format!("modulo 2^{bits}"),
+        None => String::new(),
     }
 }
 
@@ -251,7 +275,7 @@ pub fn structs(bundle: &Bundle, language: Language) -> Vec<StructView> {
                 Language::C => format!("{} {name}", c::type_name(&bundle.prefix, v.ty)),
                 Language::Rust => format!("{name}: {}", rust::type_name(v.ty)),
             };
-            (declaration, port.meaning.clone())
+            (declaration, text::shown(&port.meaning, Place::Source))
         });
         structs.push(StructView {
             name: function.name.clone(),
@@ -289,6 +313,10 @@ fn function(bundle: &Bundle, k: usize, language: Language) -> FunctionView {
         }
     }
     notes.extend(guarantee(&function.name).map(str::to_owned));
+    let notes = notes
+        .iter()
+        .map(|n| text::shown(n, Place::Source))
+        .collect();
 
     let fault = match (lowered.may_fault, language) {
         (false, _) => "",
@@ -330,6 +358,7 @@ fn function(bundle: &Bundle, k: usize, language: Language) -> FunctionView {
             _ => format!("{p}_{}_out_t", function.name),
         },
         faults: lowered.may_fault,
+        internal: language == Language::C && bundle.has_chain && function.name == "sample",
         tested: false,
         inputs: inputs
             .map(|((_, range), t)| input(*range, ty(t), language))

@@ -17,6 +17,11 @@ pub struct Origin<'a> {
     pub command: &'a str,
 }
 
+/// The prefix of the correction in a product of this name, whose chain has the name itself: both link together.
+pub fn prefix(name: &str) -> String {
+    format!("{name}_correction")
+}
+
 /// Emits a correction in one language, as files in memory: sources, self-test, driver, vectors, manifest.
 ///
 /// # Errors

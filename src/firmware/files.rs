@@ -1,18 +1,19 @@
 //! The files of a firmware bundle: sources, harness, self-test, vectors, manifest.
 
-use super::calibrated;
 use super::manifest::{self, Header, Manifest};
 use super::stepped::StreamView;
+use super::{calibrated, outside};
 use crate::circuit::engine::{self};
 use crate::compensation::certainty;
 use crate::design::Design;
 use crate::emit::bundle::{Bundle, Part};
-use crate::emit::machine::{Type, Width};
+use crate::emit::machine::{Type, Width, parameter_type};
 use crate::emit::views;
 use crate::emit::views::{FunctionView, Language, StateView, StructView, TableView, mix};
 use crate::emit::{c, rust};
 use crate::error::{InputError, Result, io_error};
-use crate::numeric::trace::ir::Interval;
+use crate::numeric::trace::ir::{Function, Interval};
+use crate::text::{self, Place};
 use crate::vectors::model;
 use crate::vectors::model::Model;
 use crate::vectors::rows;
@@ -78,6 +79,7 @@ pub struct View {
     pub(super) stream: Option<StreamView>,
     seed: u64,
     chain_count: usize,
+    code: String,
     code_low: String,
     code_span: String,
     row: Vec<String>,
@@ -205,6 +207,7 @@ impl View {
         banner: String,
         facts: Vec<String>,
     ) -> Self {
+        let facts = facts.iter().map(|line| text::shown(line, Place::Source));
         let tables = views::tables(bundle, language);
         let mut functions = views::functions(bundle, language);
         let mut number = tables.len() as u32;
@@ -226,7 +229,7 @@ impl View {
             p: bundle.prefix.clone(),
             banner,
             guard: bundle.prefix.to_uppercase(),
-            facts,
+            facts: facts.collect(),
             states: views::states(bundle, language),
             structs: views::structs(bundle, language),
             checks: checks(bundle),
@@ -240,6 +243,7 @@ impl View {
             stream: None,
             seed: SEED,
             chain_count: PERIODS * bundle.ratio as usize,
+            code: String::new(),
             code_low: String::new(),
             code_span: String::new(),
             row: Vec::new(),
@@ -266,6 +270,10 @@ impl View {
     fn with_chain(mut self, design: &Design, bundle: &Bundle, language: Language) -> Self {
         let code = design.circuit.adc.format;
         let code = Interval::new(code.min_raw(), code.max_raw());
+        self.code = match language {
+            Language::C => c::type_name("", parameter_type(code)),
+            Language::Rust => rust::type_name(parameter_type(code)).to_owned(),
+        };
         let low = Type::Signed(Width::W64);
         (self.code_low, self.code_span) = match language {
             Language::C => (
@@ -423,9 +431,15 @@ fn vectors(design: &Design, bundle: &Bundle, models: &[Model]) -> Vec<EmittedFil
             inputs.extend(sensitive.into_iter().map(|x| vec![x]));
         }
         let mut results = vec![0; model.outputs];
-        for input in inputs {
-            let fault = model.call(&input, &mut results);
-            let mut line = input;
+        let position = |f: &Function| f.name == model.name;
+        let lowered = bundle.program.functions.iter().position(position);
+        let beside = lowered.map_or(Vec::new(), |k| {
+            outside::rows(&bundle.lowered[k], &model.inputs)
+        });
+        let inside = inputs.into_iter().map(|input| [input.clone(), input]);
+        for [given, due] in inside.chain(beside) {
+            let fault = model.call(&due, &mut results);
+            let mut line = given;
             line.extend(&results);
             line.push(i128::from(fault));
             text += &csv_line(&line);

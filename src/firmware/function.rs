@@ -2,6 +2,7 @@
 
 use super::files::{self, EmittedFile, View, csv_line};
 use super::manifest::{self, Header, Manifest};
+use super::outside;
 use crate::emit::bundle::{Bundle, Part};
 use crate::emit::lower::lower;
 use crate::emit::views;
@@ -107,9 +108,12 @@ fn chosen(program: &Program, model: &Model) -> EmittedFile {
     let candidates = stimulus::inputs(&model.inputs, CANDIDATES, SEED + 4);
     inputs.extend(model.near_ties(&candidates));
     let mut outputs = vec![0; model.outputs];
-    for input in inputs {
-        let fault = model.call(&input, &mut outputs);
-        let mut line = input;
+    let position = program.functions.iter().position(|f| f.name == model.name);
+    let beside = position.and_then(|k| Some(outside::rows(lower(program).get(k)?, &model.inputs)));
+    let inside = inputs.into_iter().map(|input| [input.clone(), input]);
+    for [given, due] in inside.chain(beside.unwrap_or_default()) {
+        let fault = model.call(&due, &mut outputs);
+        let mut line = given;
         line.extend(&outputs);
         line.push(i128::from(fault));
         text += &csv_line(&line);

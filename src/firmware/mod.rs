@@ -9,4 +9,5 @@ pub mod correction;
 pub mod files;
 pub mod function;
 pub mod manifest;
+mod outside;
 pub mod stepped;

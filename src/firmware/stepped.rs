@@ -4,6 +4,7 @@
 
 use super::files::{self, EmittedFile, View, csv_line};
 use super::manifest::{self, Header, Manifest};
+use super::outside;
 use crate::emit::bundle::{Bundle, Part, states};
 use crate::emit::lower::lower;
 use crate::emit::views;
@@ -95,7 +96,11 @@ pub fn emit(what: &Stepped, language: Language) -> Result<Vec<EmittedFile>> {
     let mut emitted = files::sources(&view, Part::Compensation, language)?;
     let names = function.inputs.iter().map(|(port, _)| port.name);
     let names = names.chain(function.outputs.iter().map(|(port, _)| port.name));
-    emitted.push(vectors(what.model, &ranges, &function.name, names));
+    let beside = bundle
+        .lowered
+        .last()
+        .map_or(Vec::new(), |l| outside::rows(l, &ranges));
+    emitted.push(vectors(what.model, &ranges, beside, &function.name, names));
     emitted.push(files::table_vectors(&view.tables));
     let header = Header {
         design_sha256: what.request_sha256,
@@ -141,6 +146,7 @@ fn random(lcg: &mut Lcg, ranges: &[Interval], restart: bool) -> Vec<i128> {
 fn vectors<'a>(
     model: &dyn Fn(&[Vec<i128>]) -> Vec<i128>,
     ranges: &[Interval],
+    beside: Vec<[Vec<i128>; 2]>,
     name: &str,
     names: impl Iterator<Item = &'a str>,
 ) -> EmittedFile {
@@ -173,8 +179,11 @@ fn vectors<'a>(
         calls.push(words);
     }
     calls.extend((0..CALLS).map(|n| random(&mut lcg, ranges, n % RESTART == 0)));
+    let (more, due): (Vec<_>, Vec<_>) = beside.into_iter().map(|[given, due]| (given, due)).unzip();
+    let given: Vec<Vec<i128>> = calls.iter().cloned().chain(more).collect();
+    calls.extend(due);
     let mut text = names.chain(["fault"]).collect::<Vec<_>>().join(",") + "\n";
-    for (mut line, word) in calls.iter().cloned().zip(model(&calls)) {
+    for (mut line, word) in given.into_iter().zip(model(&calls)) {
         line.extend([word, 0]);
         text += &csv_line(&line);
     }

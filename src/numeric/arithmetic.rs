@@ -95,6 +95,11 @@ pub trait Arithmetic: Sized {
     fn mul(&self, a: Self::Word, b: Self::Word) -> Self::Word;
     /// Exact negative.
     fn neg(&self, a: Self::Word) -> Self::Word;
+    /// The same word under a name of its own, for emitted code.
+    #[inline(always)]
+    fn named(&self, a: Self::Word, _name: &'static str) -> Self::Word {
+        a
+    }
     /// The same raw word read in another unit: its value times 2^exponent.
     fn read_as(&self, a: Self::Word, exponent: i32) -> Self::Word;
     /// Quantisation. `operands` are what the design's error message names. Without quantisation:
@@ -149,6 +154,12 @@ pub trait Arithmetic: Sized {
     /// States that `a` is a component of a vector no longer than `radius` (proved where it is
     /// called; intervals alone lose it).
     fn bounded(&self, a: Self::Word, radius: Self::Radius) -> Self::Word;
+    /// States that `a`, a component of a vector no longer than `radius`, is not below zero as long as no word of
+    /// `width` bits wraps (proved where it is called; intervals alone lose it).
+    #[inline(always)]
+    fn not_negative(&self, a: Self::Word, _radius: Self::Radius, _width: u32) -> Self::Word {
+        a
+    }
     /// The bound after a CORDIC micro-rotation by `index`: the length grows by sqrt(1 + 4^-index),
     /// and each floor moves a component by less than one LSB.
     fn rotated(&self, radius: Self::Radius, index: Self::Index) -> Self::Radius;

@@ -1,7 +1,9 @@
-//! The standard output: every failed write is an error, but for a reader that has gone away (`| head`).
+//! The standard output: every failed write is an error, but for a reader that has gone away (`| head`). What would
+//! command a terminal or is not seen is written as what it is ([`crate::text`]).
 
 use super::io_error;
 use crate::error::Result;
+use crate::text::{Place, lines};
 use std::fmt;
 use std::io::{self, Write};
 use std::sync::{Mutex, PoisonError};
@@ -11,12 +13,17 @@ static FAILED: Mutex<Option<io::Error>> = Mutex::new(None);
 
 /// Prints a line. What fails is kept for [`check`]: what is written to files does not depend on it.
 pub fn line(words: fmt::Arguments<'_>) {
-    keep(writeln!(io::stdout(), "{words}"));
+    keep(writeln!(io::stdout(), "{}", on_screen(words)));
 }
 
 /// Says a line on the standard error, where nobody has to listen.
 pub fn talk(words: fmt::Arguments<'_>) {
-    _ = writeln!(io::stderr(), "{words}");
+    _ = writeln!(io::stderr(), "{}", on_screen(words));
+}
+
+/// The words as a terminal may have them, users' names and paths among them.
+fn on_screen(words: fmt::Arguments<'_>) -> String {
+    lines(&words.to_string(), Place::Screen)
 }
 
 /// Everything has been printed, or nobody reads it any more.

@@ -1,5 +1,7 @@
 //! Numbers as people read them, and text that HTML and SVG take as text.
 
+use crate::text::Place;
+
 /// `value` with `digits` significant digits; as a power of ten beyond 1e-4..1e6.
 pub fn significant(value: f64, digits: usize) -> String {
     if !value.is_finite() {
@@ -132,6 +134,10 @@ pub fn escape(text: &str) -> String {
             '\'' => out.push_str("&#39;"),
             // Neither XML nor HTML has a place for other control characters.
             c if c.is_control() => out.push(' '),
+            // Nor has a reader one for marks that reorder or hide what is written.
+            c if !crate::text::is_visible(c) => {
+                out.push_str(&crate::text::shown(&c.to_string(), Place::Screen))
+            }
             c => out.push(c),
         }
     }

@@ -15,23 +15,32 @@
 #endif
 
 {% for w in [32, 64] %}
-/* floor(a / 2^n), n < {{ w }}: a negative word is shifted as its complement -a - 1. */
+/* The word with these bits. Compilers make nothing of it. */
+static inline int{{ w }}_t {{ v.p }}_word_{{ w }}(uint{{ w }}_t bits)
+{
+    return (bits <= (uint{{ w }}_t)INT{{ w }}_MAX) ? (int{{ w }}_t)bits
+                                          : ((-(int{{ w }}_t)(UINT{{ w }}_MAX - bits)) - 1);
+}
+
+/* floor(a / 2^n), n < {{ w - 1 }}. Where n is a constant, compilers make one arithmetic shift of it. */
 static inline int{{ w }}_t {{ v.p }}_asr_{{ w }}(int{{ w }}_t a, uint32_t n)
 {
-    const uint{{ w }}_t bits = (uint{{ w }}_t)((a >= 0) ? a : (-(a + 1)));
-    const uint{{ w }}_t shifted = bits >> n;
-    const int{{ w }}_t word = (int{{ w }}_t)shifted;
-    return (a >= 0) ? word : ((-word) - 1);
+    const int{{ w }}_t unit = (int{{ w }}_t)(UINT{{ w }}_C(1) << n);
+    return (a >= 0) ? (a / unit) : ((-1) - (((-1) - a) / unit));
+}
+
+/* The same where n < {{ w }} is not a constant: the word is shifted with 2^{{ w - 1 }} on it, which comes off again. */
+static inline int{{ w }}_t {{ v.p }}_asr_by_{{ w }}(int{{ w }}_t a, uint32_t n)
+{
+    const uint{{ w }}_t lift = UINT{{ w }}_C(1) << {{ w - 1 }}U;
+    return {{ v.p }}_word_{{ w }}((((uint{{ w }}_t)a + lift) >> n) - (lift >> n));
 }
 
 /* The bits up to and with `sign` as a two's-complement number. */
 static inline int{{ w }}_t {{ v.p }}_sign_extend_{{ w }}(uint{{ w }}_t a, uint{{ w }}_t sign)
 {
-    const uint{{ w }}_t below = (uint{{ w }}_t)(sign - UINT{{ w }}_C(1));
-    const uint{{ w }}_t low = a & below;
-    const uint{{ w }}_t complement = below - low;
-    const int{{ w }}_t word = (int{{ w }}_t)complement;
-    return ((a & sign) != UINT{{ w }}_C(0)) ? ((-word) - 1) : (int{{ w }}_t)low;
+    const uint{{ w }}_t low = a & ((sign - UINT{{ w }}_C(1)) | sign);
+    return {{ v.p }}_word_{{ w }}((low ^ sign) - sign);
 }
 
 static inline int{{ w }}_t {{ v.p }}_clamp_{{ w }}(int{{ w }}_t a, int{{ w }}_t low, int{{ w }}_t high)

@@ -2,7 +2,10 @@
 #include "{{ v.p }}.h"
 #include "{{ v.p }}_tables.h"
 
-{% for f in v.functions %}{{ f.definition }}
+{% for f in v.functions %}{% if f.internal %}/* {{ f.name }}
+{% for line in f.notes %} *   {{ line }}
+{% endfor %} */
+static {% endif %}{{ f.definition }}
 {% endfor %}{% if v.chain %}void {{ v.p }}_init({{ v.p }}_t *g)
 {
     static const {{ v.p }}_t zero = {0};
@@ -10,7 +13,7 @@
 {% for i in v.initial %}    g->chain.{{ i }};
 {% endfor %}}
 
-bool {{ v.p }}_push({{ v.p }}_t *g, int32_t drive, int32_t sense, {{ v.p }}_period_out_t *row)
+bool {{ v.p }}_push({{ v.p }}_t *g, {{ v.code }} drive, {{ v.code }} sense, {{ v.p }}_period_out_t *row)
 {
     {{ v.p }}_sample(&g->chain, drive, sense{% if v.sample_faults %}, &g->fault{% endif %});
     ++g->count;

@@ -113,7 +113,7 @@ static int table(const char *name)
     uint64_t out[16];
     {{ v.p }}_init(&g);
     while (get(codes, sizeof codes) == 1U) {
-        if ({{ v.p }}_push(&g, codes[0], codes[1], &row)) {
+        if ({{ v.p }}_push(&g, ({{ v.code }})codes[0], ({{ v.code }})codes[1], &row)) {
 {% for o in v.row %}            out[{{ loop.index0 }}] = {{ o }};
 {% endfor %}            out[{{ v.row.len() }}] = g.fault;
             put(out, {{ v.row.len() + 1 }}U);

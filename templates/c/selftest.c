@@ -52,8 +52,8 @@ static uint64_t {{ v.p }}_mix(uint64_t h, uint64_t word)
         uint64_t x = UINT64_C({{ v.seed }});
         {{ v.p }}_init(&g);
         for (uint32_t k = UINT32_C(0); k < UINT32_C({{ v.chain_count }}); ++k) {
-            const int32_t drive = (int32_t){{ v.p }}_stimulus(&x, {{ v.code_low }}, {{ v.code_span }});
-            const int32_t sense = (int32_t){{ v.p }}_stimulus(&x, {{ v.code_low }}, {{ v.code_span }});
+            const {{ v.code }} drive = ({{ v.code }}){{ v.p }}_stimulus(&x, {{ v.code_low }}, {{ v.code_span }});
+            const {{ v.code }} sense = ({{ v.code }}){{ v.p }}_stimulus(&x, {{ v.code_low }}, {{ v.code_span }});
             if ({{ v.p }}_push(&g, drive, sense, &row)) {
 {% for o in v.row %}                h = {{ v.p }}_mix(h, {{ o }});
 {% endfor %}            }

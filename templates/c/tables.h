@@ -4,7 +4,15 @@
 
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 {% for t in v.tables %}/* {{ t.note }} */
 extern const {{ t.ty }} {{ v.p }}_{{ t.name }}[{{ t.len }}];
 
-{% endfor %}#endif
+{% endfor %}#ifdef __cplusplus
+}
+#endif
+
+#endif

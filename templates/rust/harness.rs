@@ -57,7 +57,7 @@ fn table(name: &str) -> Option<Vec<u64>> {
         let [a, b, c, d, e, f, h, i] = bytes;
         let drive = i32::from_ne_bytes([a, b, c, d]);
         let sense = i32::from_ne_bytes([e, f, h, i]);
-        if let Some(row) = g.push(drive, sense) {
+        if let Some(row) = g.push(drive{% if v.code != "i32" %} as {{ v.code }}{% endif %}, sense{% if v.code != "i32" %} as {{ v.code }}{% endif %}) {
             put(output, &[{% for o in v.row %}{{ o }}, {% endfor %}u64::from(g.fault)]);
         }
     }

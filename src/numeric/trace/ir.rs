@@ -194,6 +194,8 @@ pub struct Function {
     pub loops: Vec<Loop>,
     /// Calls.
     pub calls: Vec<CallSite>,
+    /// Values with a name of their own.
+    pub names: std::collections::BTreeMap<Id, &'static str>,
 }
 
 /// Everything that was recorded.

@@ -100,6 +100,7 @@ impl Trace {
                 nodes: Vec::new(),
                 loops: Vec::new(),
                 calls: Vec::new(),
+                names: std::collections::BTreeMap::new(),
             },
             ..Frame::default()
         };
@@ -177,12 +178,14 @@ impl Trace {
         program.casts[cast.id] = cast.clone();
         let seen = &mut program.cast_ranges[cast.id];
         *seen = Some(seen.map_or(before_overflow, |r| r.join(before_overflow)));
-        // Channels share a function where their casts do the same and need not be told apart.
+        // Channels share a function where their casts do the same and need not be told apart: no fault is ever
+        // noted here, or none at all.
+        let (low, high) = cast.limits();
+        let is_quiet =
+            cast.overflow != Some(Overflow::Error) || before_overflow.is_within(low, high);
         let seen = program.casts.iter().zip(&program.cast_ranges);
         let mut seen = seen.map(|(other, range)| range.map(|_| other));
-        let first = seen.position(|other| {
-            other.is_some_and(|o| o.overflow != Some(Overflow::Error) && o.does_as(cast))
-        });
+        let first = seen.position(|other| other.is_some_and(|o| is_quiet && o.does_as(cast)));
         first.unwrap_or(cast.id)
     }
 }
@@ -226,6 +229,10 @@ impl Arithmetic for Trace {
         let x = self.range(a);
         let range = Interval::new(x.high.saturating_neg(), x.low.saturating_neg());
         self.push(Op::Neg(a), range)
+    }
+    fn named(&self, a: Id, name: &'static str) -> Id {
+        self.with(|frame| frame.function.names.insert(a, name));
+        a
     }
     fn read_as(&self, a: Id, _exponent: i32) -> Id {
         a
@@ -393,6 +400,13 @@ impl Arithmetic for Trace {
         if radius < 1e36 {
             let reach = radius as i128 + 1;
             self.narrow(a, -reach, reach)
+        } else {
+            a
+        }
+    }
+    fn not_negative(&self, a: Id, radius: f64, width: u32) -> Id {
+        if radius + 1.0 < f64::powi(2.0, width as i32 - 1) {
+            self.narrow(a, 0, i128::MAX)
         } else {
             a
         }

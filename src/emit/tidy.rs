@@ -1,0 +1,89 @@
+//! What is left out of a lowered function, and what is written where it is used.
+
+use super::machine::{Expr, Statement, Type, Typed, Value, visit_operands};
+use std::collections::BTreeMap;
+
+/// Removes temporaries that nothing reads; notes of faults and calls stay.
+pub(super) fn drop_unused(body: &mut Vec<Statement>, outputs: &[(&'static str, Typed)]) {
+    let mut used = std::collections::BTreeSet::new();
+    let mut note = |v: &Typed| {
+        if let Value::Temp(t) = v.value {
+            used.insert(t);
+        }
+    };
+    outputs.iter().for_each(|(_, v)| note(v));
+    visit_operands(body, &mut note);
+    let before = count(body);
+    retain(body, &|s| match s {
+        Statement::Let(t, _, expr, _) => used.contains(t) || matches!(expr, Expr::Check(..)),
+        _ => true,
+    });
+    if count(body) < before {
+        drop_unused(body, outputs);
+    }
+}
+
+fn count(body: &[Statement]) -> usize {
+    body.iter()
+        .map(|s| match s {
+            Statement::Loop(_, inner) => 1 + count(inner),
+            _ => 1,
+        })
+        .sum()
+}
+
+fn retain(body: &mut Vec<Statement>, keep: &dyn Fn(&Statement) -> bool) {
+    body.retain(|s| keep(s));
+    for s in body {
+        if let Statement::Loop(_, inner) = s {
+            retain(inner, keep);
+        }
+    }
+}
+
+/// Takes out temporaries that are nothing but another value in another type, and gives them back: the
+/// printers write them where they are used. One that a loop's end assigns stays, as what it stands for may
+/// have changed by then.
+pub(super) fn write_out_conversions(
+    body: &mut Vec<Statement>,
+    outputs: &[(&'static str, Typed)],
+) -> BTreeMap<usize, (Type, Expr)> {
+    let mut kept = Vec::new();
+    note_assigned(body, &mut kept);
+    let mut written_out = BTreeMap::new();
+    take(body, &kept, &mut written_out);
+    _ = outputs;
+    written_out
+}
+
+fn note_assigned(body: &[Statement], kept: &mut Vec<usize>) {
+    for statement in body {
+        match statement {
+            Statement::Loop(_, inner) => note_assigned(inner, kept),
+            Statement::Next(values) => {
+                kept.extend(values.iter().filter_map(|(_, v)| match v.value {
+                    Value::Temp(k) => Some(k),
+                    _ => None,
+                }))
+            }
+            _ => {}
+        }
+    }
+}
+
+fn take(body: &mut Vec<Statement>, kept: &[usize], taken: &mut BTreeMap<usize, (Type, Expr)>) {
+    body.retain(|s| match s {
+        Statement::Let(k, ty, expr @ (Expr::Convert(_) | Expr::Low(_) | Expr::ToSigned(_)), _)
+            if !kept.contains(k) =>
+        {
+            taken.insert(*k, (*ty, expr.clone()));
+            false
+        }
+        _ => true,
+    });
+    for s in body {
+        if let Statement::Loop(_, inner) = s {
+            take(inner, kept, taken);
+        }
+    }
+}

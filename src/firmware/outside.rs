@@ -1,0 +1,39 @@
+//! Vectors outside the inputs' ranges: a guarded function limits such words, and its limits are tested so.
+
+use crate::emit::machine::{Lowered, Type};
+use crate::numeric::trace::ir::Interval;
+
+/// Inputs just outside their ranges and at the ends of their types, each with the inputs whose outputs are due:
+/// the same, limited. None for a function that limits nothing.
+pub(super) fn rows(lowered: &Lowered, ranges: &[Interval]) -> Vec<[Vec<i128>; 2]> {
+    if !lowered.guarded {
+        return Vec::new();
+    }
+    let limited = |words: &[i128]| -> Vec<i128> {
+        let pairs = words.iter().zip(ranges);
+        pairs
+            .map(|(word, range)| (*word).clamp(range.low, range.high))
+            .collect()
+    };
+    let mut rows = Vec::new();
+    for (k, (range, ty)) in ranges.iter().zip(&lowered.inputs).enumerate() {
+        let Type::Signed(width) = *ty else { continue };
+        // A vector has words of 64 bits.
+        let all = width
+            .interval()
+            .meet(i128::from(i64::MIN), i128::from(i64::MAX));
+        let beside = [range.low - 1, range.high + 1, all.low, all.high];
+        let is_outside = |word: &i128| {
+            all.low <= *word && *word <= all.high && !(range.low..=range.high).contains(word)
+        };
+        for word in beside.into_iter().filter(is_outside) {
+            for others in [0, i128::from(i64::MIN), i128::from(i64::MAX)] {
+                let mut given: Vec<i128> = limited(&vec![others; ranges.len()]);
+                given[k] = word;
+                let due = limited(&given);
+                rows.push([given, due]);
+            }
+        }
+    }
+    rows
+}

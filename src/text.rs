@@ -1,0 +1,110 @@
+//! Text that others wrote (names, columns, paths, units, titles, commands), made harmless where it is shown.
+//!
+//! Everything of a user's that reaches a source, a manifest, a report or a terminal goes through [`shown`].
+//! What is an identifier in the place (a prefix) is not shown but checked, and refused with the reason.
+
+/// Where a text is going to stand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// A line of a comment or a string of C, Rust, TOML, CMake or make.
+    Source,
+    /// A terminal, JSON, HTML (which escapes its own marks besides).
+    Screen,
+}
+
+/// Most characters of one text in a source; the rest is counted.
+const MOST: usize = 2000;
+
+/// Marks beyond ASCII that are no letters and common in units and titles.
+const MARKS: &str = "°µ±·×²³–—…′″‰√∞≤≥≈−„“”‘’«»€§";
+
+/// Letters by their category that show nothing: fillers.
+const BLANKS: [char; 5] = ['\u{115f}', '\u{1160}', '\u{3164}', '\u{ffa0}', '\u{2800}'];
+
+/// `text` on one line, with what could end a comment or a string, splice or reorder lines, or command a terminal
+/// written as `{U+000A}`. The same text again if there is nothing of that kind in it.
+///
+/// Written so are, everywhere: control characters (line ends and tabs among them), marks of direction and others
+/// that show nothing. In sources also: the backslash (C joins lines at it), the quotation mark, a `*` beside a
+/// `/`, a `?` after a `?` (trigraphs), `$` (make and CMake), `#` at the end, and all beyond ASCII that is neither a
+/// letter, a digit nor one of a few marks of units; what is beyond 2000 characters is left out and counted.
+pub fn shown(text: &str, place: Place) -> String {
+    let characters: Vec<char> = text.chars().collect();
+    let kept = match place {
+        Place::Source => characters.len().min(MOST),
+        Place::Screen => characters.len(),
+    };
+    let mut shown = String::with_capacity(text.len());
+    for (k, c) in characters[..kept].iter().enumerate() {
+        let before = k.checked_sub(1).map(|b| characters[b]);
+        let after = characters.get(k + 1).copied();
+        let is_plain = is_visible(*c)
+            && match place {
+                Place::Screen => true,
+                Place::Source => is_known(*c) && is_harmless(before, *c, after, k + 1 == kept),
+            };
+        if is_plain {
+            shown.push(*c);
+        } else {
+            shown += &format!("{{U+{:04X}}}", u32::from(*c));
+        }
+    }
+    if kept < characters.len() {
+        shown += &format!("{{{} more characters}}", characters.len() - kept);
+    }
+    shown
+}
+
+/// [`shown`] line by line: of a text that has lines of its own.
+pub fn lines(text: &str, place: Place) -> String {
+    let lines: Vec<String> = text.split('\n').map(|line| shown(line, place)).collect();
+    lines.join("\n")
+}
+
+/// Indented JSON with a final newline, in which every character is seen: others stand as JSON's escapes.
+pub fn json<T: serde::Serialize>(value: &T) -> String {
+    // Structures of strings and finite numbers always have a JSON form.
+    let plain = serde_json::to_string_pretty(value).unwrap_or_default() + "\n";
+    let mut units = [0; 2];
+    let mut json = String::with_capacity(plain.len());
+    for c in plain.chars() {
+        if c == '\n' || is_visible(c) {
+            json.push(c);
+        } else {
+            let escapes = c.encode_utf16(&mut units).iter();
+            json.extend(escapes.map(|unit| format!("\\u{unit:04x}")));
+        }
+    }
+    json
+}
+
+/// It is seen, and where it is written: no control, no mark of direction, no blank without a width.
+pub fn is_visible(c: char) -> bool {
+    !c.is_control()
+        && !BLANKS.contains(&c)
+        && !matches!(c,
+            '\u{ad}' | '\u{34f}' | '\u{61c}' | '\u{180b}'..='\u{180f}' | '\u{200b}'..='\u{200f}'
+            | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{fe00}'..='\u{fe0f}' | '\u{feff}'
+            | '\u{fff0}'..='\u{fffb}' | '\u{fffe}' | '\u{ffff}' | '\u{e0000}'..='\u{e0fff}')
+}
+
+/// It has a meaning in a sentence or a unit.
+fn is_known(c: char) -> bool {
+    c.is_ascii() || c.is_alphanumeric() || MARKS.contains(c)
+}
+
+/// It ends no comment and no string, whatever stands around the text.
+fn is_harmless(before: Option<char>, c: char, after: Option<char>, last: bool) -> bool {
+    match c {
+        '\\' | '"' | '$' => false,
+        '*' => before != Some('/') && after != Some('/'),
+        // `/` is kept: a star beside it is not.
+        '?' => before != Some('?'),
+        '#' => !last,
+        _ => true,
+    }
+}
+
+#[cfg(test)]
+#[path = "text_tests.rs"]
+mod tests;

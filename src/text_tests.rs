@@ -1,0 +1,80 @@
+use super::*;
+use proptest::prelude::*;
+
+/// What ends comments and strings, splices lines, commands a terminal, or reorders what is read.
+const HOSTILE: [&str; 24] = [
+    "*/",
+    "/*",
+    "//",
+    "\n",
+    "\r",
+    "\\",
+    "\\\n",
+    "??/",
+    "??/\n",
+    "\"",
+    "'",
+    "`",
+    "/**/",
+    "*//*",
+    "\u{1b}[2J",
+    "\0",
+    "\u{202e}",
+    "\u{2066}",
+    "\u{2028}",
+    "\u{feff}",
+    "$(rm)",
+    "#",
+    "\u{85}",
+    "r#\"",
+];
+
+fn hostile() -> impl Strategy<Value = String> {
+    let part = prop_oneof![
+        3 => prop::sample::select(&HOSTILE[..]).prop_map(str::to_owned),
+        1 => "[a-z */?\\\\\"']{0,5}",
+        1 => any::<String>(),
+    ];
+    prop::collection::vec(part, 0..8).prop_map(|parts| parts.concat())
+}
+
+proptest! {
+    #[test]
+    fn in_a_source_nothing_ends_a_comment_or_a_string(text in hostile()) {
+        let shown = shown(&text, Place::Source);
+        for end in ["*/", "/*", "??", "\\", "\"", "\n", "\r", "$"] {
+            prop_assert!(!shown.contains(end), "{end:?} in {shown:?}");
+        }
+        prop_assert!(shown.chars().all(is_visible));
+        // Again is the same: a line that is shown may be shown inside another one.
+        prop_assert_eq!(super::shown(&shown, Place::Source), shown.clone());
+    }
+
+    #[test]
+    fn on_a_screen_every_character_is_seen(text in hostile()) {
+        prop_assert!(shown(&text, Place::Screen).chars().all(is_visible));
+        prop_assert!(lines(&text, Place::Screen).chars().all(|c| c == '\n' || is_visible(c)));
+        let json = json(&text);
+        prop_assert!(json.chars().all(|c| c == '\n' || is_visible(c)));
+        prop_assert_eq!(serde_json::from_str::<String>(&json).unwrap(), text);
+    }
+
+    #[test]
+    fn plain_words_stay_as_they_are(text in "[A-Za-z0-9_ .,;:+=()<>µ°-]{0,60}") {
+        prop_assert_eq!(shown(&text, Place::Source), text.clone());
+        prop_assert_eq!(shown(&text, Place::Screen), text);
+    }
+}
+
+#[test]
+fn what_is_replaced_can_be_read() {
+    assert_eq!(
+        shown("supply */ int evil(void); /*", Place::Source),
+        "supply {U+002A}/ int evil(void); /{U+002A}"
+    );
+    assert_eq!(shown("a\nb", Place::Screen), "a{U+000A}b");
+    assert_eq!(shown("what??/", Place::Source), "what?{U+003F}/");
+    assert_eq!(shown("2 * x / y", Place::Source), "2 * x / y");
+    let long = "a".repeat(2500);
+    assert!(shown(&long, Place::Source).ends_with("a{500 more characters}"));
+}

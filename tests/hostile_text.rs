@@ -1,0 +1,281 @@
+//! Names, columns and paths that are meant to become code: they are refused with the reason, or stand in
+//! comments and strings of the emitted sources alone.
+//!
+//! A small lexer of C and one of Rust take comments and strings out. What is left of a bundle made with hostile texts
+//! has to be, token by token, what is left of the same bundle made with plain ones.
+//!
+//! `GYROGEN_HOSTILE=N`: so many texts.
+
+use gyrogen::correction::Correction;
+use gyrogen::design::reader;
+use gyrogen::emit::views::Language;
+use gyrogen::firmware::correction::{Origin, emit};
+use gyrogen::firmware::files::EmittedFile;
+use std::path::Path;
+
+/// Texts in an ordinary run.
+const TEXTS: usize = 240;
+/// Columns of a correction.
+const COLUMNS: usize = 8;
+
+/// What closes, opens, splices, escapes, reorders or commands.
+const PIECES: [&str; 30] = [
+    " */ int evil(void); /*",
+    "*/",
+    "/*",
+    "//",
+    "\n",
+    "\nfn evil() {}\n",
+    "\r\n",
+    "\\",
+    "\\\n",
+    "??/",
+    "??/\n",
+    "\"",
+    "\" ; evil(",
+    "'",
+    "`",
+    "*/ /* /*",
+    "/* /* */",
+    "\u{1b}[2J",
+    "\0",
+    "\u{202e}",
+    "\u{2066}evil\u{2069}",
+    "\u{2028}",
+    "\u{feff}",
+    "$(evil)",
+    "#",
+    "%:",
+    "<::>",
+    "r#\"",
+    "\"#",
+    "é µ °",
+];
+
+/// Numbers of a linear congruential generator.
+struct Dice(u64);
+
+impl Dice {
+    fn below(&mut self, n: usize) -> usize {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) as usize % n
+    }
+
+    fn hostile(&mut self) -> String {
+        let count = 1 + self.below(5);
+        let mut text = String::new();
+        for _ in 0..count {
+            match self.below(4) {
+                0 => text.push(char::from_u32(self.below(0x3000) as u32).unwrap_or('*')),
+                1 => text.push_str(["supply", "t_degc", "a", "*", "/"][self.below(5)]),
+                _ => text.push_str(PIECES[self.below(PIECES.len())]),
+            }
+        }
+        text
+    }
+}
+
+/// C without comments, strings and white space: lines are spliced first, as the standard says.
+fn c_tokens(text: &str) -> String {
+    let trigraphs = text.replace("??/", "\\");
+    let spliced = trigraphs.replace("\\\r\n", "").replace("\\\n", "");
+    let all: Vec<char> = spliced.chars().collect();
+    let mut left = String::new();
+    let mut k = 0;
+    while k < all.len() {
+        let next = all.get(k + 1).copied();
+        match (all[k], next) {
+            ('/', Some('*')) => {
+                k += 2;
+                while k < all.len() && !(all[k] == '*' && all.get(k + 1) == Some(&'/')) {
+                    k += 1;
+                }
+                k += 2;
+            }
+            ('/', Some('/')) => {
+                while k < all.len() && !matches!(all[k], '\n' | '\r') {
+                    k += 1;
+                }
+            }
+            (quote @ ('"' | '\''), _) => {
+                k += 1;
+                while k < all.len() && all[k] != quote && all[k] != '\n' {
+                    k += 1 + usize::from(all[k] == '\\');
+                }
+                k += 1;
+                left.push(quote);
+            }
+            (c, _) => {
+                if !c.is_whitespace() {
+                    left.push(c);
+                }
+                k += 1;
+            }
+        }
+    }
+    left
+}
+
+/// Rust without comments (which nest), strings and white space.
+fn rust_tokens(text: &str) -> String {
+    let all: Vec<char> = text.chars().collect();
+    let mut left = String::new();
+    let mut k = 0;
+    while k < all.len() {
+        match (all[k], all.get(k + 1).copied()) {
+            ('/', Some('*')) => {
+                let mut depth = 1;
+                k += 2;
+                while k < all.len() && depth > 0 {
+                    match (all[k], all.get(k + 1).copied()) {
+                        ('*', Some('/')) => (depth, k) = (depth - 1, k + 2),
+                        ('/', Some('*')) => (depth, k) = (depth + 1, k + 2),
+                        _ => k += 1,
+                    }
+                }
+            }
+            ('/', Some('/')) => {
+                while k < all.len() && all[k] != '\n' {
+                    k += 1;
+                }
+            }
+            ('"', _) => {
+                k += 1;
+                while k < all.len() && all[k] != '"' {
+                    k += 1 + usize::from(all[k] == '\\');
+                }
+                k += 1;
+                left.push('"');
+            }
+            (c, _) => {
+                if !c.is_whitespace() {
+                    left.push(c);
+                }
+                k += 1;
+            }
+        }
+    }
+    left
+}
+
+/// A design with a correction that reads these columns.
+fn design(columns: &[String]) -> String {
+    let quoted = |text: &String| toml::Value::String(text.clone()).to_string();
+    let inputs: Vec<String> = columns
+        .iter()
+        .map(|c| format!("{{ column = {}, offset = 0.0, scale = 1.0 }}", quoted(c)))
+        .collect();
+    let terms: Vec<String> = (0..columns.len())
+        .map(|k| format!("{{ kind = \"product\", gain_dps = 0.5, factors = [[{k}, 1]] }}"))
+        .collect();
+    format!(
+        "[correction]\nperiod_s = 1.0\nfull_scale_dps = 100.0\nnoise_dps = 0.01\ninputs = [{}]\nterms = [{}]\n",
+        inputs.join(", "),
+        terms.join(", ")
+    )
+}
+
+fn bundle(columns: &[String], command: &str, language: Language) -> Vec<EmittedFile> {
+    let text = design(columns);
+    let design = reader::parse(&text, Some(Path::new("d.toml"))).expect("a design");
+    let correction: Correction = design
+        .correction
+        .expect("a correction")
+        .compile()
+        .expect("a correction");
+    let origin = Origin {
+        prefix: "hostile",
+        sha256: "0",
+        command,
+    };
+    emit(&correction, &origin, language).expect("a bundle")
+}
+
+/// The sources without comments and strings.
+fn code(files: &[EmittedFile]) -> Vec<(String, String)> {
+    let of = |f: &EmittedFile| match f.path.rsplit('.').next() {
+        Some("c" | "h") => Some((f.path.clone(), c_tokens(&f.text))),
+        Some("rs") => Some((f.path.clone(), rust_tokens(&f.text))),
+        _ => None,
+    };
+    files.iter().filter_map(of).collect()
+}
+
+fn texts(count: usize) {
+    let mut dice = Dice(2004);
+    let plain: Vec<String> = (0..COLUMNS).map(|k| format!("column_{k}")).collect();
+    for language in [Language::C, Language::Rust] {
+        let expected = code(&bundle(&plain, "gyrogen emit", language));
+        assert!(expected.len() >= 2 && expected.iter().any(|(_, text)| text.len() > 1000));
+        for _ in 0..count.div_ceil(COLUMNS + 1) {
+            let columns: Vec<String> = (0..COLUMNS).map(|_| dice.hostile()).collect();
+            let command = format!("gyrogen emit {}", dice.hostile());
+            let files = bundle(&columns, &command, language);
+            assert_eq!(code(&files), expected, "{columns:?} {command:?}");
+            for file in files.iter().filter(|f| !f.path.ends_with(".csv")) {
+                let hidden = |c: &char| *c != '\n' && !gyrogen::text::is_visible(*c);
+                assert_eq!(file.text.chars().find(hidden), None, "{}", file.path);
+            }
+        }
+    }
+}
+
+#[test]
+fn hostile_columns_and_commands_stay_in_comments_and_strings() {
+    let asked = std::env::var("GYROGEN_HOSTILE").ok();
+    texts(asked.and_then(|n| n.parse().ok()).unwrap_or(TEXTS));
+}
+
+#[test]
+#[ignore = "ten thousand texts take a minute"]
+fn ten_thousand_hostile_texts_stay_in_comments_and_strings() {
+    texts(10_000);
+}
+
+#[test]
+fn the_lexers_see_what_the_languages_see() {
+    assert_eq!(c_tokens("a /* b */ c // d\\\ne\nf \"*/\" g"), "acf\"g");
+    assert_eq!(c_tokens("a // b ??/\nc\nd"), "ad");
+    assert_eq!(
+        c_tokens("/* x */ int evil(void); /* y */"),
+        "intevil(void);"
+    );
+    assert_eq!(
+        rust_tokens("a /* b /* c */ d */ e // f\ng \"//\" h"),
+        "aeg\"h"
+    );
+}
+
+#[test]
+fn a_name_that_becomes_an_identifier_is_refused_with_the_reason() {
+    let mut dice = Dice(7);
+    let mut names: Vec<String> = (0..2000).map(|_| dice.hostile()).collect();
+    let words = [
+        "Gyro", "E1", "gyroA", "int8", "size", "while", "match", "self", "core", "std", "_a",
+        "a__b", "a_", "é", "", "1a", "gyro-a",
+    ];
+    names.extend(words.map(str::to_owned));
+    for name in names {
+        let text = format!("name = {}\n", toml::Value::String(name.clone()));
+        match reader::parse(&text, None) {
+            Ok(_) => {
+                let snake = name
+                    .bytes()
+                    .all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_');
+                assert!(snake && !words.contains(&name.as_str()), "{name:?}");
+            }
+            Err(e) => {
+                let said = e.to_string();
+                assert!(said.contains("help:"), "{said}");
+                assert!(
+                    said.chars()
+                        .all(|c| c == '\n' || gyrogen::text::is_visible(c)),
+                    "{said:?}"
+                );
+            }
+        }
+    }
+}
