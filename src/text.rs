@@ -25,9 +25,10 @@ const BLANKS: [char; 5] = ['\u{115f}', '\u{1160}', '\u{3164}', '\u{ffa0}', '\u{2
 /// written as `{U+000A}`. The same text again if there is nothing of that kind in it.
 ///
 /// Written so are, everywhere: control characters (line ends and tabs among them), marks of direction and others
-/// that show nothing. In sources also: the backslash (C joins lines at it), the quotation mark, a `*` beside a
-/// `/`, a `?` after a `?` (trigraphs), `$` (make and CMake), `#` at the end, and all beyond ASCII that is neither a
-/// letter, a digit nor one of a few marks of units; what is beyond 2000 characters is left out and counted.
+/// that show nothing. In sources also: the backslash (C joins lines at it) but before an apostrophe (so a shell is
+/// given one), the quotation mark, a `*` beside a `/`, a `?` after a `?` (trigraphs), `$` (make and CMake), `#` at
+/// the end, and all beyond ASCII that is neither a letter, a digit nor one of a few marks of units; what is beyond
+/// 2000 characters is left out and counted.
 pub fn shown(text: &str, place: Place) -> String {
     let characters: Vec<char> = text.chars().collect();
     let kept = match place {
@@ -96,7 +97,9 @@ fn is_known(c: char) -> bool {
 /// It ends no comment and no string, whatever stands around the text.
 fn is_harmless(before: Option<char>, c: char, after: Option<char>, last: bool) -> bool {
     match c {
-        '\\' | '"' | '$' => false,
+        // The command that a file records is quoted for a shell, and stays one in a banner.
+        '\\' => after == Some('\'') && !last,
+        '"' | '$' => false,
         '*' => before != Some('/') && after != Some('/'),
         // `/` is kept: a star beside it is not.
         '?' => before != Some('?'),
