@@ -240,3 +240,49 @@ int main(void)
             .success()
     );
 }
+
+/// The text between ```` ```KIND ```` and the next fence.
+fn example<'a>(readme: &'a str, kind: &str) -> &'a str {
+    let (_, rest) = readme
+        .split_once(&format!("```{kind}\n"))
+        .expect("an example");
+    rest.split_once("```").expect("its end").0
+}
+
+#[test]
+fn the_readmes_example_compiles_and_runs() {
+    let text = format!("{DEFAULT}\n{CORRECTION}");
+    let design = reader::parse(&text, None).expect("a design");
+    let of_part = |part| files::emit(&design, part, Language::C, "test").expect("a bundle");
+    let name = prefix(&design.name);
+    let origin = Origin {
+        prefix: &name,
+        sha256: "0",
+        command: "test",
+    };
+    let planned = design.correction.as_ref().expect("a correction");
+    let correction = planned.compile().expect("a correction");
+    let bundles = [
+        of_part(Part::Chain),
+        of_part(Part::Compensation),
+        emit(&correction, &origin, Language::C).expect("a bundle"),
+    ];
+    for emitted in bundles {
+        let folder = tempfile::tempdir().expect("a folder");
+        files::write(&emitted, folder.path()).expect("written");
+        let readme = self::text(&emitted, "README.md");
+        assert!(readme.contains("SPDX-License-Identifier"));
+        std::fs::write(folder.path().join("main.c"), example(readme, "c")).expect("written");
+        let mut arguments: Vec<&str> = STRICT.to_vec();
+        arguments.extend(["-I.", "main.c", "-o", "run"]);
+        let firmware = emitted.iter().map(|f| f.path.as_str());
+        arguments.extend(firmware.filter(|path| path.ends_with(".c") && !path.contains('/')));
+        compile(folder.path(), &arguments);
+        assert!(
+            Command::new(folder.path().join("run"))
+                .status()
+                .expect("it runs")
+                .success()
+        );
+    }
+}

@@ -38,6 +38,15 @@ pub struct TableView {
     pub checksum: String,
 }
 
+impl TableView {
+    /// Its size.
+    pub fn bytes(&self) -> usize {
+        let digits = |c: char| c.is_ascii_digit();
+        let bits: String = self.ty.chars().filter(|c| digits(*c)).collect();
+        self.len * bits.parse::<usize>().unwrap_or(0) / 8
+    }
+}
+
 /// A state's type.
 #[derive(Debug, Clone)]
 pub struct StateView {

@@ -61,6 +61,7 @@ macro_rules! page {
 #[derive(Debug)]
 pub struct View {
     p: String,
+    language: Language,
     banner: String,
     guard: String,
     facts: Vec<String>,
@@ -87,6 +88,7 @@ pub struct View {
     chain_number: u32,
 }
 
+page!(Readme, "bundle/README.md");
 page!(CArith, "c/arith.h");
 page!(CHeader, "c/firmware.h");
 page!(CSource, "c/firmware.c");
@@ -189,6 +191,9 @@ pub(super) fn sources(view: &View, part: Part, language: Language) -> Result<Vec
             pages.push(("src/bin/harness.rs".into(), RustHarness { v }.render()));
         }
     }
+    if part != Part::Tables {
+        pages.push(("README.md".into(), Readme { v }.render()));
+    }
     let mut files = Vec::new();
     for (path, text) in pages {
         let text = text.map_err(|e| InputError::new(format!("cannot print {path}: {e}")))?;
@@ -227,6 +232,7 @@ impl View {
         };
         View {
             p: bundle.prefix.clone(),
+            language,
             banner,
             guard: bundle.prefix.to_uppercase(),
             facts: facts.collect(),
@@ -252,6 +258,10 @@ impl View {
             functions,
             tables,
         }
+    }
+
+    fn is_c(&self) -> bool {
+        self.language == Language::C
     }
 
     /// Takes away all but the tables.
