@@ -44,15 +44,11 @@ fn retain(body: &mut Vec<Statement>, keep: &dyn Fn(&Statement) -> bool) {
 /// Takes out temporaries that are nothing but another value in another type, and gives them back: the
 /// printers write them where they are used. One that a loop's end assigns stays, as what it stands for may
 /// have changed by then.
-pub(super) fn write_out_conversions(
-    body: &mut Vec<Statement>,
-    outputs: &[(&'static str, Typed)],
-) -> BTreeMap<usize, (Type, Expr)> {
+pub(super) fn write_out_conversions(body: &mut Vec<Statement>) -> BTreeMap<usize, (Type, Expr)> {
     let mut kept = Vec::new();
     note_assigned(body, &mut kept);
     let mut written_out = BTreeMap::new();
     take(body, &kept, &mut written_out);
-    _ = outputs;
     written_out
 }
 
