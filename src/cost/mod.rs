@@ -2,7 +2,7 @@
 //!
 //! Everything is counted from the program that is emitted: the typed operations of [`crate::emit::lower`] (casts
 //! that cannot act are gone, widths are those of the operands), times how often each function runs for a row: the
-//! sample rate's R times, a loop's body as often as it counts. [`sequences`] has the instructions of each
+//! sample rate's R times, a loop's body as often as it counts. [`sequences`] and [`processors`] have the instructions of each
 //! operation, [`walk`] adds them up, `uses` knows what a compiler drops; [`fabric`] counts an FPGA's parts;
 //! [`price`] makes one number of it.
 //!
@@ -13,6 +13,7 @@
 pub mod fabric;
 pub mod function;
 pub mod price;
+pub mod processors;
 pub mod sequences;
 mod uses;
 pub mod walk;
@@ -25,7 +26,8 @@ use crate::emit::machine::{Lowered, residue_type, word_type};
 use crate::emit::views::entry_type;
 use crate::numeric::trace::ir::{Program, SlotKind};
 use fabric::Fabric;
-use sequences::{Sequence, processor};
+use processors::processor;
+use sequences::Sequence;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use walk::Walk;

@@ -37,16 +37,17 @@ pub struct Uses<'a> {
 }
 
 impl<'a> Uses<'a> {
-    /// Of a lowered function; `inside` gives the words that are alive in the callee of a call which is none in
+    /// Of a lowered function with its `body` of all conversions; `inside` gives the words that are alive in the callee of a call which is none in
     /// machine code.
     pub fn of(
         function: &'a Function,
         lowered: &Lowered,
+        body: &[Statement],
         registers: usize,
         inside: &dyn Fn(usize) -> Option<usize>,
     ) -> Self {
         let mut repeated = Vec::new();
-        flatten(&lowered.body, 1.0, &mut repeated);
+        flatten(body, 1.0, &mut repeated);
         let flat: Vec<&Statement> = repeated.iter().map(|(s, _)| *s).collect();
         let mut uses = Uses {
             function,
@@ -60,7 +61,7 @@ impl<'a> Uses<'a> {
                     multiplied_only: true,
                     last: 0,
                 };
-                temps(&lowered.body)
+                temps(body)
             ],
             crowded: 0.0,
             peak: 0,
@@ -95,7 +96,7 @@ impl<'a> Uses<'a> {
             Value::Input(k) => Some(self.function.inputs[k].1),
             Value::Temp(t) => match (&self.temps[t].made, self.temps[t].range) {
                 (_, Some(range)) => Some(range),
-                (Some(Expr::Convert(a)), None) => self.range(a),
+                (Some(Expr::Convert(a) | Expr::ToSigned(a)), None) => self.range(a),
                 _ => None,
             },
         }
@@ -105,9 +106,9 @@ impl<'a> Uses<'a> {
     pub fn is_narrow(&self, v: &Typed) -> bool {
         match v.value {
             Value::Constant(c) => i32::try_from(c).is_ok(),
-            _ if v.ty == Type::Signed(Width::W32) => true,
+            _ if is_signed_word(v.ty) => true,
             Value::Temp(t) => match &self.temps[t].made {
-                Some(Expr::Convert(a) | Expr::Low(a)) => a.ty == Type::Signed(Width::W32),
+                Some(Expr::Convert(a) | Expr::Low(a)) => is_signed_word(a.ty),
                 _ => false,
             },
             Value::Input(_) => false,
@@ -156,10 +157,7 @@ impl<'a> Uses<'a> {
 
     fn expression(&mut self, t: usize, ty: Type, expr: &Expr, at: usize) {
         let (upper, share) = (self.temps[t].upper, self.temps[t].share);
-        let is_short = matches!(
-            ty,
-            Type::Signed(Width::W32) | Type::Unsigned(Width::W32) | Type::Bool
-        );
+        let is_short = words(ty) < 2;
         match expr {
             Expr::Convert(a) | Expr::Low(a) | Expr::ToSigned(a) => {
                 self.note(a, upper && !is_short, share, at, false);
@@ -245,9 +243,13 @@ impl<'a> Uses<'a> {
     }
 }
 
+fn is_signed_word(ty: Type) -> bool {
+    matches!(ty, Type::Signed(width) if width <= Width::W32)
+}
+
 fn words(ty: Type) -> usize {
     match ty {
-        Type::Signed(w) | Type::Unsigned(w) => w.bits() as usize / 32,
+        Type::Signed(w) | Type::Unsigned(w) => w.bits().div_ceil(32) as usize,
         Type::Bool => 0,
     }
 }

@@ -4,6 +4,7 @@
 use super::sequences::{Immediate, Processor, Sequence};
 use super::uses::Uses;
 use crate::emit::machine::{Expr, Lowered, Statement, Type, Typed, Value, Width};
+use crate::emit::tidy::with_conversions;
 use crate::numeric::trace::ir::Program;
 use std::collections::BTreeSet;
 
@@ -24,6 +25,8 @@ pub struct Tally {
 pub struct Walk<'a> {
     program: &'a Program,
     lowered: &'a [Lowered],
+    /// The statements of each function with its conversions.
+    bodies: Vec<Vec<Statement>>,
     processor: &'a Processor,
     sizes: Vec<u32>,
     /// The most words that are alive in each function.
@@ -47,13 +50,14 @@ impl<'a> Walk<'a> {
         let mut walk = Walk {
             program,
             lowered,
+            bodies: lowered.iter().map(with_conversions).collect(),
             processor,
             sizes: Vec::new(),
             peaks: Vec::new(),
             tallies: Vec::new(),
         };
-        for (number, function) in lowered.iter().enumerate() {
-            let size = walk.size(number, &function.body);
+        for number in 0..lowered.len() {
+            let size = walk.size(number, &walk.bodies[number]);
             walk.sizes.push(size);
             let (tally, peak) = walk.count(number);
             walk.tallies.push(tally);
@@ -78,7 +82,8 @@ impl<'a> Walk<'a> {
             let callee = function.calls[site].function;
             self.is_inlined(callee).then(|| self.peaks[callee])
         };
-        let uses = Uses::of(function, lowered, self.processor.registers, &inside);
+        let body = &self.bodies[number];
+        let uses = Uses::of(function, lowered, body, self.processor.registers, &inside);
         let p = self.processor;
         let (crowded, peak) = (uses.crowded, uses.peak);
         let saved = uses
@@ -93,7 +98,7 @@ impl<'a> Walk<'a> {
             tables: BTreeSet::new(),
             decided: BTreeSet::new(),
         };
-        counting.body(&lowered.body, 1.0);
+        counting.body(body, 1.0);
         counting.take(&p.spill, crowded, 1.0);
         if !self.is_inlined(number) {
             let calls = (0..function.calls.len()).any(is_call);
@@ -116,12 +121,12 @@ impl<'a> Walk<'a> {
     /// A function's size as the compiler sees it when it decides where to put it.
     fn size(&self, number: usize, body: &[Statement]) -> u32 {
         let of = |statement: &Statement| match statement {
-            Statement::Let(_, ty, expr, range) => {
+            Statement::Let(_, ty, expr, _) => {
                 let wide = matches!(ty, Type::Signed(Width::W128) | Type::Unsigned(Width::W128));
                 let size = match expr {
-                    Expr::Asr(..) if range.is_some_and(|r| r.low >= 0) => 1,
                     Expr::Asr(..) | Expr::AsrIndex(_) => 4,
                     Expr::SignExtend(..) | Expr::Check(..) => 5,
+                    Expr::Convert(a) if size_of(a.ty) == size_of(*ty) => 0,
                     Expr::Clamp(..) => 3,
                     Expr::Mask(..) => 0,
                     Expr::Low(a) if size_of(a.ty) == size_of(*ty) => 0,
@@ -146,12 +151,16 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// 0, 1, 2 for words of 32, 64 and 128 bits.
+/// 0, 1, 2 for words of up to 32, 64 and 128 bits.
 fn size_of(ty: Type) -> usize {
     match ty {
-        Type::Signed(Width::W32) | Type::Unsigned(Width::W32) | Type::Bool => 0,
-        Type::Signed(Width::W64) | Type::Unsigned(Width::W64) => 1,
-        Type::Signed(Width::W128) | Type::Unsigned(Width::W128) => 2,
+        Type::Bool => 0,
+        Type::Signed(width) | Type::Unsigned(width) => match width {
+            // Parameters come in registers of 32 bits.
+            Width::W8 | Width::W16 | Width::W32 => 0,
+            Width::W64 => 1,
+            Width::W128 => 2,
+        },
     }
 }
 
@@ -231,7 +240,6 @@ impl Counting<'_, '_> {
         let (share, upper) = (u.share, u.upper);
         // The lower half of a word of 64 bits is a word.
         let half = if size == 1 && !upper { 0 } else { size };
-        let is_positive = u.range.is_some_and(|r| r.low >= 0);
         let none = Sequence::NONE;
         let sequence = match expr {
             Expr::Convert(a) | Expr::Low(a) | Expr::ToSigned(a) => {
@@ -251,15 +259,18 @@ impl Counting<'_, '_> {
             }
             Expr::Mul(a, b) => self.product(half, a, b, times, share),
             Expr::Neg(_) => p.add[half],
-            Expr::Asr(_, count) => match (size, is_positive) {
-                (1, false) if *count >= 32 => p.asr_high,
-                (1, false) if !upper => p.asr_low,
-                (_, false) => p.asr[size],
-                (1, true) if *count >= 32 => p.shift[0],
-                (1, true) if !upper => p.shift_low,
-                (_, true) => p.shift[size],
+            Expr::Asr(_, count) => match size {
+                1 if *count >= 32 => p.asr_high,
+                1 if !upper => p.asr_low,
+                _ => p.asr[size],
+            },
+            Expr::ShrPositive(_, count) => match size {
+                1 if *count >= 32 => p.shift[0],
+                1 if !upper => p.shift_low,
+                _ => p.shift[size],
             },
             Expr::AsrIndex(_) => p.asr_index[size],
+            Expr::ShrIndex(_) => p.shr_index[size],
             Expr::Shl(..) | Expr::Shr(..) if half == 0 && size == 1 => p.shift_low,
             Expr::Shl(..) | Expr::Shr(..) => p.shift[size],
             Expr::Mask(a, bits) => self.mask(half, a, *bits),

@@ -11,5 +11,5 @@ pub mod machine;
 mod modular;
 mod names;
 pub mod rust;
-mod tidy;
+pub mod tidy;
 pub mod views;

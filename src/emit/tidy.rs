@@ -1,11 +1,11 @@
 //! What is left out of a lowered function, and what is written where it is used.
 
-use super::machine::{Expr, Statement, Type, Typed, Value, visit_operands};
-use std::collections::BTreeMap;
+use super::machine::{Expr, Lowered, Statement, Type, Typed, Value, visit_operands};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Removes temporaries that nothing reads; notes of faults and calls stay.
 pub(super) fn drop_unused(body: &mut Vec<Statement>, outputs: &[(&'static str, Typed)]) {
-    let mut used = std::collections::BTreeSet::new();
+    let mut used = BTreeSet::new();
     let mut note = |v: &Typed| {
         if let Value::Temp(t) = v.value {
             used.insert(t);
@@ -81,5 +81,52 @@ fn take(body: &mut Vec<Statement>, kept: &[usize], taken: &mut BTreeMap<usize, (
         if let Statement::Loop(_, inner) = s {
             take(inner, kept, taken);
         }
+    }
+}
+
+/// The body with the conversions that are written out put back before the statement that reads them first: what a
+/// machine computes, for those who count it.
+pub fn with_conversions(lowered: &Lowered) -> Vec<Statement> {
+    let mut made = BTreeSet::new();
+    put_back(&lowered.body, &lowered.written_out, &mut made)
+}
+
+fn put_back(
+    body: &[Statement],
+    written_out: &BTreeMap<usize, (Type, Expr)>,
+    made: &mut BTreeSet<usize>,
+) -> Vec<Statement> {
+    let mut whole = Vec::new();
+    for statement in body {
+        if let Statement::Loop(count, inner) = statement {
+            let inner = put_back(inner, written_out, made);
+            whole.push(Statement::Loop(*count, inner));
+            continue;
+        }
+        let mut read = Vec::new();
+        visit_operands(std::slice::from_ref(statement), &mut |v| read.push(*v));
+        for v in read {
+            convert_before(&v, written_out, made, &mut whole);
+        }
+        whole.push(statement.clone());
+    }
+    whole
+}
+
+fn convert_before(
+    v: &Typed,
+    written_out: &BTreeMap<usize, (Type, Expr)>,
+    made: &mut BTreeSet<usize>,
+    whole: &mut Vec<Statement>,
+) {
+    let Value::Temp(k) = v.value else { return };
+    let Some((ty, expr)) = written_out.get(&k) else {
+        return;
+    };
+    if made.insert(k) {
+        for v in expr.operands() {
+            convert_before(&v, written_out, made, whole);
+        }
+        whole.push(Statement::Let(k, *ty, expr.clone(), None));
     }
 }
