@@ -9,7 +9,7 @@
 mod children;
 mod temporary;
 
-pub use children::{Child, output, spawn};
+pub use children::{Child, spawn};
 pub use temporary::{TemporaryFile, TemporaryFolder, sweep};
 
 use std::collections::BTreeMap;

@@ -40,13 +40,3 @@ fn a_child_that_is_dropped_ends_with_all_that_it_started() {
     std::thread::sleep(std::time::Duration::from_millis(2500));
     assert!(!mark.exists());
 }
-
-#[test]
-fn output_takes_both_streams() {
-    let mut command = Command::new("sh");
-    command.args(["-c", "echo out; echo err >&2; exit 3"]);
-    let output = output(&mut command).unwrap();
-    assert_eq!(output.stdout, b"out\n");
-    assert_eq!(output.stderr, b"err\n");
-    assert_eq!(output.status.code(), Some(3));
-}

@@ -96,7 +96,14 @@ fn step<'a>(value: &'a Value, effect: &str) -> Option<&'a Value> {
 #[test]
 fn the_default_gyro_hides_a_mode_crossing() {
     let design = reader::read(None).unwrap();
-    let outcome = gyrogen::job::run(&design, None, "test", &|_| {}).unwrap();
+    let outcome = gyrogen::job::run(
+        &design,
+        None,
+        "test",
+        &[gyrogen::emit::views::Language::C],
+        &|_| {},
+    )
+    .unwrap();
     let csv = outcome.parts.record_csv.unwrap();
     let (value, _) = answer(&csv).unwrap();
     let step = step(&value, "mode_crossing").expect("the crossing is named");

@@ -61,7 +61,7 @@ fn a_design_with_a_correction_becomes_firmware_that_verifies() {
     assert!(manifest.contains("\"part\": \"correction\""), "{manifest}");
 
     // A changed vector shows.
-    let vectors = folder.path().join("c/vectors/correct.csv");
+    let vectors = folder.path().join("c/vectors/sequence.csv");
     let text = std::fs::read_to_string(&vectors).expect("vectors");
     let damaged = text.replacen(",0\n", ",1\n", 1);
     std::fs::write(&vectors, damaged).expect("written");

@@ -7,6 +7,7 @@ use crate::design::target::Target;
 use crate::emit::views::Language;
 use crate::error::{Error, InputError, Result};
 use crate::firmware::approximation;
+use crate::firmware::replace;
 use crate::numeric::format::Format;
 use crate::output::Results;
 use crate::tabulate::job;
@@ -82,6 +83,9 @@ pub struct Arguments {
     /// Folder for the results; made if it does not exist.
     #[arg(long, value_name = "DIR", default_value = "gyrogen-approx")]
     out: PathBuf,
+    /// Overwrite firmware in the folder that was edited; files that are none of a bundle's stay.
+    #[arg(long)]
+    force: bool,
     /// How the result is printed on stdout.
     #[arg(long, value_enum, default_value = "text")]
     format: OutputFormat,
@@ -96,6 +100,11 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let request = request(arguments)?;
     let planned = ["approx.json", timing::NAME];
     let mut results = Results::claim(&arguments.out, &planned, &recorded.inputs)?;
+    if !arguments.force {
+        for folder in ["c", "rust"] {
+            replace::refuse(&[], &arguments.out.join(folder))?;
+        }
+    }
     let bar = Progress::new();
     let threads = super::threads(arguments.threads);
     let made = job::approximate(&request, &recorded.command, threads, &|total, count| {
@@ -105,12 +114,13 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let made = made?;
     watch.stage("emitting");
     let model = crate::vectors::form::model(&made.settled)?;
-    let vectors = approximation::vectors(&made.settled, &model, threads);
+    let vectors = approximation::vectors(&made.settled, &model);
+    let every = approximation::every(&made.settled, &model, threads);
     let emit = |language| {
         approximation::emit(
             &made.settled,
             &model,
-            &vectors,
+            (&vectors, every),
             &made.outcome,
             &request.name,
             language,
@@ -120,7 +130,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let json = super::json(&made.outcome);
     watch.stage("writing");
     for (files, folder) in [(&c, "c"), (&rust, "rust")] {
-        super::collect(files, folder, &mut results)?;
+        super::common::bundle(files, folder, &mut results, arguments.force)?;
     }
     results.write("approx.json", json.as_bytes())?;
     watch.write(&mut results, &made.outcome.design_sha256, &recorded.command)?;

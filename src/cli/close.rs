@@ -59,6 +59,9 @@ pub struct Arguments {
     /// writes no files.
     #[arg(long, value_name = "DIR")]
     pub(super) out: Option<PathBuf>,
+    /// Overwrite firmware in the folder that was edited; files that are none of a bundle's stay.
+    #[arg(long, conflicts_with_all = ["capture", "self_test"])]
+    force: bool,
     /// How the result is printed on stdout.
     #[arg(long, value_enum, default_value = "text")]
     pub(super) format: OutputFormat,
@@ -111,6 +114,9 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         results.write("report.html", page.as_bytes())?;
         (closed.closure, None, None)
     } else if let Some(path) = &arguments.record {
+        if !arguments.force {
+            crate::verify::firmware::refuse_edited(out)?;
+        }
         let (record, warnings) = crate::record::read_any(path, &design.record)?;
         closing(path);
         if arguments.format == OutputFormat::Text {
@@ -143,7 +149,14 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
             controls: controls.as_ref(),
             diff: None,
         };
-        write(&closed, path, &design, &sources, beside, &mut results)?;
+        write(
+            &closed,
+            path,
+            &design,
+            &sources,
+            beside,
+            (&mut results, arguments.force),
+        )?;
         (closed.closure, compared, controls)
     } else {
         return Ok(());
@@ -247,7 +260,7 @@ fn write(
     design: &Design,
     sources: &Option<[Vec<EmittedFile>; 2]>,
     beside: Beside<'_>,
-    results: &mut Results,
+    (results, force): (&mut Results, bool),
 ) -> Result<()> {
     let augmented = closed.correction.as_ref().map(|correction| {
         let planned = Planned {
@@ -278,7 +291,7 @@ fn write(
         .flatten()
         .zip(["firmware/c", "firmware/rust"])
     {
-        super::collect(files, folder, results)?;
+        super::common::bundle(files, folder, results, force)?;
     }
     results.write_with("residuals.csv", |path| {
         crate::thermal::residuals::write(closed, path)

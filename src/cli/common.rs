@@ -1,9 +1,11 @@
 //! What the subcommands share: lines and tables on the terminal, progress, JSON, the design that was named.
 
+use crate::emit::views::Language;
 use crate::error::Result;
 use crate::firmware::files::EmittedFile;
+use crate::firmware::replace;
 use crate::output::Results;
-use crate::verify::compare::Compared;
+use crate::verify::compare::{Compared, language_name};
 use clap::ValueEnum;
 use std::io::IsTerminal;
 use std::path::Path;
@@ -99,12 +101,29 @@ pub(super) fn json<T: serde::Serialize>(value: &T) -> String {
     crate::text::json(value)
 }
 
-/// Emitted code among the results, below a folder.
-pub(super) fn collect(files: &[EmittedFile], folder: &str, results: &mut Results) -> Result<()> {
-    let files = files
-        .iter()
-        .map(|file| (Path::new(folder).join(&file.path), file.text.as_bytes()));
-    results.write_all(files)
+/// The languages that emitted code is built in, of those asked for; says for which there is no compiler.
+pub(super) fn languages(asked: Option<Language>) -> Result<Vec<Language>> {
+    let (found, lacking) = crate::verify::toolchain::languages(asked)?;
+    for why in lacking {
+        let other = found.first().map_or("", |l| language_name(*l));
+        talk!("note: only the emitted code of one language ({other}) is built and compared: {why}");
+    }
+    Ok(found)
+}
+
+/// A bundle among the results, in `folder` below theirs and in the place of the bundle that is there; says what was in
+/// the way where that was forced.
+pub(super) fn bundle(
+    files: &[EmittedFile],
+    folder: &str,
+    results: &mut Results,
+    force: bool,
+) -> Result<()> {
+    let in_the_way = replace::collect(files, folder, results, force)?;
+    if !in_the_way.is_empty() {
+        talk!("in the way: {}", replace::listed(&in_the_way));
+    }
+    Ok(())
 }
 
 /// A table of numbers for the terminal.

@@ -12,7 +12,7 @@ use crate::firmware::correction;
 use crate::firmware::correction::Origin;
 use crate::firmware::files;
 use crate::firmware::files::EmittedFile;
-use crate::firmware::manifest;
+use crate::firmware::{manifest, replace};
 use crate::output::Results;
 use std::path::PathBuf;
 
@@ -30,6 +30,9 @@ pub struct Arguments {
     /// Folder for the bundle; made if it does not exist.
     #[arg(long, value_name = "DIR", default_value = "gyrogen-emit")]
     out: PathBuf,
+    /// Overwrite a bundle's files that were edited; files that are none of a bundle's stay.
+    #[arg(long)]
+    force: bool,
 }
 
 /// Runs the command.
@@ -43,11 +46,11 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         None => Part::Chain,
     });
     let mut results = Results::claim(&arguments.out, &[manifest::NAME], &recorded.inputs)?;
-    let bundle = match part {
-        Part::Correction => correction(&design, arguments.lang, &recorded.command)?,
-        part => files::emit(&design, part, arguments.lang, &recorded.command)?,
-    };
-    super::collect(&bundle, "", &mut results)?;
+    if !arguments.force {
+        replace::refuse(&[], &arguments.out)?;
+    }
+    let bundle = emitted(&design, part, arguments.lang, &recorded.command)?;
+    super::common::bundle(&bundle, "", &mut results, arguments.force)?;
     results.finish()?;
     for remark in remarks(&design, part, arguments.part.is_some()) {
         talk!("{remark}");
@@ -57,7 +60,24 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         bundle.len(),
         arguments.out.display()
     );
+    talk!("digest {}", manifest::digest(&bundle));
     Ok(())
+}
+
+/// The bundle of a part of a design, as files in memory.
+///
+/// # Errors
+/// A design without what the part needs.
+pub(super) fn emitted(
+    design: &Design,
+    part: Part,
+    language: Language,
+    command: &str,
+) -> Result<Vec<EmittedFile>> {
+    match part {
+        Part::Correction => correction(design, language, command),
+        part => files::emit(design, part, language, command),
+    }
 }
 
 /// A part as the command line names it.

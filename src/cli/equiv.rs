@@ -4,6 +4,7 @@ use super::OutputFormat;
 use super::recorded::Recorded;
 use crate::cosim::stream::stimulus;
 use crate::design::Design;
+use crate::emit::views::Language;
 use crate::equivalence::job::{self, Request, Stimulus};
 use crate::equivalence::outcome::{Equivalence, NodeReport};
 use crate::equivalence::shrink;
@@ -36,6 +37,10 @@ pub struct Arguments {
     /// Folder for the results; made if it does not exist.
     #[arg(long, value_name = "DIR", default_value = "gyrogen-out")]
     out: PathBuf,
+    /// Language of the emitted code that is built and compared; both if left out, or that for which there is a
+    /// compiler.
+    #[arg(long, value_enum)]
+    lang: Option<Language>,
     /// How the result is printed on stdout.
     #[arg(long, value_enum, default_value = "text")]
     format: OutputFormat,
@@ -62,6 +67,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let design = super::design(arguments.design.as_deref())?;
     let planned = ["equiv.json", job::COUNTEREXAMPLE, timing::NAME];
     let mut results = Results::claim(&arguments.out, &planned, &recorded.inputs)?;
+    let languages = super::common::languages(arguments.lang)?;
     let (drive, sense, origin) = codes(&design, arguments)?;
     let stimulus = Stimulus {
         drive: &drive,
@@ -74,6 +80,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         command: &recorded.command,
         against: other.as_ref(),
         threads: super::threads(arguments.threads),
+        languages: &languages,
     };
     watch.stage("comparing");
     let (result, counterexample) = job::equivalence(&design, stimulus, request)?;
@@ -157,6 +164,10 @@ fn print(e: &Equivalence) {
     say!("{table}");
     say!("{} ADC samples, {} rows: {}", e.samples, e.rows, e.stimulus);
     for (emitted, language) in [(&e.model_vs_c, "C"), (&e.model_vs_rust, "Rust")] {
+        let Some(emitted) = emitted else {
+            say!("emitted {language}: not built");
+            continue;
+        };
         say!(
             "emitted {language}: {} words compared with the model, {} mismatches",
             emitted.compared,

@@ -26,7 +26,7 @@ mod verify;
 
 use crate::error::{Error, Result};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use common::{OutputFormat, collect, comparison_table, design, json, table, threads, with_bar};
+use common::{OutputFormat, comparison_table, design, json, table, threads, with_bar};
 use recorded::Recorded;
 use std::process::ExitCode;
 

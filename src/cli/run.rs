@@ -2,6 +2,7 @@
 
 use super::recorded::Recorded;
 use super::{OutputFormat, alternatives};
+use crate::emit::views::Language;
 use crate::error::{Error, Result};
 use crate::job;
 use crate::job::bound::Line;
@@ -26,6 +27,13 @@ pub struct Arguments {
     /// Folder for the results; made if it does not exist.
     #[arg(long, value_name = "DIR", default_value = "gyrogen-out")]
     out: PathBuf,
+    /// Language of the emitted code that is built and compared (both are written); both if left out, or that for
+    /// which there is a compiler.
+    #[arg(long, value_enum)]
+    lang: Option<Language>,
+    /// Overwrite firmware in the folder that was edited; files that are none of a bundle's stay.
+    #[arg(long)]
+    force: bool,
     /// How the result is printed on stdout.
     #[arg(long, value_enum, default_value = "text")]
     format: OutputFormat,
@@ -49,6 +57,10 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let mut design = super::design(arguments.design.as_deref())?;
     design.record.undo_correction = arguments.undo_correction;
     let mut results = Results::claim(&arguments.out, &PLANNED, &recorded.inputs)?;
+    if !arguments.force {
+        crate::verify::firmware::refuse_edited(&arguments.out)?;
+    }
+    let languages = super::common::languages(arguments.lang)?;
     let loud = std::io::stderr().is_terminal();
     let say = |step: &str| {
         watch.stage(step);
@@ -60,13 +72,15 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         &design,
         arguments.record.as_deref(),
         &recorded.command,
+        &languages,
         &say,
     )?;
     watch.stage("writing");
     let html = crate::report::html(&outcome)?;
     let json = super::json(&outcome.summary);
-    let files = outcome.parts.firmware.files();
-    results.write_all(files.map(|(path, text)| (path, text.as_bytes())))?;
+    for (files, folder) in outcome.parts.firmware.bundles() {
+        super::common::bundle(files, folder, &mut results, arguments.force)?;
+    }
     if let Some(record) = &outcome.parts.record_csv {
         results.write("record.csv", record.as_bytes())?;
     }
@@ -126,8 +140,14 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
     row("before compensation", s.before);
     row("after, float model", s.after.float);
     row("after, fixed-point model", s.after.fixed);
-    row("after, emitted C", s.after.c);
-    row("after, emitted Rust", s.after.rust);
+    for (name, drift) in [
+        ("after, emitted C", s.after.c),
+        ("after, emitted Rust", s.after.rust),
+    ] {
+        if let Some(drift) = drift {
+            row(name, drift);
+        }
+    }
     for column in table.column_iter_mut().skip(1) {
         column.set_cell_alignment(comfy_table::CellAlignment::Right);
     }

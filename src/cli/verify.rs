@@ -2,14 +2,19 @@
 
 use super::OutputFormat;
 use super::recorded::Recorded;
-use crate::error::{Error, Result};
+use crate::emit::bundle::Part;
+use crate::emit::views::Language;
+use crate::error::{Error, InputError, Result};
+use crate::firmware::files::EmittedFile;
+use crate::firmware::manifest::Manifest;
 use crate::output::Results;
 use crate::timing::{self, Stopwatch};
-use crate::verify::bundle::{self, Verification};
+use crate::verify::bundle::{self, Against, Verification};
 use crate::verify::target::Target;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-/// Build a firmware bundle anew from its own files alone, run its self-test and its test vectors.
+/// Build a firmware bundle anew from its own files alone, run its self-test and its test vectors. This compiles and
+/// runs the bundle's code: do not verify a bundle that you would not build.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// Folder of the bundle, as `emit` and `run` write them (`out/firmware/c`).
@@ -17,6 +22,12 @@ pub struct Arguments {
     /// The processor that the code is built for and runs on.
     #[arg(long, value_enum, default_value = "host")]
     target: Target,
+    /// The digest that the bundle has to have: SHA-256 of its manifest, as `emit` printed it.
+    #[arg(long, value_name = "HEX")]
+    digest: Option<String>,
+    /// A design file: the bundle has to be what it emits now.
+    #[arg(long, value_name = "FILE")]
+    design: Option<PathBuf>,
     /// Folder for verify.json; made if it does not exist. The bundle's folder if left out.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -31,10 +42,32 @@ pub struct Arguments {
 /// A folder that holds no bundle, no compiler for the target (exit 2); a difference (exit 1).
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let watch = Stopwatch::start("building and running");
+    if let Some(digest) = &arguments.digest {
+        let is_digest = digest.len() == 64 && digest.chars().all(|c| c.is_ascii_hexdigit());
+        if !is_digest {
+            return Err(InputError::new(
+                "`--digest` takes the 64 hexadecimal digits that `gyrogen emit` printed",
+            )
+            .into());
+        }
+    }
+    let against = Against {
+        digest: arguments.digest.clone(),
+        design: arguments.design.clone(),
+    };
     let folder = arguments.out.as_ref().unwrap_or(&arguments.bundle);
     let planned = ["verify.json", timing::NAME];
+    for name in planned {
+        refuse_link(&folder.join(name))?;
+    }
     let mut results = Results::claim(folder, &planned, &recorded.inputs)?;
-    let verification = bundle::verify(&arguments.bundle, arguments.target, &recorded.command)?;
+    let verification = bundle::verify(
+        &arguments.bundle,
+        arguments.target,
+        &against,
+        &of_design,
+        &recorded.command,
+    )?;
     watch.stage("writing");
     let json = super::json(&verification);
     results.write("verify.json", json.as_bytes())?;
@@ -50,6 +83,43 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     Err(Error::Check(reasons(&verification).join("; ")))
 }
 
+/// A result in a bundle's folder, which may be anybody's, replaces a plain file or nothing.
+fn refuse_link(path: &Path) -> Result<()> {
+    if path.symlink_metadata().is_ok_and(|found| !found.is_file()) {
+        return Err(InputError::new(
+            "the result is not written here: this is a link, or no regular file",
+        )
+        .in_file(path)
+        .help("remove it, or name another folder: `--out DIR`")
+        .into());
+    }
+    Ok(())
+}
+
+/// What a design emits now for a bundle's part and language, by the bundle's command.
+fn of_design(path: &Path, manifest: &Manifest) -> Result<Vec<EmittedFile>> {
+    let design = super::design(Some(path))?;
+    let part = match manifest.part.as_str() {
+        "chain" => Part::Chain,
+        // A whole chain's part where its thermometer is not the circuit's.
+        "compensation" => Part::Compensation,
+        "tables" => Part::Tables,
+        "correction" => Part::Correction,
+        other => {
+            return Err(
+                InputError::new(format!("no design emits a bundle of the part `{other}`"))
+                    .help("leave `--design` out, and hold the bundle against its digest")
+                    .into(),
+            );
+        }
+    };
+    let language = match manifest.language.as_str() {
+        "c" => Language::C,
+        _ => Language::Rust,
+    };
+    super::emit::emitted(&design, part, language, &manifest.command)
+}
+
 fn print(v: &Verification) {
     say!("{}", super::comparison_table(&v.functions));
     let selftest = match v.selftest {
@@ -59,6 +129,7 @@ fn print(v: &Verification) {
     };
     say!("self-test: {selftest}");
     say!("toolchain: {}", v.toolchain);
+    say!("digest: {}", v.digest);
 }
 
 fn reasons(v: &Verification) -> Vec<String> {
@@ -77,5 +148,6 @@ fn reasons(v: &Verification) -> Vec<String> {
         let files = v.changed_files.join(", ");
         reasons.push(format!("files differ from the manifest: {files}"));
     }
+    reasons.extend(v.problems.iter().cloned());
     reasons
 }

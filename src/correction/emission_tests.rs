@@ -5,7 +5,7 @@ use super::*;
 use crate::emit::views::Language;
 use crate::firmware::correction::{Origin, emit};
 use crate::firmware::files;
-use crate::verify::bundle::verify;
+use crate::verify::bundle::{Against, verify};
 use crate::verify::correction::Firmware;
 use crate::verify::target::Target;
 
@@ -23,7 +23,8 @@ fn emitted_c_and_rust_are_the_model_bit_for_bit_on_random_plans() {
         let plan = plan(1000 + seed, seed as usize % 9, true);
         bent += usize::from(bends(&plan));
         let correction = Correction::auto(&plan).unwrap();
-        let firmware = Firmware::make(&correction, &ORIGIN).unwrap();
+        let firmware =
+            Firmware::make(&correction, &ORIGIN, &[Language::C, Language::Rust]).unwrap();
         let readings = record(&plan, 3000, seed);
         let compared = firmware.compare(&correction, &readings).unwrap();
         assert!(compared.len() >= 2);
@@ -44,12 +45,19 @@ fn a_bundle_verifies_from_its_files_and_damage_to_a_constant_shows() {
         assert_eq!(emitted, emit(&correction, &ORIGIN, language).unwrap());
         let folder = tempfile::tempdir().unwrap();
         files::write(&emitted, folder.path()).unwrap();
-        let good = verify(folder.path(), Target::Host, "test").unwrap();
+        let good = verify(
+            folder.path(),
+            Target::Host,
+            &Against::default(),
+            &|_, _| Ok(Vec::new()),
+            "test",
+        )
+        .unwrap();
         assert!(good.holds && good.selftest == Some(true), "{good:?}");
         assert!(
             good.functions
                 .iter()
-                .any(|f| f.name == "correct" && f.inputs >= 3072)
+                .any(|f| f.name == "sequence" && f.inputs >= 3072)
         );
 
         // Each multiplier of the step: one in 256 more shows in all of them, one LSB in nearly all (a
@@ -67,7 +75,14 @@ fn a_bundle_verifies_from_its_files_and_damage_to_a_constant_shows() {
         for (k, share) in ks.flat_map(|k| [(k, 256), (k, i64::MAX)]) {
             let (what, damaged) = damage(&file.text, language, k, share);
             std::fs::write(folder.path().join(source), damaged).unwrap();
-            let bad = verify(folder.path(), Target::Host, "test").unwrap();
+            let bad = verify(
+                folder.path(),
+                Target::Host,
+                &Against::default(),
+                &|_, _| Ok(Vec::new()),
+                "test",
+            )
+            .unwrap();
             if bad.vectors.mismatches == 0 {
                 unseen.push((what, share));
             }

@@ -22,7 +22,7 @@ pub use plan::{
     HIGHEST_POWER, Input, LONGEST_TAU_PERIODS, MOST_INPUTS, MOST_KNOTS, MOST_OF_A_KIND,
     MOST_SLOPE_ROWS, Plan, SHORTEST_TAU_PERIODS, Term,
 };
-pub use run::{Correction, MOST_STEPS, Reading, Steps, readings, schedule};
+pub use run::{Calls, Correction, MOST_STEPS, Reading, Steps, readings, schedule};
 pub use text::{Planned, refuse_unbuildable};
 
 #[cfg(test)]

@@ -86,7 +86,15 @@ fn firmware_is_the_model_up_to_the_largest_coefficients() {
             sha256: "0",
             command: "test",
         };
-        let firmware = Firmware::make(&correction, &origin).unwrap();
+        let firmware = Firmware::make(
+            &correction,
+            &origin,
+            &[
+                crate::emit::views::Language::C,
+                crate::emit::views::Language::Rust,
+            ],
+        )
+        .unwrap();
         for c in firmware.compare(&correction, &readings).unwrap() {
             assert_eq!(c.mismatches, 0, "{s:?}: {} {:?}", c.name, c.first);
         }

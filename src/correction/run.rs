@@ -6,7 +6,7 @@ use super::formats::Formats;
 use super::plan::Plan;
 use crate::error::{InputError, Result};
 use crate::numeric::arithmetic::Block;
-use crate::numeric::fixed::Fixed;
+use crate::numeric::fixed::{Fixed, Words};
 use crate::numeric::float::Float;
 use crate::numeric::format::{Format, pow2};
 use crate::numeric::trace::Trace;
@@ -202,13 +202,17 @@ impl Correction {
 
     /// The model's output word for each call, from the state before the first reading.
     pub fn run_words(&self, calls: &[Vec<i128>]) -> Vec<i128> {
-        let ar = Fixed::<i128, i128>::new();
-        let mut state: State<Fixed<i128, i128>> = self.step.state();
-        let one = |words: &Vec<i128>| match words.as_slice() {
-            [restart, inputs @ .., rate] => self.step.run(&ar, &mut state, *restart, inputs, *rate),
-            _ => 0,
-        };
-        calls.iter().map(one).collect()
+        let mut stepper = self.stepper();
+        calls.iter().map(|words| stepper.call(words)).collect()
+    }
+
+    /// The bit-accurate model, call by call from the state before the first reading.
+    pub fn stepper(&self) -> Stepper<'_> {
+        Stepper {
+            step: &self.step,
+            ar: Fixed::new(),
+            state: self.step.state(),
+        }
     }
 
     /// The corrected rate of each reading as firmware computes it, deg/s; NaN where the rate is.
@@ -263,6 +267,40 @@ impl Correction {
             _ => record::<10>(&self.step, &trace),
         }
         trace.finish()
+    }
+}
+
+/// The model of a function with a state, called once a reading.
+pub trait Calls {
+    /// The output of the next call.
+    fn call(&mut self, words: &[i128]) -> i128;
+    /// The state, word by word in the order of its type.
+    fn state(&mut self) -> Vec<i128>;
+}
+
+/// The bit-accurate model of a correction with its state.
+#[derive(Debug)]
+pub struct Stepper<'a> {
+    step: &'a Step,
+    ar: Fixed<i128, i128>,
+    state: State<Fixed<i128, i128>>,
+}
+
+impl Calls for Stepper<'_> {
+    fn call(&mut self, words: &[i128]) -> i128 {
+        match words {
+            [restart, inputs @ .., rate] => {
+                self.step
+                    .run(&self.ar, &mut self.state, *restart, inputs, *rate)
+            }
+            _ => 0,
+        }
+    }
+
+    fn state(&mut self) -> Vec<i128> {
+        let mut words = Words::default();
+        Block::<_, 2, 1>::visit(self.step, &mut self.state, &mut words);
+        words.0
     }
 }
 

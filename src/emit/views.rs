@@ -99,8 +99,6 @@ pub struct FunctionView {
     pub faults: bool,
     /// In C it is called by `push` alone and has no declaration in the header: compilers make one function of both.
     pub internal: bool,
-    /// It has no state and inputs of at most 64 bits: the self-test and the harness call it.
-    pub tested: bool,
     /// Its inputs.
     pub inputs: Vec<InputView>,
     /// Arguments a0, a1, ... in the self-test.
@@ -109,12 +107,6 @@ pub struct FunctionView {
     pub harness_arguments: String,
     /// Outputs of `r` as unsigned 64-bit words.
     pub outputs: Vec<String>,
-    /// Number in the self-test.
-    pub number: u32,
-    /// Draws in the self-test.
-    pub count: u32,
-    /// FNV-1a of the outputs.
-    pub checksum: String,
 }
 
 /// The tables of a bundle.
@@ -295,7 +287,7 @@ pub fn structs(bundle: &Bundle, language: Language) -> Vec<StructView> {
     structs
 }
 
-/// The functions of a bundle; checksums of the tested ones are filled in by the caller.
+/// The functions of a bundle.
 pub fn functions(bundle: &Bundle, language: Language) -> Vec<FunctionView> {
     (0..bundle.program.functions.len())
         .map(|k| function(bundle, k, language))
@@ -368,16 +360,12 @@ fn function(bundle: &Bundle, k: usize, language: Language) -> FunctionView {
         },
         faults: lowered.may_fault,
         internal: language == Language::C && bundle.has_chain && function.name == "sample",
-        tested: false,
         inputs: inputs
             .map(|((_, range), t)| input(*range, ty(t), language))
             .collect(),
         arguments: arguments.join(", ") + fault,
         harness_arguments: from_array.join(", ") + fault,
         outputs,
-        number: 0,
-        count: 0,
-        checksum: String::new(),
     }
 }
 

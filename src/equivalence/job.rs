@@ -6,6 +6,7 @@ use super::predicted;
 use super::{against, shrink};
 use crate::design::Design;
 use crate::emit::bundle::Bundle;
+use crate::emit::views::Language;
 use crate::error::Result;
 use crate::nodes::probe::Seen;
 use crate::nodes::run;
@@ -40,6 +41,8 @@ pub struct Request<'a> {
     pub against: Option<&'a Design>,
     /// More than one: emitted code is built and compared beside the paired run. The result is the same.
     pub threads: usize,
+    /// Languages of the emitted code that is built.
+    pub languages: &'a [Language],
 }
 
 /// Runs everything; with the result the shrunk stimulus, if a node left its bound or emitted code differs. The result
@@ -56,7 +59,7 @@ pub fn equivalence(
         .against
         .map(|other| against::against(design, other, stimulus.drive, stimulus.sense));
     let against = against.transpose()?;
-    let beside = || Beside::new(design, stimulus, request.command);
+    let beside = || Beside::new(design, stimulus, request.command, request.languages);
     let (seen, beside) = if request.threads < 2 {
         let beside = beside();
         (run::run(design, stimulus.drive, stimulus.sense), beside)
@@ -100,7 +103,7 @@ pub const COUNTEREXAMPLE: &str = "counterexample.csv";
 /// from the model (`mismatched`). `None` if neither happened, or emitted code differs elsewhere only.
 pub fn counterexample(
     seen: &Seen,
-    emitted: &[Emitted; 2],
+    emitted: &[Option<Emitted>; 2],
     stimulus: Stimulus,
     outside: &dyn Fn(&[i32], &[i32]) -> bool,
     mismatched: &dyn Fn(&[i32], &[i32]) -> bool,
@@ -111,7 +114,7 @@ pub fn counterexample(
     };
     let fails = if seen.nodes.iter().any(|n| n.outside > 0) {
         outside
-    } else if emitted.iter().any(on_stimulus) {
+    } else if emitted.iter().flatten().any(on_stimulus) {
         mismatched
     } else {
         return None;
@@ -126,19 +129,27 @@ const ON_STIMULUS: &str = "chain on the stimulus";
 /// What is done beside the paired run.
 struct Beside {
     firmware: Firmware,
-    emitted: [Emitted; 2],
+    emitted: [Option<Emitted>; 2],
     nco_spurs: NcoSpurs,
     loops: Vec<Hunting>,
     notes: Vec<String>,
 }
 
 impl Beside {
-    fn new(design: &Design, stimulus: Stimulus, command: &str) -> Result<Self> {
-        let firmware = Firmware::make(design, command)?;
-        let emitted = [
-            compared(design, stimulus, &firmware.c, &firmware.bundle)?,
-            compared(design, stimulus, &firmware.rust, &firmware.bundle)?,
-        ];
+    fn new(
+        design: &Design,
+        stimulus: Stimulus,
+        command: &str,
+        languages: &[Language],
+    ) -> Result<Self> {
+        let firmware = Firmware::make(design, command, languages)?;
+        let emitted = |language| {
+            let built = firmware.built(language);
+            built
+                .map(|built| compared(design, stimulus, built, &firmware.bundle))
+                .transpose()
+        };
+        let emitted = [emitted(Language::C)?, emitted(Language::Rust)?];
         let mut notes = Vec::new();
         let loops = hunting(design).unwrap_or_else(|error| {
             notes.push(format!("loops are not measured: {error}"));
@@ -155,8 +166,7 @@ impl Beside {
 
     /// Does emitted code differ from the model on these codes?
     fn differs(&self, design: &Design, drive: &[i32], sense: &[i32]) -> bool {
-        let built = [&self.firmware.c, &self.firmware.rust];
-        built.iter().any(|b| {
+        self.firmware.all().iter().any(|b| {
             let chain = compare::chain(design, b.language, &b.harness, drive, sense);
             chain.is_ok_and(|c| c.mismatches > 0)
         })
@@ -242,7 +252,7 @@ fn assemble(
         reasons.push(first.sentence());
     }
     for (emitted, language) in [(&c, "C"), (&rust, "Rust")] {
-        if emitted.mismatches > 0 {
+        if let Some(emitted) = emitted.as_ref().filter(|e| e.mismatches > 0) {
             let first = emitted.first.as_deref().unwrap_or("");
             reasons.push(format!(
                 "emitted {language} differs from the model: {first}"

@@ -208,10 +208,10 @@ pub struct Equivalence {
     pub rows: u64,
     /// In the order of the circuit's steps.
     pub nodes: Vec<NodeReport>,
-    /// Emitted C.
-    pub model_vs_c: Emitted,
+    /// Emitted C; null where it was not built.
+    pub model_vs_c: Option<Emitted>,
     /// Emitted Rust.
-    pub model_vs_rust: Emitted,
+    pub model_vs_rust: Option<Emitted>,
     /// Null if nothing overflowed.
     pub first_overflow: Option<FirstOverflow>,
     /// The changes, one after the other, until nothing overflows on this stimulus; empty if nothing did.

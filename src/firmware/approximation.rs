@@ -6,12 +6,18 @@ use crate::error::Result;
 use crate::firmware::files::EmittedFile;
 use crate::firmware::function;
 use crate::firmware::function::Standalone;
+use crate::firmware::vectors::Checked;
 use crate::tabulate::outcome::Outcome;
 use crate::vectors::model::Model;
 
 /// What both languages' bundles are tested with.
-pub fn vectors(settled: &Settled, model: &Model, threads: usize) -> Vec<EmittedFile> {
-    function::vectors(&settled.program, model, &|x| settled.run(x), threads)
+pub fn vectors(settled: &Settled, model: &Model) -> Vec<EmittedFile> {
+    function::vectors(&settled.program, model)
+}
+
+/// Number and checksum of every input, where these are few enough.
+pub fn every(settled: &Settled, model: &Model, threads: usize) -> Option<Checked> {
+    function::every(model, &|x| settled.run(x), threads)
 }
 
 /// The bundle in one language, as files in memory.
@@ -21,7 +27,7 @@ pub fn vectors(settled: &Settled, model: &Model, threads: usize) -> Vec<EmittedF
 pub fn emit(
     settled: &Settled,
     model: &Model,
-    vectors: &[EmittedFile],
+    (vectors, every): (&[EmittedFile], Option<Checked>),
     outcome: &Outcome,
     prefix: &str,
     language: Language,
@@ -34,6 +40,7 @@ pub fn emit(
         request_sha256: &outcome.design_sha256,
         command: &outcome.command,
         vectors,
+        every,
     };
     function::emit(&standalone, language)
 }

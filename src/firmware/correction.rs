@@ -34,7 +34,7 @@ pub fn emit(
     let what = Stepped {
         prefix: origin.prefix,
         program: &correction.trace(),
-        model: &|calls| correction.run_words(calls),
+        model: &|| Box::new(correction.stepper()),
         part: "correction",
         facts: sentences::facts(correction),
         request_sha256: origin.sha256,

@@ -1,43 +1,31 @@
 //! The files of a firmware bundle: sources, harness, self-test, vectors, manifest.
 
+use super::calibrated;
 use super::manifest::{self, Header, Manifest};
 use super::stepped::StreamView;
-use super::{calibrated, outside};
-use crate::circuit::engine::{self};
+use super::tested::{self, TestView, Tested};
+use super::vectors::{self, Checked};
 use crate::compensation::certainty;
 use crate::design::Design;
 use crate::emit::bundle::{Bundle, Part};
 use crate::emit::machine::{Type, Width, parameter_type};
 use crate::emit::views;
-use crate::emit::views::{FunctionView, Language, StateView, StructView, TableView, mix};
+use crate::emit::views::{FunctionView, Language, StateView, StructView, TableView};
 use crate::emit::{c, rust};
 use crate::error::{InputError, Result, io_error};
-use crate::numeric::trace::ir::{Function, Interval};
+use crate::numeric::trace::ir::Interval;
 use crate::text::{self, Place};
+use crate::vectors::chain;
+use crate::vectors::interpreter::Interpreter;
 use crate::vectors::model;
 use crate::vectors::model::Model;
-use crate::vectors::rows;
 use crate::vectors::stimulus;
-use crate::vectors::stimulus::{Lcg, SEED};
+use crate::vectors::stimulus::SEED;
 use askama::Template;
 use std::path::Path;
 
 /// Draws for each function in the self-test.
 const SELFTEST_DRAWS: u32 = 256;
-/// Decimation periods in the self-test, and least number of them in the vectors.
-const PERIODS: usize = 64;
-/// ADC samples of the chain's vectors, where the number of periods allows it.
-const VECTOR_SAMPLES: usize = 1 << 14;
-/// Most decimation periods in the vectors.
-const MOST_PERIODS: usize = 512;
-/// Words among which the vectors at ties and limits are searched.
-const CANDIDATES: usize = 1 << 16;
-/// Random vectors of each function.
-const VECTORS: usize = 1024;
-
-/// Random inputs among which those are searched that show a coefficient's last bit.
-const SEARCHED: usize = 1 << 19;
-
 /// A file of a bundle.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct EmittedFile {
@@ -76,16 +64,23 @@ pub struct View {
     initial: Vec<String>,
     sample_faults: bool,
     period_faults: bool,
-    pub(super) stimulated: bool,
+    pub(super) tests: Vec<TestView>,
     pub(super) stream: Option<StreamView>,
     seed: u64,
+    draws: u32,
     chain_count: usize,
     code: String,
     code_low: String,
     code_span: String,
     row: Vec<String>,
+    chain_state: Vec<String>,
     chain_checksum: String,
-    chain_number: u32,
+    pub(super) chain_number: u32,
+    vector_rows: usize,
+    /// Low end, width and rate of each word that a long run draws.
+    long_words: Vec<[String; 3]>,
+    long_steps: u64,
+    long_checksum: String,
 }
 
 page!(Readme, "bundle/README.md");
@@ -97,6 +92,7 @@ page!(CTables, "c/tables.c");
 page!(CSelftest, "c/selftest.c");
 page!(CHarness, "c/harness.c");
 page!(RustLib, "rust/lib.rs");
+page!(RustSelftest, "rust/selftest.rs");
 page!(RustHarness, "rust/harness.rs");
 
 /// Emits a design's firmware in one language, as files in memory.
@@ -123,25 +119,34 @@ pub fn emit(
     let models = model::models(design, &bundle.program);
     let banner = manifest::banner(&design.source.sha256, command);
     let facts = manifest::facts(design, &bundle);
-    let view = View::new(&bundle, &models, language, banner, facts);
+    let every: Vec<Option<Checked>> = match part {
+        Part::Tables => Vec::new(),
+        _ => models.iter().map(vectors::every_of).collect(),
+    };
+    let view = View::new(&bundle, &models, &every, language, banner, facts);
     let view = match part {
         Part::Tables => view.tables_alone(),
         _ => view.with_chain(design, &bundle, language),
     };
     let mut files = sources(&view, part, language)?;
     if part != Part::Tables {
-        files.extend(vectors(design, &bundle, &models));
+        files.extend(vectors::of_design(design, &bundle, &models));
     }
-    files.push(table_vectors(&view.tables));
+    files.push(vectors::of_tables(&view.tables));
     let header = Header {
         design_sha256: &design.source.sha256,
         command,
         language,
-        part: &format!("{part:?}").to_lowercase(),
+        part: match part {
+            Part::Chain if !bundle.has_chain => "compensation",
+            Part::Chain => "chain",
+            Part::Tables => "tables",
+            _ => "compensation",
+        },
         has_code: part != Part::Tables,
-        columns: &engine::columns(design),
+        columns: &chain::columns(design),
     };
-    let mut manifest = Manifest::new(&header, &bundle, &view.tables, &view.functions, &files);
+    let mut manifest = Manifest::new(&header, &bundle, &view, &files);
     manifest.calibrated = calibrated::Calibrated::of(design);
     files.push(EmittedFile {
         path: manifest::NAME.into(),
@@ -165,6 +170,35 @@ pub fn write(files: &[EmittedFile], folder: &Path) -> Result<()> {
     Ok(())
 }
 
+/// The paths of a bundle's sources, as [`emit`] gives them: of tables alone, or with code.
+pub fn paths(prefix: &str, only_tables: bool, language: Language) -> Vec<String> {
+    let p = prefix;
+    match language {
+        Language::C => {
+            let mut paths = vec![format!("{p}_tables.h"), format!("{p}_tables.c")];
+            if !only_tables {
+                paths.extend([
+                    format!("{p}_arith.h"),
+                    format!("{p}.h"),
+                    format!("{p}.c"),
+                    format!("{p}_selftest.c"),
+                    format!("test/{p}_harness.c"),
+                ]);
+            }
+            paths
+        }
+        Language::Rust => {
+            let paths = [
+                "src/lib.rs",
+                "src/selftest.rs",
+                "Cargo.toml",
+                "src/bin/harness.rs",
+            ];
+            paths.map(str::to_owned).to_vec()
+        }
+    }
+}
+
 pub(super) fn sources(view: &View, part: Part, language: Language) -> Result<Vec<EmittedFile>> {
     let p = &view.p;
     let v = view;
@@ -183,6 +217,7 @@ pub(super) fn sources(view: &View, part: Part, language: Language) -> Result<Vec
         }
         Language::Rust => {
             pages.push(("src/lib.rs".into(), RustLib { v }.render()));
+            pages.push(("src/selftest.rs".into(), RustSelftest { v }.render()));
             let cargo = format!(
                 "# {}\n[package]\nname = \"{p}\"\nversion = \"0.1.0\"\nedition = \"2021\"\npublish = false\n\n[workspace]\n",
                 v.banner
@@ -204,31 +239,50 @@ pub(super) fn sources(view: &View, part: Part, language: Language) -> Result<Vec
 }
 
 impl View {
-    /// What every bundle shows: its functions and tables with the checksums of the self-test.
+    /// What every bundle shows: its functions and tables with the checksums of the self-test. `every` of
+    /// each model: number and checksum of all its inputs, where these are few.
     pub(super) fn new(
         bundle: &Bundle,
         models: &[Model],
+        every: &[Option<Checked>],
         language: Language,
         banner: String,
         facts: Vec<String>,
     ) -> Self {
         let facts = facts.iter().map(|line| text::shown(line, Place::Source));
         let tables = views::tables(bundle, language);
-        let mut functions = views::functions(bundle, language);
+        let functions = views::functions(bundle, language);
+        let program = Interpreter::new(&bundle.program);
         let mut number = tables.len() as u32;
-        for view in &mut functions {
-            let Some(model) = models.iter().find(|m| m.name == view.name) else {
+        let mut tests = Vec::new();
+        for (k, function) in bundle.program.functions.iter().enumerate() {
+            let Some(m) = models.iter().position(|m| m.name == function.name) else {
                 continue;
             };
             number += 1;
-            view.tested = true;
-            view.number = number;
-            view.count = SELFTEST_DRAWS;
-            view.checksum = format!("{:#x}", selftest_checksum(model));
+            let (model, may_fault) = (&models[m], bundle.lowered[k].may_fault);
+            let checksum = match model.stands_alone() {
+                true => vectors::selftest_of_function(model, may_fault, SELFTEST_DRAWS),
+                false => 0,
+            };
+            let of = Tested {
+                model,
+                number,
+                checksum,
+                every: every.get(m).copied().flatten(),
+            };
+            tests.push(tested::view(bundle, &program, k, &of, language));
         }
-        let faults = |name: &str| {
-            let k = bundle.program.functions.iter().position(|f| f.name == name);
-            k.is_some_and(|k| bundle.lowered[k].may_fault)
+        let position = |name: &str| bundle.program.functions.iter().position(|f| f.name == name);
+        let faults = |name: &str| position(name).is_some_and(|k| bundle.lowered[k].may_fault);
+        let chain_state = match position("period") {
+            Some(k) if bundle.has_chain => {
+                let words = program.state(k).iter();
+                words
+                    .flat_map(|word| tested::state_words(word, "g.chain", language))
+                    .collect()
+            }
+            _ => Vec::new(),
         };
         View {
             p: bundle.prefix.clone(),
@@ -245,16 +299,22 @@ impl View {
             initial: initial(bundle, language),
             sample_faults: faults("sample"),
             period_faults: faults("period"),
-            stimulated: bundle.has_chain || functions.iter().any(|f| f.tested),
+            tests,
             stream: None,
             seed: SEED,
-            chain_count: PERIODS * bundle.ratio as usize,
+            draws: SELFTEST_DRAWS,
+            chain_count: vectors::PERIODS * bundle.ratio as usize,
             code: String::new(),
             code_low: String::new(),
             code_span: String::new(),
             row: Vec::new(),
+            chain_state,
             chain_checksum: String::new(),
             chain_number: number + 1,
+            vector_rows: 0,
+            long_words: Vec::new(),
+            long_steps: 0,
+            long_checksum: String::new(),
             functions,
             tables,
         }
@@ -272,7 +332,8 @@ impl View {
         self.structs.clear();
         self.functions.clear();
         self.checks.clear();
-        (self.chain, self.stimulated) = (false, false);
+        self.tests.clear();
+        self.chain = false;
         self
     }
 
@@ -296,13 +357,101 @@ impl View {
             ),
         };
         self.row = row(design, bundle, language);
-        self.chain_checksum = format!("{:#x}", chain_checksum(design, bundle));
+        if bundle.has_chain {
+            self.chain_checksum = format!("{:#x}", vectors::selftest_of_chain(design));
+            self.vector_rows = vectors::periods(design);
+            self.with_long(
+                vectors::long_words_of_chain(design),
+                vectors::long_of_chain(design),
+                language,
+            );
+        }
         self
     }
 
-    /// Functions that the self-test and the harness call.
-    fn tested(&self) -> impl Iterator<Item = &FunctionView> {
-        self.functions.iter().filter(|f| f.tested)
+    /// Adds a long run: the words that it draws, its steps and its checksum.
+    pub(super) fn with_long(
+        &mut self,
+        words: Vec<(Interval, u32)>,
+        (steps, checksum): Checked,
+        language: Language,
+    ) {
+        let low = Type::Signed(Width::W64);
+        let word = |(range, rate): (Interval, u32)| {
+            let span = (range.high - range.low) as u64;
+            match language {
+                Language::C => [
+                    c::constant("", range.low, low),
+                    format!("UINT64_C({span})"),
+                    format!("UINT32_C({rate})"),
+                ],
+                Language::Rust => [
+                    rust::constant(range.low, low),
+                    span.to_string(),
+                    rate.to_string(),
+                ],
+            }
+        };
+        self.long_words = words.into_iter().map(word).collect();
+        self.long_steps = steps;
+        self.long_checksum = format!("{checksum:#x}");
+    }
+
+    /// Steps and checksum of the long run, where there is one.
+    pub(super) fn long(&self) -> Option<(u64, &str)> {
+        (self.long_steps > 0).then_some((self.long_steps, self.long_checksum.as_str()))
+    }
+
+    /// The self-test draws words.
+    fn is_stimulated(&self) -> bool {
+        self.chain
+            || self.stream.is_some()
+            || self.tests.iter().any(|t| t.alone && !t.drawn.is_empty())
+    }
+
+    /// A row where the chain is at the pointer `g`.
+    fn row_at(&self) -> Vec<String> {
+        self.row
+            .iter()
+            .map(|word| word.replace("g.chain", "g->chain"))
+            .collect()
+    }
+
+    /// The words of the state at the end of a long run.
+    fn long_state(&self) -> &[String] {
+        match &self.stream {
+            Some(stream) => &stream.final_state,
+            None => &self.chain_state,
+        }
+    }
+
+    /// The type of a sequence's state.
+    fn stream_state(&self) -> &str {
+        self.stream.as_ref().map_or("", |t| match t.language {
+            Language::C => t.state.as_str(),
+            Language::Rust => t.camel.as_str(),
+        })
+    }
+
+    /// Words of a sequence's record.
+    fn stream_outputs(&self) -> usize {
+        self.stream
+            .as_ref()
+            .map_or(0, |t| t.function.outputs.len() + 1)
+    }
+
+    fn every_block(&self) -> u64 {
+        vectors::BLOCK
+    }
+
+    fn long_segment(&self) -> u64 {
+        stimulus::SEGMENT
+    }
+
+    /// Words of the longest record or line of vectors.
+    fn most_words(&self) -> usize {
+        let tests = self.tests.iter().map(|t| t.inputs + t.outputs);
+        tests.chain([16, self.row.len() + 1]).max().unwrap_or(16)
     }
 }
 
@@ -319,7 +468,7 @@ fn row(design: &Design, bundle: &Bundle, language: Language) -> Vec<String> {
     let outputs = &bundle.lowered[k].outputs;
     let bits = design.circuit.nco.phase_bits;
     let mask = u64::MAX >> (64 - bits);
-    engine::columns(design)
+    chain::columns(design)
         .iter()
         .map(
             |column| match outputs.iter().find(|(name, _)| name == column) {
@@ -378,129 +527,4 @@ fn checks(bundle: &Bundle) -> Vec<&'static str> {
 /// True if any value needs more than 64 bits.
 fn wide(bundle: &Bundle) -> bool {
     format!("{:?}{:?}", bundle.lowered, bundle.states).contains("W128")
-}
-
-fn selftest_checksum(model: &Model) -> u64 {
-    let mut lcg = Lcg(SEED);
-    let mut outputs = vec![0; model.outputs];
-    let mut h = views::BASIS;
-    for _ in 0..SELFTEST_DRAWS {
-        let inputs: Vec<i128> = model.inputs.iter().map(|range| lcg.word(*range)).collect();
-        model.call(&inputs, &mut outputs);
-        h = outputs.iter().fold(h, |h, word| mix(h, *word as u64));
-    }
-    h
-}
-
-fn chain_checksum(design: &Design, bundle: &Bundle) -> u64 {
-    if !bundle.has_chain {
-        return 0;
-    }
-    let format = design.circuit.adc.format;
-    let code = Interval::new(format.min_raw(), format.max_raw());
-    let mut lcg = Lcg(SEED);
-    let (mut drive, mut sense) = (Vec::new(), Vec::new());
-    for _ in 0..PERIODS * bundle.ratio as usize {
-        drive.push(lcg.word(code) as i32);
-        sense.push(lcg.word(code) as i32);
-    }
-    let words = rows::saturating_rows(design, &drive, &sense);
-    words
-        .iter()
-        .fold(views::BASIS, |h, word| mix(h, *word as u64))
-}
-
-pub(super) fn csv_line(words: &[i128]) -> String {
-    let words: Vec<String> = words.iter().map(i128::to_string).collect();
-    words.join(",") + "\n"
-}
-
-fn vectors(design: &Design, bundle: &Bundle, models: &[Model]) -> Vec<EmittedFile> {
-    let mut files = Vec::new();
-    for model in models {
-        let function = bundle.program.function(&model.name);
-        let (mut header, mut outputs) = (Vec::new(), Vec::new());
-        if let Some(f) = function {
-            header.extend(f.inputs.iter().map(|(port, _)| port.name));
-            outputs.extend(f.outputs.iter().map(|(port, _)| port.name));
-        }
-        header.extend(outputs);
-        header.push("fault");
-        let mut text = header.join(",") + "\n";
-        let mut inputs = stimulus::inputs(&model.inputs, VECTORS, SEED);
-        inputs.extend(calibrated::about_the_ends(design, model));
-        let candidates = stimulus::inputs(&model.inputs, CANDIDATES, SEED + 4);
-        inputs.extend(model.near_ties(&candidates));
-        inputs.extend(model.fault_edges(&candidates));
-        if model.name == "bias" {
-            let candidates: Vec<i128> = stimulus::inputs(&model.inputs, SEARCHED, SEED + 1)
-                .into_iter()
-                .flatten()
-                .collect();
-            let sensitive = model::sensitive_inputs(design, &candidates);
-            inputs.extend(sensitive.into_iter().map(|x| vec![x]));
-        }
-        let mut results = vec![0; model.outputs];
-        let position = |f: &Function| f.name == model.name;
-        let lowered = bundle.program.functions.iter().position(position);
-        let beside = lowered.map_or(Vec::new(), |k| {
-            outside::rows(&bundle.lowered[k], &model.inputs)
-        });
-        let inside = inputs.into_iter().map(|input| [input.clone(), input]);
-        for [given, due] in inside.chain(beside) {
-            let fault = model.call(&due, &mut results);
-            let mut line = given;
-            line.extend(&results);
-            line.push(i128::from(fault));
-            text += &csv_line(&line);
-        }
-        files.push(EmittedFile {
-            path: format!("vectors/{}.csv", model.name),
-            text,
-        });
-    }
-    if bundle.has_chain {
-        files.extend(chain_vectors(design, bundle));
-    }
-    files
-}
-
-fn chain_vectors(design: &Design, bundle: &Bundle) -> [EmittedFile; 2] {
-    // Long enough for the loops to reach their limits, where the periods are short.
-    let ratio = bundle.ratio as usize;
-    let periods = (VECTOR_SAMPLES / ratio).clamp(PERIODS, MOST_PERIODS);
-    let samples = periods * ratio;
-    let segment = periods.div_ceil(6) * ratio;
-    let (drive, sense) = stimulus::segments(design, samples, segment, SEED);
-    let mut input = String::from("drive_code,sense_code\n");
-    for (d, s) in drive.iter().zip(&sense) {
-        input += &format!("{d},{s}\n");
-    }
-    let mut output = engine::columns(design).join(",") + ",fault\n";
-    for row in rows::expected_rows(design, &drive, &sense) {
-        output += &csv_line(&row);
-    }
-    [
-        EmittedFile {
-            path: "vectors/chain_input.csv".into(),
-            text: input,
-        },
-        EmittedFile {
-            path: "vectors/chain_output.csv".into(),
-            text: output,
-        },
-    ]
-}
-
-pub(super) fn table_vectors(tables: &[TableView]) -> EmittedFile {
-    let mut text = String::from("table,entry,value\n");
-    for table in tables {
-        for (k, v) in table.entries.iter().enumerate() {
-            text += &format!("{},{k},{v}\n", table.name);
-        }
-    }
-    EmittedFile {
-        path: "vectors/tables.csv".into(),
-        text,
-    }
 }

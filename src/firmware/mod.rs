@@ -1,13 +1,18 @@
 //! Firmware bundles, as files in memory: sources with self-test, harness, vectors and manifest.
 //!
 //! [`files`] assembles the chain or its compensation, [`function`] one function alone, [`stepped`] one with a state,
-//! [`correction`] the step of a correction, [`approximation`] what `gyrogen approx` found; [`manifest`] says what is in a bundle, [`calibrated`] where it holds.
+//! [`correction`] the step of a correction, [`approximation`] what `gyrogen approx` found; [`manifest`] says what is in a bundle, [`calibrated`] where it holds,
+//! [`vectors`] and [`tested`] how it is compared; [`replace`] puts it in the place of an older one, of whose [`folder`] only plain files are read.
 
 pub mod approximation;
 pub mod calibrated;
 pub mod correction;
 pub mod files;
+pub mod folder;
 pub mod function;
 pub mod manifest;
 mod outside;
+pub mod replace;
 pub mod stepped;
+pub mod tested;
+pub mod vectors;

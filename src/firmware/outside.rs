@@ -1,11 +1,12 @@
 //! Vectors outside the inputs' ranges: a guarded function limits such words, and its limits are tested so.
 
 use crate::emit::machine::{Lowered, Type};
-use crate::numeric::trace::ir::Interval;
+use crate::vectors::model::Model;
 
 /// Inputs just outside their ranges and at the ends of their types, each with the inputs whose outputs are due:
-/// the same, limited. None for a function that limits nothing.
-pub(super) fn rows(lowered: &Lowered, ranges: &[Interval]) -> Vec<[Vec<i128>; 2]> {
+/// the same, limited. The state is inside its ranges. None for a function that limits nothing.
+pub(super) fn rows(lowered: &Lowered, model: &Model) -> Vec<[Vec<i128>; 2]> {
+    let ranges = &model.inputs;
     if !lowered.guarded {
         return Vec::new();
     }
@@ -29,6 +30,7 @@ pub(super) fn rows(lowered: &Lowered, ranges: &[Interval]) -> Vec<[Vec<i128>; 2]
         for word in beside.into_iter().filter(is_outside) {
             for others in [0, i128::from(i64::MIN), i128::from(i64::MAX)] {
                 let mut given: Vec<i128> = limited(&vec![others; ranges.len()]);
+                model.repair(&mut given);
                 given[k] = word;
                 let due = limited(&given);
                 rows.push([given, due]);

@@ -2,21 +2,30 @@
 //!
 //! Its first input restarts the state where it is 1. The state starts at zeros.
 
-use super::files::{self, EmittedFile, View, csv_line};
+use super::files::{self, EmittedFile, View};
 use super::manifest::{self, Header, Manifest};
-use super::outside;
+use super::tested;
+use super::vectors::{self, csv_line};
+use crate::correction::Calls;
 use crate::emit::bundle::{Bundle, Part, states};
 use crate::emit::lower::lower;
 use crate::emit::views;
 use crate::emit::views::{FunctionView, Language, mix};
 use crate::error::{Error, Result};
 use crate::numeric::trace::ir::{Interval, Program};
-use crate::vectors::stimulus::{Lcg, SEED};
+use crate::vectors::interpreter::Interpreter;
+use crate::vectors::model::Model;
+use crate::vectors::stimulus::{Lcg, LongRun, SEED, SEGMENT};
 
 /// Calls of the self-test, and of each of the three parts of the vectors.
 const CALLS: usize = 1024;
 /// A restart so often.
 const RESTART: usize = 512;
+
+/// What vectors and manifest call the calls in order.
+pub const SEQUENCE: &str = "sequence";
+/// Steps through 2^32 a call of the long run's first word, half of which are those of the second, and so on.
+const RATE: u32 = 1 << 23;
 
 /// What is emitted, and where it comes from.
 pub struct Stepped<'a> {
@@ -24,8 +33,8 @@ pub struct Stepped<'a> {
     pub prefix: &'a str,
     /// The recorded block: one function with a state, one output.
     pub program: &'a Program,
-    /// Its bit-accurate model: the output of each call, from the state at zeros.
-    pub model: &'a dyn Fn(&[Vec<i128>]) -> Vec<i128>,
+    /// Its bit-accurate model from the state at zeros.
+    pub model: &'a dyn Fn() -> Box<dyn Calls + 'a>,
     /// `part` in the manifest.
     pub part: &'static str,
     /// Lines for the head of the sources.
@@ -41,10 +50,16 @@ pub struct Stepped<'a> {
 pub struct StreamView {
     /// The function.
     pub function: FunctionView,
+    /// Printed in.
+    pub language: Language,
+    /// What vectors and self-test call it.
+    pub name: &'static str,
     /// The state's name.
     pub state: String,
     /// As a Rust type.
     pub camel: String,
+    /// The state `s` as unsigned 64-bit words.
+    pub final_state: Vec<String>,
     /// Number in the self-test.
     pub number: u32,
     /// Calls in the self-test.
@@ -81,27 +96,45 @@ pub fn emit(what: &Stepped, language: Language) -> Result<Vec<EmittedFile>> {
     let banner = manifest::banner(what.request_sha256, what.command);
     let mut facts = what.facts.clone();
     facts.push("words are two's complement; ranges beside them are proved, not observed".into());
-    let mut view = View::new(&bundle, &[], language, banner, facts);
+    let program = Interpreter::new(what.program);
+    let last = what.program.functions.len() - 1;
+    let models: Vec<Model> = (0..=last).map(|k| Model::recorded(&program, k)).collect();
+    let every: Vec<_> = models.iter().map(vectors::every_of).collect();
+    let mut view = View::new(&bundle, &models, &every, language, banner, facts);
     let shown = views::functions(&bundle, language).pop();
-    view.stimulated = true;
+    let words = program.state(last).iter();
+    let wide: Vec<bool> = words.clone().map(|word| word.is_wide()).collect();
     view.stream = Some(StreamView {
         function: shown.ok_or_else(internal)?,
+        language,
+        name: SEQUENCE,
+        final_state: words
+            .flat_map(|word| tested::state_words(word, "s", language))
+            .collect(),
         state: function.state.to_owned(),
         camel: crate::emit::rust::camel(function.state),
-        number: view.tables.len() as u32 + 1,
+        number: view.chain_number,
         count: CALLS,
         restart: RESTART,
-        checksum: format!("{:#x}", checksum(what.model, &ranges)),
+        checksum: format!("{:#x}", checksum(what.model, &ranges, &wide)),
     });
+    let rates = ranges.iter().skip(1).enumerate();
+    let drawn: Vec<(Interval, u32)> = rates
+        .map(|(k, range)| (*range, RATE / (k as u32 + 2)))
+        .collect();
+    let long = long(what.model, drawn.clone(), &wide);
+    view.with_long(drawn, (vectors::LONG, long), language);
     let mut emitted = files::sources(&view, Part::Compensation, language)?;
     let names = function.inputs.iter().map(|(port, _)| port.name);
     let names = names.chain(function.outputs.iter().map(|(port, _)| port.name));
-    let beside = bundle
-        .lowered
-        .last()
-        .map_or(Vec::new(), |l| outside::rows(l, &ranges));
-    emitted.push(vectors(what.model, &ranges, beside, &function.name, names));
-    emitted.push(files::table_vectors(&view.tables));
+    emitted.extend(
+        models
+            .iter()
+            .zip(&bundle.lowered)
+            .map(|(model, lowered)| vectors::function(model, Some(lowered), Vec::new())),
+    );
+    emitted.push(in_order(what.model, &ranges, names));
+    emitted.push(vectors::of_tables(&view.tables));
     let header = Header {
         design_sha256: what.request_sha256,
         command: what.command,
@@ -110,10 +143,10 @@ pub fn emit(what: &Stepped, language: Language) -> Result<Vec<EmittedFile>> {
         has_code: true,
         columns: &[],
     };
-    let mut manifest = Manifest::new(&header, &bundle, &view.tables, &view.functions, &emitted);
-    manifest.stream = Some(manifest::FunctionEntry {
-        number: view.tables.len() as u32 + 1,
-        name: function.name.clone(),
+    let mut manifest = Manifest::new(&header, &bundle, &view, &emitted);
+    manifest.sequence = Some(manifest::FunctionEntry {
+        number: view.chain_number,
+        name: SEQUENCE.to_owned(),
         inputs: function.inputs.len(),
         outputs: function.outputs.len(),
         every_input: None,
@@ -125,14 +158,37 @@ pub fn emit(what: &Stepped, language: Language) -> Result<Vec<EmittedFile>> {
     Ok(emitted)
 }
 
-/// Of the model's outputs on the self-test's stimulus.
-fn checksum(model: &dyn Fn(&[Vec<i128>]) -> Vec<i128>, ranges: &[Interval]) -> u64 {
+/// Of the model's outputs on the self-test's stimulus, and of its state then.
+fn checksum<'a>(
+    model: &dyn Fn() -> Box<dyn Calls + 'a>,
+    ranges: &[Interval],
+    wide: &[bool],
+) -> u64 {
     let mut lcg = Lcg(SEED);
-    let calls = (0..CALLS).map(|n| random(&mut lcg, ranges, n % RESTART == 0));
-    let outputs = model(&calls.collect::<Vec<_>>());
-    outputs
-        .iter()
-        .fold(views::BASIS, |h, word| mix(h, *word as u64))
+    let mut calls = model();
+    let outputs = (0..CALLS).map(|n| calls.call(&random(&mut lcg, ranges, n % RESTART == 0)));
+    let h = outputs.fold(views::BASIS, |h, word| mix(h, word as u64));
+    vectors::with_state(h, &calls.state(), wide)
+}
+
+/// Of the model's first state, its records over a long run, and its state then.
+fn long<'a>(
+    model: &dyn Fn() -> Box<dyn Calls + 'a>,
+    drawn: Vec<(Interval, u32)>,
+    wide: &[bool],
+) -> u64 {
+    let mut run = LongRun::new(drawn, SEED);
+    let mut calls = model();
+    let mut h = vectors::with_state(views::BASIS, &calls.state(), wide);
+    let mut words = Vec::new();
+    for n in 0..vectors::LONG {
+        words.clear();
+        words.push(i128::from(n % SEGMENT == 0));
+        words.extend(run.draw());
+        // The record ends with the fault, which is none.
+        h = mix(mix(h, calls.call(&words) as u64), 0);
+    }
+    vectors::with_state(h, &calls.state(), wide)
 }
 
 fn random(lcg: &mut Lcg, ranges: &[Interval], restart: bool) -> Vec<i128> {
@@ -141,13 +197,11 @@ fn random(lcg: &mut Lcg, ranges: &[Interval], restart: bool) -> Vec<i128> {
     words
 }
 
-/// Calls with the model's outputs: slow triangles over each range (as temperatures move), ends and zeros,
+/// Calls in order with the model's outputs: slow triangles over each range (as temperatures move), ends and zeros,
 /// random words.
-fn vectors<'a>(
-    model: &dyn Fn(&[Vec<i128>]) -> Vec<i128>,
+fn in_order<'a, 'm>(
+    model: &dyn Fn() -> Box<dyn Calls + 'm>,
     ranges: &[Interval],
-    beside: Vec<[Vec<i128>; 2]>,
-    name: &str,
     names: impl Iterator<Item = &'a str>,
 ) -> EmittedFile {
     let mut lcg = Lcg(SEED + 5);
@@ -164,7 +218,8 @@ fn vectors<'a>(
     };
     let mut calls = Vec::with_capacity(3 * CALLS);
     for n in 0..CALLS {
-        let mut words = vec![i128::from(n == 0)];
+        // The first call restarts by itself.
+        let mut words = vec![i128::from(n == CALLS / 2)];
         let inputs = ranges.iter().enumerate().skip(1);
         words.extend(inputs.map(|(k, range)| triangle(n, k, range)));
         calls.push(words);
@@ -179,16 +234,15 @@ fn vectors<'a>(
         calls.push(words);
     }
     calls.extend((0..CALLS).map(|n| random(&mut lcg, ranges, n % RESTART == 0)));
-    let (more, due): (Vec<_>, Vec<_>) = beside.into_iter().map(|[given, due]| (given, due)).unzip();
-    let given: Vec<Vec<i128>> = calls.iter().cloned().chain(more).collect();
-    calls.extend(due);
     let mut text = names.chain(["fault"]).collect::<Vec<_>>().join(",") + "\n";
-    for (mut line, word) in given.into_iter().zip(model(&calls)) {
+    let mut model = model();
+    for mut line in calls {
+        let word = model.call(&line);
         line.extend([word, 0]);
         text += &csv_line(&line);
     }
     EmittedFile {
-        path: format!("vectors/{name}.csv"),
+        path: format!("vectors/{SEQUENCE}.csv"),
         text,
     }
 }

@@ -4,6 +4,7 @@
 use super::outcome::Point;
 use super::{clamped_bias, compensation, thermometer_raw};
 use crate::design::{Compensation, CompensationInput, Design};
+use crate::emit::views::Language;
 use crate::error::{InputError, Result};
 use crate::numeric::format::Format;
 use crate::record::ThermalRecord;
@@ -58,7 +59,8 @@ pub fn points(
             .map(|r| r[0])
             .collect())
     };
-    let (c_words, rust_words) = (emitted(&firmware.c)?, emitted(&firmware.rust)?);
+    let of = |language| firmware.built(language).map(emitted).transpose();
+    let (c_words, rust_words) = (of(Language::C)?, of(Language::Rust)?);
     let temperature = ["die_degc", "chamber_degc"]
         .iter()
         .find_map(|name| record.column(name));
@@ -77,8 +79,12 @@ pub fn points(
             before_dps: rate_out[row] - applied_at(row),
             float_dps: rate_out[row] - applied_at(row) - clamped_bias(fit, thermometer[row]),
             fixed_dps: word(&fixed, k) - applied_at(row),
-            c_dps: word(&c_words, k) - applied_at(row),
-            rust_dps: word(&rust_words, k) - applied_at(row),
+            c_dps: c_words
+                .as_ref()
+                .map(|words| word(words, k) - applied_at(row)),
+            rust_dps: rust_words
+                .as_ref()
+                .map(|words| word(words, k) - applied_at(row)),
         })
         .collect())
 }

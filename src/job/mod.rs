@@ -24,6 +24,7 @@ pub mod word_lengths;
 
 use crate::compensation::certainty;
 use crate::design::Design;
+use crate::emit::views::Language;
 use crate::error::Result;
 use crate::record::{self};
 use outcome::Outcome;
@@ -44,6 +45,7 @@ pub fn run(
     design: &Design,
     record_path: Option<&Path>,
     command: &str,
+    languages: &[Language],
     say: Say,
 ) -> Result<Outcome> {
     let mut design = design.clone();
@@ -80,11 +82,11 @@ pub fn run(
     }
     let budget = budget::budget(&design, &fit, &certainty);
 
-    say("emitting, building and comparing C and Rust");
-    let firmware = crate::verify::firmware::Firmware::make(&design, command)?;
+    say("emitting the firmware, building and comparing it");
+    let firmware = crate::verify::firmware::Firmware::make(&design, command, languages)?;
     let compared = firmware.compare(&design)?;
 
-    say("running the record through float, fixed, C and Rust");
+    say("running the record through float, fixed and emitted code");
     let points = match &simulated {
         Some(run) => run.points(&design, &fit, &firmware)?,
         None => from_record::points(&design, &fit, &record, &firmware)?,

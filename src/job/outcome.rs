@@ -117,10 +117,12 @@ pub struct After {
     pub fixed: Drift,
     /// Emitted code (C and Rust, the larger figure).
     pub emitted: Drift,
-    /// Emitted C.
-    pub c: Drift,
+    /// Emitted C; absent where it was not built.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub c: Option<Drift>,
     /// Emitted Rust.
-    pub rust: Drift,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rust: Option<Drift>,
 }
 
 /// The fit in numbers.
@@ -193,22 +195,25 @@ impl Outcome {
             rms_dps: rms(&parts.points, of),
         };
         let before = drift(&|p| p.before_dps);
-        let (c, rust) = (drift(&|p| p.c_dps), drift(&|p| p.rust_dps));
+        let built = |of: fn(&Point) -> Option<f64>| {
+            let is_built = parts.points.iter().any(|p| of(p).is_some());
+            is_built.then(|| drift(&|p| of(p).unwrap_or(f64::NAN)))
+        };
+        let (c, rust) = (built(|p| p.c_dps), built(|p| p.rust_dps));
+        let fixed = drift(&|p| p.fixed_dps);
         let after = After {
             float: drift(&|p| p.float_dps),
-            fixed: drift(&|p| p.fixed_dps),
-            emitted: if c.drift_pp_dps >= rust.drift_pp_dps {
-                c
-            } else {
-                rust
+            emitted: match (c, rust) {
+                (Some(c), Some(rust)) if c.drift_pp_dps < rust.drift_pp_dps => rust,
+                (c, rust) => c.or(rust).unwrap_or(fixed),
             },
+            fixed,
             c,
             rust,
         };
         let points = &parts.points;
         let apart = points.iter().map(|p| (p.fixed_dps - p.float_dps).abs());
-        let differing = |p: &&Point| p.c_dps != p.fixed_dps || p.rust_dps != p.fixed_dps;
-        let on_record = points.iter().filter(differing).count() as u64;
+        let on_record = points.iter().filter(|p| p.differs()).count() as u64;
         let compensation = parts.design.compensation.as_ref();
         let fit = &parts.fit;
         let summary = Summary {
@@ -257,10 +262,12 @@ impl Outcome {
             },
             emitted: parts
                 .firmware
-                .files()
-                .map(|(path, text)| Emitted {
-                    path,
-                    sha256: sha256(text.as_bytes()),
+                .bundles()
+                .flat_map(|(files, folder)| {
+                    files.iter().map(move |file| Emitted {
+                        path: format!("{folder}/{}", file.path),
+                        sha256: sha256(file.text.as_bytes()),
+                    })
                 })
                 .collect(),
             warnings: parts.warnings.clone(),
@@ -288,10 +295,11 @@ impl Outcome {
             })
             .collect();
         for p in &self.parts.points {
-            if lines.is_empty() && (p.c_dps != p.fixed_dps || p.rust_dps != p.fixed_dps) {
+            if lines.is_empty() && p.differs() {
+                let [c, rust] = p.emitted(|dps| dps.to_string());
                 lines.push(format!(
-                    "record at {} s: fixed {}, C {}, Rust {} deg/s",
-                    p.time_s, p.fixed_dps, p.c_dps, p.rust_dps
+                    "record at {} s: fixed {}, C {c}, Rust {rust} deg/s",
+                    p.time_s, p.fixed_dps
                 ));
             }
         }

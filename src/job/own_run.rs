@@ -8,6 +8,7 @@ use crate::cosim::scale::{full_scale_dps, nominal_full_scale_dps};
 use crate::cosim::surroundings::Moment;
 use crate::cosim::{readings, stream};
 use crate::design::{CompensationInput, Design};
+use crate::emit::views::Language;
 use crate::error::{Error, InputError, Result};
 use crate::numeric::format::pow2;
 use crate::plant::profile::{Profile, Reading};
@@ -184,16 +185,19 @@ impl OwnRun {
         let fixed = self.fixed_dps(design)?;
         let (columns, rate, lsb) = rate_column(design)?;
         let rate_of = |words: &[i64]| self.mean_column(words, columns, rate, lsb);
-        let c = rate_of(
-            &firmware
-                .c
-                .chain(&self.stream.drive, &self.stream.sense, columns)?,
-        );
-        let rust = rate_of(&firmware.rust.chain(
-            &self.stream.drive,
-            &self.stream.sense,
-            columns,
-        )?);
+        let emitted = |language| -> Result<Option<Vec<f64>>> {
+            let Some(built) = firmware.built(language) else {
+                return Ok(None);
+            };
+            let (drive, sense) = (&self.stream.drive, &self.stream.sense);
+            let every = crate::vectors::chain::columns(design).len();
+            let rows = built.chain(drive, sense, every)?;
+            // The columns of `replay` come first.
+            let rows = rows.chunks_exact(every).flat_map(|row| &row[..columns]);
+            let rows: Vec<i64> = rows.copied().collect();
+            Ok(Some(rate_of(&rows)))
+        };
+        let (c, rust) = (emitted(Language::C)?, emitted(Language::Rust)?);
         let missing = f64::NAN;
         let at = |values: &[f64], k: usize| values.get(k).copied().unwrap_or(missing);
         let readings = self.readings.iter().zip(&self.moments).zip(&self.measured);
@@ -207,8 +211,8 @@ impl OwnRun {
                 before_dps: *rate,
                 float_dps: at(&float, k),
                 fixed_dps: at(&fixed, k),
-                c_dps: at(&c, k),
-                rust_dps: at(&rust, k),
+                c_dps: c.as_ref().map(|dps| at(dps, k)),
+                rust_dps: rust.as_ref().map(|dps| at(dps, k)),
             })
             .collect())
     }

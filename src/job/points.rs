@@ -19,10 +19,24 @@ pub struct Point {
     pub float_dps: f64,
     /// Compensated by the bit-accurate model.
     pub fixed_dps: f64,
-    /// Compensated by the emitted C.
-    pub c_dps: f64,
+    /// Compensated by the emitted C; `None` where it was not built.
+    pub c_dps: Option<f64>,
     /// Compensated by the emitted Rust.
-    pub rust_dps: f64,
+    pub rust_dps: Option<f64>,
+}
+
+impl Point {
+    /// True if emitted code that was built differs from the model.
+    pub fn differs(&self) -> bool {
+        let emitted = [self.c_dps, self.rust_dps];
+        let mut built = emitted.into_iter().flatten();
+        built.any(|dps| dps != self.fixed_dps)
+    }
+
+    /// C and Rust in words.
+    pub fn emitted(&self, show: impl Fn(f64) -> String) -> [String; 2] {
+        [self.c_dps, self.rust_dps].map(|dps| dps.map_or("not built".to_owned(), &show))
+    }
 }
 
 /// Points' drift: greatest minus least of the means over bins of the thermometer.

@@ -2,7 +2,11 @@
 
 use super::{Leftover, Ticket, undisturbed};
 use std::io;
-use std::process::{self, Command, ExitStatus, Output, Stdio};
+use std::process::{self, Command, ExitStatus};
+use std::time::{Duration, Instant};
+
+/// So often is looked whether a process has ended.
+const LOOK: Duration = Duration::from_millis(2);
 
 /// A started process in a group of its own. Dropped before it has ended, it is killed with all that it started.
 #[derive(Debug)]
@@ -38,59 +42,48 @@ pub fn spawn(command: &mut Command) -> io::Result<Child> {
     })
 }
 
-/// Starts a process without input, waits for it and takes what it prints.
-///
-/// # Errors
-/// A program that cannot be started, or whose output cannot be read.
-pub fn output(command: &mut Command) -> io::Result<Output> {
-    command
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped());
-    let mut child = spawn(command)?;
-    let (stdout, stderr) = (child.process.stdout.take(), child.process.stderr.take());
-    // Both at once, so that neither fills its pipe while the other is read.
-    let reader = std::thread::spawn(move || read(stderr));
-    let stdout = read(stdout);
-    let stderr = reader.join().unwrap_or_else(|_| Ok(Vec::new()));
-    Ok(Output {
-        status: child.wait()?,
-        stdout: stdout?,
-        stderr: stderr?,
-    })
-}
-
-fn read(stream: Option<impl io::Read>) -> io::Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    if let Some(mut stream) = stream {
-        stream.read_to_end(&mut bytes)?;
-    }
-    Ok(bytes)
-}
-
 impl Child {
-    /// Waits for the end.
+    /// Waits for the end, at most until `until`; `None`: it was ended.
     ///
     /// # Errors
     /// A process that cannot be waited for.
-    pub fn wait(&mut self) -> io::Result<ExitStatus> {
-        let status = self.process.wait()?;
+    pub fn wait(&mut self, until: Instant) -> io::Result<Option<ExitStatus>> {
+        loop {
+            if let Some(status) = self.process.try_wait()? {
+                self.ended = true;
+                return Ok(Some(status));
+            }
+            if Instant::now() >= until {
+                self.end()?;
+                return Ok(None);
+            }
+            std::thread::sleep(LOOK);
+        }
+    }
+
+    /// Ends it with all that it started.
+    ///
+    /// # Errors
+    /// A process that cannot be waited for.
+    pub fn end(&mut self) -> io::Result<()> {
+        #[cfg(unix)]
+        if let Some(group) = group(&self.process) {
+            kill(group);
+        }
+        // It may have ended by itself.
+        let _ = self.process.kill();
+        self.process.wait()?;
         self.ended = true;
-        Ok(status)
+        Ok(())
     }
 }
 
 impl Drop for Child {
     fn drop(&mut self) {
-        if self.ended {
-            return;
+        if !self.ended {
+            // Nobody is left to be told.
+            let _ = self.end();
         }
-        #[cfg(unix)]
-        if let Some(group) = group(&self.process) {
-            kill(group);
-        }
-        let _ = self.process.kill();
-        let _ = self.process.wait();
     }
 }
 

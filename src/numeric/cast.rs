@@ -180,6 +180,17 @@ impl Cast {
         ((1..127).contains(&self.shift) && self.rounding != Rounding::Floor).then_some(cast)
     }
 
+    /// The same cast with one bit of damage: `bit` more are dropped and wrapped to, the limits move.
+    pub fn with_damage(&self, bit: i32, (low, high): (i128, i128)) -> Cast {
+        let mut cast = self.clone();
+        let kernel = &mut cast.wide;
+        kernel.right = kernel.right.saturating_add_signed(bit).min(127);
+        kernel.bits = kernel.bits.saturating_add_signed(bit).clamp(1, 127);
+        kernel.low = kernel.low.saturating_add(low);
+        kernel.high = kernel.high.saturating_add(high).max(kernel.low);
+        cast
+    }
+
     /// Tells the cast what the ranges prove: that the value before the overflow step always lies
     /// within the limits, so that the step can go (and the whole cast, if it does not shift).
     pub fn prove_in_range(&mut self) {

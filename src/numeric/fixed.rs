@@ -1,7 +1,7 @@
 //! The bit-accurate arithmetic: a word is its raw two's-complement integer in a lane that the
 //! chain's ranges fit into.
 
-use super::arithmetic::{Arithmetic, IndexTable, LoopBody, Ring, SineTable, Table};
+use super::arithmetic::{Arithmetic, IndexTable, LoopBody, Ring, SineTable, StateVisitor, Table};
 use super::cast::{Cast, HasKernel, Label};
 use super::lane::Lane;
 use std::cell::Cell;
@@ -230,4 +230,19 @@ impl<W: HasKernel, R: Lane, const IDLE: bool> Arithmetic for Fixed<W, R, IDLE> {
     fn rotated(&self, _radius: (), _index: u32) {}
     #[inline(always)]
     fn wrapped_radius(&self, _radius: (), _width: u32) {}
+}
+
+/// Gathers a state's words, of residues the low bits of their ring.
+#[derive(Debug, Default)]
+pub struct Words(pub Vec<i128>);
+
+impl StateVisitor<Fixed<i128, i128>> for Words {
+    fn word(&mut self, _: &'static str, word: &mut i128, _: i128, _: i128) {
+        self.0.push(*word);
+    }
+
+    fn residues(&mut self, _: &'static str, residues: &mut [i128], ring: &Ring) {
+        let mask = i128::MAX >> (127 - ring.bits);
+        self.0.extend(residues.iter().map(|residue| residue & mask));
+    }
 }

@@ -19,6 +19,7 @@ pub mod svg;
 pub mod tables;
 pub mod text;
 
+use crate::emit::views::Language;
 use crate::error::{InputError, Result};
 use crate::job::outcome::Outcome;
 use askama::Template;
@@ -39,8 +40,8 @@ pub fn html(outcome: &Outcome) -> Result<String> {
         chosen: &parts.chosen,
         points: &parts.points,
         toolchains: [
-            &parts.firmware.c.harness.toolchain,
-            &parts.firmware.rust.harness.toolchain,
+            parts.firmware.toolchain(Language::C),
+            parts.firmware.toolchain(Language::Rust),
         ],
         output_lsb: compensation.map_or(f64::NAN, |c| c.output.format.lsb()),
     })

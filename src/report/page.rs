@@ -238,13 +238,14 @@ fn drift(shown: &Shown) -> Vec<[String; 4]> {
             share(d),
         ]
     };
-    vec![
+    let mut lines = vec![
         line("before compensation", s.before),
         line("after, float model", s.after.float),
         line("after, fixed-point model", s.after.fixed),
-        line("after, emitted C", s.after.c),
-        line("after, emitted Rust", s.after.rust),
-    ]
+    ];
+    lines.extend(s.after.c.map(|drift| line("after, emitted C", drift)));
+    lines.extend(s.after.rust.map(|drift| line("after, emitted Rust", drift)));
+    lines
 }
 
 fn budget_line(what: &str, dps: f64, shown: &Shown, kind: &str) -> [String; 4] {
@@ -262,10 +263,7 @@ fn equivalence(shown: &Shown) -> Vec<Equivalent> {
     let mut lines: Vec<Equivalent> = e.functions.iter().map(Equivalent::of).collect();
     let counted: u64 = e.functions.iter().map(|c| c.mismatches).sum();
     let on_record = e.mismatches.saturating_sub(counted);
-    let differing = shown
-        .points
-        .iter()
-        .find(|p| p.c_dps != p.fixed_dps || p.rust_dps != p.fixed_dps);
+    let differing = shown.points.iter().find(|p| p.differs());
     lines.push(Equivalent {
         name: "readings of the record".to_owned(),
         language: "C, Rust".to_owned(),
@@ -275,7 +273,8 @@ fn equivalence(shown: &Shown) -> Vec<Equivalent> {
         mismatches: grouped(on_record),
         same: on_record == 0,
         first: differing.map_or("–".to_owned(), |p| {
-            let [time, fixed, c, rust] = [p.time_s, p.fixed_dps, p.c_dps, p.rust_dps].map(reading);
+            let [time, fixed] = [p.time_s, p.fixed_dps].map(reading);
+            let [c, rust] = p.emitted(reading);
             format!("at {time} s: fixed {fixed}, C {c}, Rust {rust} deg/s")
         }),
     });

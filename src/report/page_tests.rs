@@ -51,8 +51,8 @@ impl Made {
                     before_dps: *rate,
                     float_dps: after,
                     fixed_dps: after + 1e-9,
-                    c_dps: after + 1e-9,
-                    rust_dps: after + 1e-9,
+                    c_dps: Some(after + 1e-9),
+                    rust_dps: Some(after + 1e-9),
                 }
             })
             .collect();
@@ -236,7 +236,7 @@ fn readings_that_are_missing_or_constant_break_no_figure() {
     for (k, p) in made.points.iter_mut().enumerate() {
         p.temperature_degc = f64::NAN;
         match k % 3 {
-            0 => (p.c_dps, p.rust_dps) = (f64::NAN, f64::INFINITY),
+            0 => (p.c_dps, p.rust_dps) = (Some(f64::NAN), Some(f64::INFINITY)),
             1 => (p.time_s, p.before_dps) = (f64::NAN, f64::NAN),
             _ => (p.thermometer, p.float_dps) = (f64::NAN, f64::NEG_INFINITY),
         }
@@ -255,7 +255,7 @@ fn a_difference_is_said_at_the_top() {
     made.summary.equivalence.mismatches = 3;
     made.summary.equivalence.functions[1].mismatches = 2;
     made.summary.equivalence.functions[1].first = Some("input 5: emitted [1], model [2]".into());
-    made.points[7].rust_dps += 1.0;
+    made.points[7].rust_dps = made.points[7].rust_dps.map(|dps| dps + 1.0);
     let html = made.html();
     assert!(html.contains("do not carry the model&#39;s bits: 3 mismatches"));
     assert!(html.contains("emitted code differs from the model"));

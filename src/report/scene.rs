@@ -108,8 +108,8 @@ impl<'a> Scene<'a> {
         let paths: [Of; 4] = [
             |p| p.float_dps,
             |p| p.fixed_dps,
-            |p| p.c_dps,
-            |p| p.rust_dps,
+            |p| p.c_dps.unwrap_or(f64::NAN),
+            |p| p.rust_dps.unwrap_or(f64::NAN),
         ];
         self.interval(&paths, &[heldout, -heldout])
     }
@@ -131,9 +131,9 @@ impl<'a> Scene<'a> {
             class("c", "c many"),
             Shape::Plus,
             0.8 * r,
-            &series(|p| p.c_dps),
+            &series(|p| p.c_dps.unwrap_or(f64::NAN)),
         );
-        let rust = series(|p| p.rust_dps);
+        let rust = series(|p| p.rust_dps.unwrap_or(f64::NAN));
         frame.markers(class("rust", "rust many"), Shape::Cross, 0.8 * r, &rust);
     }
 

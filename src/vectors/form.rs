@@ -1,5 +1,6 @@
 //! The model of an approximation's form, and copies of it that vectors have to tell from it.
 
+use super::interpreter::Interpreter;
 use super::model::Model;
 use crate::approx::form::polynomial::Polynomial;
 use crate::approx::form::{Form, Settled};
@@ -14,6 +15,7 @@ pub fn model(settled: &Settled) -> Result<Model> {
     let function = function.ok_or_else(|| Error::Check("internal: nothing was traced".into()))?;
     let narrow = settled.bits <= 64;
     let model = Model::new::<1, 1, Form>(function, settled.form.clone(), narrow);
+    let model = model.with_recorded(&Interpreter::new(&settled.program));
     Ok(model.with_damage::<1, 1, Form>(damaged(&settled.form), narrow))
 }
 

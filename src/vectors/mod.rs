@@ -1,7 +1,10 @@
-//! What emitted functions are tested with: the bit-accurate [`model`] of each ([`form`]: of an approximation), the chain's
-//! [`rows`], and the inputs ([`stimulus`]).
+//! What emitted functions are tested with: the bit-accurate [`model`] of each ([`form`]: of an approximation;
+//! [`interpreter`]: of what remembers something), the [`chain`] with its state, and the inputs ([`stimulus`], [`search`]).
 
+pub mod chain;
 pub mod form;
+pub mod interpreter;
 pub mod model;
-pub mod rows;
+mod repair;
+pub mod search;
 pub mod stimulus;

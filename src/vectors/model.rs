@@ -1,5 +1,8 @@
-//! The bit-accurate model of each emitted function without state, as something that can be called.
+//! The bit-accurate model of each emitted function, as something that can be called: without a state the block
+//! itself in [`Fixed`] arithmetic; with one the recorded program, its state going in and coming out as words.
 
+use super::interpreter::{Interpreter, StateWord};
+use super::repair::Repair;
 use crate::circuit::chain::Chain;
 use crate::circuit::compensate::Compensate;
 use crate::circuit::compensation::{Bias, Evaluation, Rate};
@@ -8,22 +11,35 @@ use crate::numeric::arithmetic::Block;
 use crate::numeric::cast::Cast;
 use crate::numeric::fixed::Fixed;
 use crate::numeric::trace::ir::{Function, Interval, Program};
+use std::sync::Arc;
 
 /// A function of the model.
 pub struct Model {
     /// The emitted function's name.
     pub name: String,
-    /// Range of each input.
+    /// Range of each input, then of each word of the state.
     pub inputs: Vec<Interval>,
-    /// Number of outputs.
+    /// Their names.
+    pub input_names: Vec<String>,
+    /// Names of the outputs, then of the words of the state.
+    pub output_names: Vec<String>,
+    /// Number of outputs with the words of the state.
     pub outputs: usize,
+    /// How many of these words are the state's.
+    pub state: usize,
+    /// True for each input and word of the state that takes two 64-bit words.
+    wide: Vec<bool>,
     call: Box<Evaluate>,
     /// The function with one rounding constant off by one.
     damaged: Vec<Box<Evaluate>>,
+    /// The recorded function, where vectors are searched.
+    pub(super) recorded: Option<(Arc<Interpreter>, usize)>,
+    /// What states have to hold that no single word's range says.
+    pub(super) repairs: Vec<Repair>,
 }
 
 /// Inputs, outputs; gives the number of the fault, 0 = none.
-type Evaluate = dyn Fn(&[i128], &mut [i128]) -> u32;
+type Evaluate = dyn Fn(&[i128], &mut [i128]) -> u32 + Send + Sync;
 
 impl Model {
     /// Evaluates; `inputs` and `outputs` have the model's lengths. Gives the number of the first
@@ -69,15 +85,159 @@ impl Model {
     ) -> Self
     where
         B: Block<Fixed<i64, i64>, I, O, State = ()> + Block<Fixed<i128, i128>, I, O, State = ()>,
-        B: 'static,
+        B: Send + Sync + 'static,
     {
+        let names = |ports: &[(crate::numeric::arithmetic::Port, usize)]| -> Vec<String> {
+            ports.iter().map(|(port, _)| port.name.to_owned()).collect()
+        };
+        let inputs = function.inputs.iter();
         Model {
             name: function.name.clone(),
-            inputs: function.inputs.iter().map(|(_, range)| *range).collect(),
+            inputs: inputs.clone().map(|(_, range)| *range).collect(),
+            input_names: inputs.map(|(port, _)| port.name.to_owned()).collect(),
+            output_names: names(&function.outputs),
             outputs: O,
+            state: 0,
+            wide: function
+                .inputs
+                .iter()
+                .map(|(_, range)| is_wide(range))
+                .collect(),
             call: evaluate(block, narrow),
             damaged: Vec::new(),
+            recorded: None,
+            repairs: Vec::new(),
         }
+    }
+
+    /// The model of any function as it was recorded, with its state among inputs and outputs.
+    pub fn recorded(program: &Arc<Interpreter>, number: usize) -> Self {
+        let function = &program.program().functions[number];
+        let words = program.state(number);
+        let named = || {
+            function
+                .outputs
+                .iter()
+                .enumerate()
+                .filter(|(_, (port, _))| !port.name.is_empty())
+        };
+        // Outputs of stages that the design lacks have no name.
+        let kept: Vec<usize> = named().map(|(k, _)| k).collect();
+        let mut output_names: Vec<String> =
+            named().map(|(_, (port, _))| port.name.to_owned()).collect();
+        let mut inputs: Vec<Interval> = function.inputs.iter().map(|(_, range)| *range).collect();
+        let mut input_names: Vec<String> = function
+            .inputs
+            .iter()
+            .map(|(port, _)| port.name.to_owned())
+            .collect();
+        let mut wide: Vec<bool> = inputs.iter().map(is_wide).collect();
+        wide.extend(words.iter().map(StateWord::is_wide));
+        inputs.extend(words.iter().map(StateWord::range));
+        input_names.extend(words.iter().map(StateWord::name));
+        output_names.extend(words.iter().map(StateWord::name));
+        let (count, run) = (function.inputs.len(), program.clone());
+        let call = move |inputs: &[i128], outputs: &mut [i128]| {
+            let mut state = inputs[count..].to_vec();
+            let mut results = Vec::with_capacity(kept.len());
+            let fault = run.call(number, &inputs[..count], &mut state, &mut results);
+            let words = kept.iter().map(|k| results[*k]).chain(state);
+            for (output, word) in outputs.iter_mut().zip(words) {
+                *output = word;
+            }
+            fault
+        };
+        Model {
+            name: function.name.clone(),
+            inputs,
+            input_names,
+            outputs: output_names.len(),
+            output_names,
+            state: words.len(),
+            wide,
+            call: Box::new(call),
+            damaged: Vec::new(),
+            recorded: Some((program.clone(), number)),
+            repairs: Repair::of(program, number),
+        }
+    }
+
+    /// The recorded function beside the model, so that vectors can be searched in it.
+    pub fn with_recorded(mut self, program: &Arc<Interpreter>) -> Self {
+        let functions = &program.program().functions;
+        let number = functions.iter().position(|f| f.name == self.name);
+        self.recorded = number.map(|number| (program.clone(), number));
+        self
+    }
+
+    /// Moves a word of a drawn state where the state would be one that no run of the chain reaches and that
+    /// the emitted code's types do not hold.
+    pub fn repair(&self, inputs: &mut [i128]) {
+        for repair in &self.repairs {
+            repair.apply(inputs);
+        }
+    }
+
+    /// Words that are drawn each for itself from its range make a call of it: no word of more than 64 bits, no
+    /// state that has to be repaired, no other blocks' states in its own.
+    pub fn stands_alone(&self) -> bool {
+        let holds_others = self.recorded.as_ref().is_some_and(|(program, number)| {
+            !program.program().functions[*number].members.is_empty()
+        });
+        !holds_others && self.repairs.is_empty() && !self.wide.contains(&true)
+    }
+
+    /// The words of a record as 64-bit words, a wider one as its low and its high half.
+    pub fn input_words(&self, inputs: &[i128]) -> Vec<i128> {
+        halves(inputs.iter().copied().zip(self.wide.iter().copied()))
+    }
+
+    /// The same of outputs and state; the fault stays as it is.
+    pub fn output_words(&self, outputs: &[i128]) -> Vec<i128> {
+        halves(outputs.iter().copied().zip(self.wide_outputs()))
+    }
+
+    /// True for each output and word of the state that takes two 64-bit words.
+    fn wide_outputs(&self) -> Vec<bool> {
+        let plain = std::iter::repeat_n(false, self.outputs - self.state);
+        let inputs = self.inputs.len() - self.state;
+        let state = self.wide[inputs..].iter().copied();
+        let mut wide: Vec<bool> = plain.chain(state).collect();
+        if let Some((program, number)) = &self.recorded {
+            let function = &program.program().functions[*number];
+            let named = function
+                .outputs
+                .iter()
+                .filter(|(port, _)| !port.name.is_empty());
+            for (wide, (_, id)) in wide.iter_mut().zip(named) {
+                *wide = function.nodes[*id].range.bits() > 64;
+            }
+        }
+        wide.push(false);
+        wide
+    }
+
+    /// The columns of its vectors: inputs, outputs, fault, each of at most 64 bits; and how many are inputs.
+    pub fn columns(&self) -> (Vec<String>, usize) {
+        let split = |names: &[String], wide: Vec<bool>| -> Vec<String> {
+            let columns = names.iter().zip(wide).flat_map(|(name, wide)| match wide {
+                true => vec![format!("{name}.low"), format!("{name}.high")],
+                false => vec![name.clone()],
+            });
+            columns.collect()
+        };
+        let mut columns = split(&self.input_names, self.wide.clone());
+        let inputs = columns.len();
+        columns.extend(split(&self.output_names, self.wide_outputs()));
+        columns.push("fault".to_owned());
+        (columns, inputs)
+    }
+
+    /// Outputs, state and fault at an input, as 64-bit words.
+    pub fn record(&self, input: &[i128]) -> Vec<i128> {
+        let mut outputs = vec![0; self.outputs + 1];
+        outputs[self.outputs] = i128::from(self.call(input, &mut outputs[..self.outputs]));
+        self.output_words(&outputs)
     }
 
     /// The model with damaged copies of its block, each of which vectors have to tell from it.
@@ -88,12 +248,25 @@ impl Model {
     ) -> Self
     where
         B: Block<Fixed<i64, i64>, I, O, State = ()> + Block<Fixed<i128, i128>, I, O, State = ()>,
-        B: 'static,
+        B: Send + Sync + 'static,
     {
         let blocks = blocks.into_iter().map(|block| evaluate(block, narrow));
         self.damaged = blocks.collect();
         self
     }
+}
+
+/// The machine type of these words has 128 bits.
+fn is_wide(range: &Interval) -> bool {
+    range.bits() > 64
+}
+
+fn halves(words: impl Iterator<Item = (i128, bool)>) -> Vec<i128> {
+    let split = words.flat_map(|(word, wide)| match wide {
+        true => vec![word & i128::from(u64::MAX), word >> 64],
+        false => vec![word],
+    });
+    split.collect()
 }
 
 /// On the way from `a` to `b`, one input after the other: the neighbours between which the fault
@@ -130,7 +303,7 @@ fn edge(fault: &mut impl FnMut(&[i128]) -> u32, a: &[i128], b: &[i128]) -> Vec<V
 fn evaluate<const I: usize, const O: usize, B>(block: B, narrow: bool) -> Box<Evaluate>
 where
     B: Block<Fixed<i64, i64>, I, O, State = ()> + Block<Fixed<i128, i128>, I, O, State = ()>,
-    B: 'static,
+    B: Send + Sync + 'static,
 {
     if narrow {
         Box::new(move |inputs, outputs| {
@@ -171,9 +344,7 @@ fn nudged<B: Clone>(block: &B, casts: fn(&mut B) -> Vec<&mut Cast>) -> Vec<B> {
     blocks
 }
 
-/// Models of the functions without state that a program has, in the program's order.
-///
-/// Functions with inputs of more than 64 bits are left out: only the chain reaches them.
+/// Models of the functions that a program has, in the program's order.
 pub fn models(design: &Design, program: &Program) -> Vec<Model> {
     match design.circuit.decimator.stages {
         1 => of_chain(&Chain::<1>::new(design), design, program),
@@ -193,12 +364,12 @@ fn of_chain<const N: usize>(chain: &Chain<N>, design: &Design, program: &Program
         .iter()
         .filter(|f| f.name.starts_with("demodulate"))
         .count();
+    let interpreter = Interpreter::new(program);
     let mut models = Vec::new();
-    for function in &program.functions {
-        let fits = |range: &Interval| range.bits() <= 64;
-        if !function.inputs.iter().all(|(_, range)| fits(range)) {
-            continue;
-        }
+    // `push` alone calls `sample`, and the chain's rows are compared with all that they leave in the state.
+    let called = program.functions.iter().enumerate();
+    for (number, function) in called.filter(|(_, f)| f.name != "sample") {
+        let recorded = || Model::recorded(&interpreter, number);
         let narrow = program.word_bits(function) <= 64;
         let base = function
             .name
@@ -218,21 +389,19 @@ fn of_chain<const N: usize>(chain: &Chain<N>, design: &Design, program: &Program
                 .with_damage(nudged(bias, Bias::casts_mut), narrow),
             ("rate", Some((_, rate))) => Model::new(function, rate.clone(), narrow)
                 .with_damage(nudged(rate, Rate::casts_mut), narrow),
-            ("in_range", _) => {
-                let Some(flag) = crate::circuit::compensate::in_range(design) else {
-                    continue;
-                };
-                Model::new(function, flag, narrow)
-            }
+            ("in_range", _) => match crate::circuit::compensate::in_range(design) {
+                Some(flag) => Model::new(function, flag, narrow),
+                None => recorded(),
+            },
             ("compensate", Some((bias, rate))) => {
                 let (bias, rate) = (bias.clone(), rate.clone());
                 // The callees' words count too.
                 let narrow = program.functions.iter().all(|f| program.word_bits(f) <= 64);
                 Model::new(function, Compensate { bias, rate }, narrow)
             }
-            _ => continue,
+            _ => recorded(),
         };
-        models.push(model);
+        models.push(model.with_recorded(&interpreter));
     }
     models
 }

@@ -23,11 +23,16 @@ impl Lcg {
         self.0
     }
 
-    /// A word of an interval of at most 2^64 values, as the emitted self-test draws it.
+    /// A word of an interval, as the emitted self-test draws it where the interval has at most 2^64 values.
     pub fn word(&mut self, range: Interval) -> i128 {
-        let span = (range.high - range.low) as u64;
+        let span = range.high.wrapping_sub(range.low);
+        if span > i128::from(u64::MAX) {
+            let [high, low] = [self.draw(), self.draw()].map(i128::from);
+            let drawn = ((high << 64) | low) & i128::MAX;
+            return range.low + span.checked_add(1).map_or(drawn, |n| drawn % n);
+        }
         let r = self.draw() >> 1;
-        let offset = match span.checked_add(1) {
+        let offset = match (span as u64).checked_add(1) {
             Some(n) => r % n,
             None => r,
         };
@@ -35,51 +40,76 @@ impl Lcg {
     }
 }
 
-/// Inputs of a function: every combination of ends, zero and their neighbours, then `random` draws.
-pub fn inputs(ranges: &[Interval], random: usize, seed: u64) -> Vec<Vec<i128>> {
-    let corners = |range: &Interval| {
-        let mut values: Vec<i128> = [
-            range.low,
-            range.low + 1,
-            -1,
-            0,
-            1,
-            range.high - 1,
-            range.high,
-        ]
+/// Words that every range is looked at: its ends, zero, and their neighbours.
+fn ends(range: &Interval) -> Vec<i128> {
+    let about = [
+        range.low,
+        range.low + 1,
+        -1,
+        0,
+        1,
+        range.high - 1,
+        range.high,
+    ];
+    let mut values: Vec<i128> = about
         .into_iter()
-        .filter(|v| range.is_within(*v, *v) || (range.low..=range.high).contains(v))
+        .filter(|v| (range.low..=range.high).contains(v))
         .collect();
-        values.dedup();
-        values
-    };
+    values.sort_unstable();
+    values.dedup();
+    values
+}
+
+/// Most words that are taken at their ends in every combination.
+const COMBINED: usize = 3;
+
+/// Inputs of a function: its words at their ends, in every combination where they are few, else at random
+/// and one by one; then `random` draws.
+pub fn inputs(ranges: &[Interval], random: usize, seed: u64) -> Vec<Vec<i128>> {
     let mut all: Vec<Vec<i128>> = vec![Vec::new()];
-    for range in ranges {
-        all = all
-            .iter()
-            .flat_map(|prefix| {
-                corners(range).into_iter().map(move |v| {
-                    let mut next = prefix.clone();
-                    next.push(v);
-                    next
-                })
-            })
+    if ranges.len() <= COMBINED {
+        for range in ranges {
+            let next = |prefix: &Vec<i128>| {
+                let extended = |v| prefix.iter().copied().chain([v]).collect();
+                ends(range).into_iter().map(extended).collect::<Vec<_>>()
+            };
+            all = all.iter().flat_map(next).collect();
+        }
+    } else {
+        let mut lcg = Lcg(seed + 7);
+        let pick = |lcg: &mut Lcg, range: &Interval| {
+            let ends = ends(range);
+            ends[(lcg.draw() >> 33) as usize % ends.len()]
+        };
+        all = (0..random / 2)
+            .map(|_| ranges.iter().map(|range| pick(&mut lcg, range)).collect())
             .collect();
+        for k in 0..ranges.len() {
+            for end in ends(&ranges[k]) {
+                let mut words: Vec<i128> = ranges.iter().map(|range| lcg.word(*range)).collect();
+                words[k] = end;
+                all.push(words);
+            }
+        }
     }
+    all.extend(self::random(ranges, random, seed));
+    all
+}
+
+/// Random words; in a third of the draws small ones, for rounding near zero.
+pub fn random(ranges: &[Interval], count: usize, seed: u64) -> Vec<Vec<i128>> {
     let mut lcg = Lcg(seed);
-    for k in 0..random {
-        let draw = ranges.iter().map(|range| {
+    let draw = |k: usize| {
+        let words = ranges.iter().map(|range| {
             let word = lcg.word(*range);
-            // A third of the draws are small words: rounding near zero.
-            if k % 3 == 2 {
-                (word >> (lcg.draw() >> 59)).clamp(range.low, range.high)
-            } else {
-                word
+            match k % 3 {
+                2 => (word >> (lcg.draw() >> 59)).clamp(range.low, range.high),
+                _ => word,
             }
         });
-        all.push(draw.collect());
-    }
-    all
+        words.collect()
+    };
+    (0..count).map(draw).collect()
 }
 
 /// Drive and sense codes: tones beside the NCO with noise, full-scale squares, constants at the
@@ -130,4 +160,63 @@ pub fn segments(design: &Design, samples: usize, length: usize, seed: u64) -> (V
         sense.push(s);
     }
     (drive, sense)
+}
+
+/// Steps that share their amplitude and kind in a long run.
+pub const SEGMENT: u64 = 4096;
+
+/// The stimulus of a long run, which the emitted harness makes for itself: triangles of changing amplitude
+/// beside the given frequencies, with noise and without, random words, squares, segment after segment.
+#[derive(Debug, Clone)]
+pub struct LongRun {
+    lcg: Lcg,
+    step: u64,
+    amplitude: u64,
+    detuning: u32,
+    words: Vec<(Interval, u32)>,
+}
+
+impl LongRun {
+    /// `words`: each word's range, and its steps through 2^32 a call.
+    pub fn new(words: Vec<(Interval, u32)>, seed: u64) -> Self {
+        LongRun {
+            lcg: Lcg(seed),
+            step: 0,
+            amplitude: 0,
+            detuning: 0,
+            words,
+        }
+    }
+
+    /// The words of the next call.
+    pub fn draw(&mut self) -> Vec<i128> {
+        if self.step.is_multiple_of(SEGMENT) {
+            self.amplitude = self.lcg.draw() >> 48;
+            self.detuning = (self.lcg.draw() >> 52) as u32;
+        }
+        let kind = (self.step / SEGMENT) % 4;
+        let n = self.step as u32;
+        self.step += 1;
+        let mut drawn = Vec::with_capacity(self.words.len());
+        for (k, (range, rate)) in self.words.iter().enumerate() {
+            let noise = self.lcg.draw() >> 32;
+            let turn = n
+                .wrapping_mul(rate.wrapping_add(self.detuning))
+                .wrapping_add((k as u32) << 30);
+            let up = turn.wrapping_mul(2);
+            let triangle = u64::from(if turn >> 31 == 0 { up } else { !up });
+            let scaled = (triangle * self.amplitude >> 16) + ((65535 - self.amplitude) << 15);
+            let place = match kind {
+                0 => scaled,
+                1 => (scaled + (noise >> 12)).min(u64::from(u32::MAX)),
+                2 => noise,
+                _ => u64::from(u32::MAX) * u64::from(turn >> 31),
+            };
+            let span = (range.high - range.low) as u64;
+            let high = (span >> 32) * place;
+            let low = ((span & u64::from(u32::MAX)) * place + u64::from(u32::MAX)) >> 32;
+            drawn.push(range.low + i128::from(high + low));
+        }
+        drawn
+    }
 }

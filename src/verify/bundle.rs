@@ -1,25 +1,30 @@
 //! Verifies a bundle from its own files alone: checksums, build, self-test, tables, vectors.
 
 use super::compare::{self, Compared};
+use super::expected;
 use super::target::{self, Target};
-use super::toolchain;
+use super::toolchain::{self, Harness};
 use crate::emit::views::Language;
 use crate::error::{InputError, Result, io_error};
-use crate::firmware::manifest;
-use crate::firmware::manifest::Manifest;
+use crate::firmware::files::EmittedFile;
+use crate::firmware::folder::Folder;
+use crate::firmware::manifest::{self, Manifest};
+use crate::leftovers::TemporaryFolder;
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// `verify.json` (`gyrogen.verify/1`).
+/// `verify.json` (`gyrogen.verify/2`).
 #[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
 pub struct Verification {
-    /// `gyrogen.verify/1`.
+    /// `gyrogen.verify/2`.
     pub schema: &'static str,
     /// Of the tool that verified.
     pub version: &'static str,
     /// Of the design that the bundle was made from.
     pub design_sha256: String,
+    /// SHA-256 of the manifest, which holds those of all other files.
+    pub digest: String,
     /// The command that verified.
     pub command: String,
     /// Where the code ran.
@@ -28,6 +33,9 @@ pub struct Verification {
     pub toolchain: String,
     /// Files that are not what the manifest says.
     pub changed_files: Vec<String>,
+    /// What a bundle of this part and language has to hold and does not, what it holds and must not, and what is
+    /// not as the digest or the design says.
+    pub problems: Vec<String>,
     /// The built-in start-up check passed; null for a bundle of tables alone, which has none.
     pub selftest: Option<bool>,
     /// Over all vectors.
@@ -47,17 +55,34 @@ pub struct Vectors {
     pub mismatches: u64,
 }
 
-/// Verifies the bundle in `folder` on this machine, or for another processor under emulation.
+/// What a bundle is held against beside itself.
+#[derive(Debug, Default)]
+pub struct Against {
+    /// The digest that `emit` printed.
+    pub digest: Option<String>,
+    /// The design's file.
+    pub design: Option<PathBuf>,
+}
+
+/// Emits the design's bundle of that part and language, for that command.
+pub type Emit<'a> = &'a dyn Fn(&Path, &Manifest) -> Result<Vec<EmittedFile>>;
+
+/// Verifies the bundle in `folder` on this machine, or for another processor under emulation. It builds the bundle's
+/// code and runs it.
 ///
 /// # Errors
 /// A folder that holds no bundle, vectors that cannot be read, no compiler or emulator; a bundle in Rust for another
-/// processor; code that does not compile.
-pub fn verify(folder: &Path, target: Target, command: &str) -> Result<Verification> {
-    let manifest = read_manifest(folder)?;
-    let language = match manifest.language.as_str() {
-        "c" => Language::C,
-        _ => Language::Rust,
-    };
+/// processor; code that does not compile or does not end.
+pub fn verify(
+    path: &Path,
+    target: Target,
+    against: &Against,
+    emit: Emit,
+    command: &str,
+) -> Result<Verification> {
+    let folder = Folder::open(path)?;
+    let (manifest, digest) = read_manifest(&folder, path)?;
+    let language = expected::language(&manifest);
     if language == Language::Rust && target != Target::Host {
         return Err(InputError::new(format!(
             "this bundle is in Rust, and {} is verified with the C bundle",
@@ -66,144 +91,272 @@ pub fn verify(folder: &Path, target: Target, command: &str) -> Result<Verificati
         .help("verify the C bundle for this target (both are the same operations), or this one with `--target host`")
         .into());
     }
-    let changed_files = changed(&manifest, folder);
-    let mut functions = Vec::new();
+    let mut problems = expected::problems(&manifest, &folder)?;
+    if let Some(due) = &against.digest
+        && !due.eq_ignore_ascii_case(&digest)
+    {
+        problems.push(format!("the bundle's digest is {digest}, not {due}"));
+    }
+    if let Some(design) = &against.design {
+        problems.extend(other_than(&emit(design, &manifest)?, &folder));
+    }
+    let changed_files = changed(&manifest, &folder);
+    let mut run = Run {
+        language,
+        manifest: &manifest,
+        folder: &folder,
+        named: path,
+        functions: Vec::new(),
+    };
     let mut toolchain_name = String::from("none: the part `tables` has nothing to run");
     let mut selftest = None;
-    let sources: Vec<String> = manifest.files.iter().map(|f| f.path.clone()).collect();
-    let harness_source = |path: &String| path.contains("harness");
-    if sources.iter().any(harness_source) {
-        let harness = match target::build(target, folder, &sources)? {
+    if !problems.is_empty() {
+        // What is not what it must be is not run.
+        toolchain_name = String::from("none: nothing was built");
+    } else if manifest.part != "tables" {
+        // Built from copies: no name of the folder's reaches a compiler.
+        let made = TemporaryFolder::of_the_system()
+            .map_err(|e| io_error(std::env::temp_dir(), "make a folder for the build", &e))?;
+        let sources = crate::firmware::files::paths(&manifest.prefix, false, language);
+        for source in &sources {
+            let to = made.path().join(source);
+            if let Some(parent) = to.parent() {
+                std::fs::create_dir_all(parent)
+                    .map_err(|e| io_error(parent, "make the folder", &e))?;
+            }
+            crate::output::write_whole(&to, &folder.read(source)?)?;
+        }
+        let harness = match target::build(target, made.path(), &sources)? {
             Some(emulated) => emulated,
-            None => toolchain::build(language, &manifest.prefix, folder, &sources)?,
+            None => toolchain::build(language, &manifest.prefix, made.path(), &sources)?,
         };
-        let status = harness.run(&["selftest".to_owned()], Vec::new(), 1, &mut |_| ())?;
+        let status = harness.run(&["selftest".to_owned()], Vec::new(), (1, 64), &mut |_| ())?;
         selftest = Some(status == Some(0));
         toolchain_name = harness.toolchain.clone();
-        let tables = read_tables(folder)?;
-        for table in &manifest.tables {
-            let expected = tables.get(&table.name).cloned().unwrap_or_default();
-            functions.push(compare::table(language, &harness, &table.name, &expected)?);
-        }
-        for function in &manifest.functions {
-            let path = folder.join(format!("vectors/{}.csv", function.name));
-            let rows = read_words(&path, function.inputs + function.outputs + 1)?;
-            let split = split(rows, function.inputs);
-            functions.push(compare::calls(
-                language,
-                &harness,
-                &function.name,
-                &split.0,
-                &split.1,
-            )?);
-            if let Some(path) = &function.every_input {
-                let blocks = read_words(&folder.join(path), 3)?;
-                let words = function.outputs + 1;
-                let every =
-                    compare::every_input(language, &harness, &function.name, words, &blocks)?;
-                functions.push(every);
-            }
-        }
-        if let Some(stream) = &manifest.stream {
-            let path = folder.join(format!("vectors/{}.csv", stream.name));
-            let rows = read_words(&path, stream.inputs + stream.outputs + 1)?;
-            let (inputs, outputs) = split(rows, stream.inputs);
-            let name = &stream.name;
-            functions.push(compare::stream(
-                language, &harness, name, &inputs, &outputs,
-            )?);
-        }
-        if let Some(chain) = &manifest.chain {
-            let codes = read_words(&folder.join("vectors/chain_input.csv"), 2)?;
-            let path = folder.join("vectors/chain_output.csv");
-            let rows = read_words(&path, chain.columns.len() + 1)?;
-            let column = |k: usize| codes.iter().map(|row| row[k] as i32).collect::<Vec<_>>();
-            functions.push(compare::chain_rows(
-                language,
-                &harness,
-                &column(0),
-                &column(1),
-                &rows,
-            )?);
-        }
+        run.all(&harness)?;
+        let empty = run.functions.iter().filter(|f| f.compared == 0);
+        problems.extend(empty.map(|f| format!("nothing of `{}` was compared", f.name)));
+    } else {
+        run.tables_alone(&mut problems)?;
     }
+    let functions = run.functions;
     let vectors = Vectors {
         compared: functions.iter().map(|f| f.compared).sum(),
         mismatches: functions.iter().map(|f| f.mismatches).sum(),
     };
     Ok(Verification {
-        schema: "gyrogen.verify/1",
+        schema: "gyrogen.verify/2",
         version: env!("CARGO_PKG_VERSION"),
+        holds: changed_files.is_empty()
+            && problems.is_empty()
+            && selftest != Some(false)
+            && vectors.mismatches == 0,
         design_sha256: manifest.design_sha256,
+        digest,
         command: command.to_owned(),
         target: target.name().into(),
         toolchain: toolchain_name,
-        holds: changed_files.is_empty() && selftest != Some(false) && vectors.mismatches == 0,
         changed_files,
+        problems,
         selftest,
         vectors,
         functions,
     })
 }
 
-fn read_manifest(folder: &Path) -> Result<Manifest> {
-    let path = folder.join(manifest::NAME);
-    let text = std::fs::read_to_string(&path)
-        .map_err(|e| io_error(&path, "read the bundle's manifest", &e))?;
+/// The manifest, and its digest.
+fn read_manifest(folder: &Folder, path: &Path) -> Result<(Manifest, String)> {
+    let named = path.join(manifest::NAME);
+    let text = folder.read_text(manifest::NAME)?;
     let manifest: Manifest = serde_json::from_str(&text).map_err(|e| {
         InputError::new(format!("this is no manifest of a bundle: {e}"))
-            .in_file(&path)
+            .in_file(&named)
             .at(e.line().max(1), e.column().max(1))
             .help("emit the bundle again with `gyrogen emit`")
     })?;
-    let inside = |path: &str| {
-        let parts = Path::new(path).components();
-        parts
-            .into_iter()
-            .all(|c| matches!(c, std::path::Component::Normal(_)))
-    };
-    if manifest.schema != "gyrogen.bundle/1" || !manifest.files.iter().all(|f| inside(&f.path)) {
-        return Err(InputError::new(format!(
-            "the manifest's schema is `{}`, or it names files outside the bundle",
-            manifest.schema
-        ))
-        .in_file(&path)
-        .help("this version verifies `gyrogen.bundle/1`; emit the bundle again")
-        .into());
+    if let Some(why) = expected::unusable(&manifest) {
+        return Err(
+            InputError::new(format!("the manifest cannot be used: {why}"))
+                .in_file(&named)
+                .help("emit the bundle again with `gyrogen emit`")
+                .into(),
+        );
     }
-    Ok(manifest)
+    Ok((manifest, crate::digest::sha256(text.as_bytes())))
 }
 
 /// Files that are missing or not what the manifest says.
-fn changed(manifest: &Manifest, folder: &Path) -> Vec<String> {
+fn changed(manifest: &Manifest, folder: &Folder) -> Vec<String> {
     let differs = |file: &&manifest::FileEntry| {
-        let bytes = std::fs::read(folder.join(&file.path));
+        let bytes = folder.read(&file.path);
         bytes.map_or(true, |b| crate::digest::sha256(&b) != file.sha256)
     };
     let files = manifest.files.iter().filter(differs);
     files.map(|file| file.path.clone()).collect()
 }
 
-/// Rows of integers under one header line, `columns` each.
-fn read_words(path: &Path, columns: usize) -> Result<Vec<Vec<i128>>> {
-    let text = std::fs::read_to_string(path).map_err(|e| io_error(path, "read the vectors", &e))?;
-    let mut rows = Vec::new();
-    for (number, line) in text.lines().enumerate().skip(1) {
-        let words: std::result::Result<Vec<i128>, _> = line.split(',').map(str::parse).collect();
-        match words {
-            Ok(words) if words.len() == columns => rows.push(words),
-            _ => {
+/// How the folder differs from what a design emits.
+fn other_than(due: &[EmittedFile], folder: &Folder) -> Vec<String> {
+    let differs = |file: &&EmittedFile| {
+        let bytes = folder.read(&file.path);
+        bytes.map_or(true, |bytes| bytes != file.text.as_bytes())
+    };
+    let files = due.iter().filter(differs);
+    files
+        .map(|f| format!("{} is not what the design emits", f.path))
+        .collect()
+}
+
+/// The comparisons of one bundle.
+struct Run<'a> {
+    language: Language,
+    manifest: &'a Manifest,
+    folder: &'a Folder,
+    named: &'a Path,
+    functions: Vec<Compared>,
+}
+
+impl Run<'_> {
+    fn all(&mut self, harness: &Harness) -> Result<()> {
+        let language = self.language;
+        let tables = self.tables()?;
+        for table in &self.manifest.tables {
+            let expected = tables.get(&table.name).cloned().unwrap_or_default();
+            self.functions
+                .push(compare::table(language, harness, &table.name, &expected)?);
+        }
+        for function in &self.manifest.functions {
+            let (inputs, outputs) = self.split(function)?;
+            let name = &function.name;
+            self.functions
+                .push(compare::calls(language, harness, name, &inputs, &outputs)?);
+            if let Some(due) = &function.every_input {
+                let words = function.outputs + 1;
+                self.functions
+                    .push(compare::every_input(language, harness, name, words, due)?);
+            }
+        }
+        if let Some(sequence) = &self.manifest.sequence {
+            let (inputs, outputs) = self.split(sequence)?;
+            let name = &sequence.name;
+            self.functions.push(compare::sequence(
+                language, harness, name, &inputs, &outputs,
+            )?);
+        }
+        if let Some(chain) = &self.manifest.chain {
+            let codes = self.words("chain_input", 2)?;
+            let rows = self.words("chain_output", chain.columns.len() + 1)?;
+            let column = |k: usize| codes.iter().map(|row| row[k] as i32).collect::<Vec<_>>();
+            let (drive, sense) = (column(0), column(1));
+            let mut compared = compare::chain_rows(language, harness, &drive, &sense, &rows)?;
+            if codes.len() as u64 != rows.len() as u64 * u64::from(chain.ratio) {
+                compared.mismatches += 1;
+                let what = format!(
+                    "{} samples are no {} rows of {}",
+                    codes.len(),
+                    rows.len(),
+                    chain.ratio
+                );
+                compared.first.get_or_insert(what);
+            }
+            self.functions.push(compared);
+        }
+        if let Some(due) = &self.manifest.long_run {
+            let words = self.manifest.sequence.as_ref().map(|s| s.outputs + 1);
+            self.functions.push(compare::long_run(
+                language,
+                harness,
+                words.unwrap_or(1),
+                due,
+            )?);
+        }
+        Ok(())
+    }
+
+    /// Of a bundle of tables alone: the files hold the entries of the vectors.
+    fn tables_alone(&self, problems: &mut Vec<String>) -> Result<()> {
+        let tables = self.tables()?;
+        for table in &self.manifest.tables {
+            let entries = tables.get(&table.name).map_or(0, Vec::len);
+            if entries == 0 || entries != table.entries {
+                problems.push(format!(
+                    "the vectors have {entries} entries of `{}`, not {}",
+                    table.name, table.entries
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// The vectors of a function: inputs and outputs.
+    fn split(
+        &self,
+        function: &manifest::FunctionEntry,
+    ) -> Result<(Vec<Vec<i128>>, Vec<Vec<i128>>)> {
+        let columns = function
+            .inputs
+            .saturating_add(function.outputs)
+            .saturating_add(1);
+        Ok(split(self.words(&function.name, columns)?, function.inputs))
+    }
+
+    /// Rows of integers under one header line, `columns` each.
+    fn words(&self, name: &str, columns: usize) -> Result<Vec<Vec<i128>>> {
+        let name = format!("vectors/{name}.csv");
+        let text = self.folder.read_text(&name)?;
+        let mut rows = Vec::new();
+        for (number, line) in text.lines().enumerate() {
+            let cells = line.split(',');
+            if number == 0 && cells.clone().count() == columns {
+                continue;
+            }
+            let words: std::result::Result<Vec<i128>, _> = cells.map(str::parse).collect();
+            match words {
+                Ok(words) if words.len() == columns && number > 0 => rows.push(words),
+                _ => {
+                    return Err(InputError::new(format!(
+                        "line {} has not {columns} columns of integers",
+                        number + 1
+                    ))
+                    .in_file(self.named.join(&name))
+                    .at(number + 1, 1)
+                    .help("the vectors were damaged; emit the bundle again")
+                    .into());
+                }
+            }
+        }
+        Ok(rows)
+    }
+
+    fn tables(&self) -> Result<BTreeMap<String, Vec<i128>>> {
+        let name = "vectors/tables.csv";
+        let text = self.folder.read_text(name)?;
+        let mut tables: BTreeMap<String, Vec<i128>> = BTreeMap::new();
+        for (number, line) in text.lines().enumerate().skip(1) {
+            let cells: Vec<&str> = line.split(',').collect();
+            let parsed = match cells.as_slice() {
+                [name, entry, value] => {
+                    let entries = tables.entry((*name).to_owned()).or_default();
+                    let counted = entry.parse() == Ok(entries.len());
+                    counted
+                        .then(|| value.parse::<i128>().ok())
+                        .flatten()
+                        .map(|v| entries.push(v))
+                }
+                _ => None,
+            };
+            if parsed.is_none() {
                 return Err(
-                    InputError::new(format!("`{line}` is no row of {columns} integers"))
-                        .in_file(path)
+                    InputError::new(format!("line {} is no entry of a table", number + 1))
+                        .in_file(self.named.join(name))
                         .at(number + 1, 1)
                         .help("the vectors were damaged; emit the bundle again")
                         .into(),
                 );
             }
         }
+        Ok(tables)
     }
-    Ok(rows)
 }
 
 /// Rows as inputs and outputs.
@@ -213,30 +366,4 @@ fn split(rows: Vec<Vec<i128>>, inputs: usize) -> (Vec<Vec<i128>>, Vec<Vec<i128>>
         (row, outputs)
     });
     parts.unzip()
-}
-
-fn read_tables(folder: &Path) -> Result<BTreeMap<String, Vec<i128>>> {
-    let path = folder.join("vectors/tables.csv");
-    let text =
-        std::fs::read_to_string(&path).map_err(|e| io_error(&path, "read the tables", &e))?;
-    let mut tables: BTreeMap<String, Vec<i128>> = BTreeMap::new();
-    for (number, line) in text.lines().enumerate().skip(1) {
-        let cells: Vec<&str> = line.split(',').collect();
-        match (
-            cells.as_slice(),
-            cells.last().and_then(|v| v.parse::<i128>().ok()),
-        ) {
-            ([name, _, _], Some(value)) => {
-                tables.entry((*name).to_owned()).or_default().push(value)
-            }
-            _ => {
-                return Err(InputError::new(format!("`{line}` is no entry of a table"))
-                    .in_file(&path)
-                    .at(number + 1, 1)
-                    .help("the vectors were damaged; emit the bundle again")
-                    .into());
-            }
-        }
-    }
-    Ok(tables)
 }

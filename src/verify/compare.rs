@@ -5,14 +5,18 @@ use crate::design::Design;
 use crate::emit::bundle::Bundle;
 use crate::emit::views::{self, Language};
 use crate::error::Result;
+use crate::firmware::manifest::{EveryEntry, LongEntry};
+use crate::vectors::chain;
 use crate::vectors::model;
 use crate::vectors::model::Model;
-use crate::vectors::rows::expected_rows;
+use crate::vectors::search;
 use crate::vectors::stimulus::{self, EXHAUSTIVE_BITS, SEED};
 use serde::Serialize;
 
 /// Random inputs of a function that is not compared exhaustively.
 const RANDOM_INPUTS: usize = 1 << 18;
+/// Random states and inputs of a function that remembers something.
+const RANDOM_STATES: usize = 1 << 13;
 /// ADC samples of the chain's comparison.
 pub const CHAIN_SAMPLES: usize = 1 << 20;
 
@@ -132,12 +136,17 @@ pub fn table(
     tally.outcome.exhaustive = true;
     let mut k = 0;
     let arguments = ["table".to_owned(), name.to_owned()];
-    harness.run(&arguments, Vec::new(), 1, &mut |words| {
-        tally.note(words, expected.get(k..=k).unwrap_or(&[]), || {
-            format!("entry {k}")
-        });
-        k += 1;
-    })?;
+    harness.run(
+        &arguments,
+        Vec::new(),
+        (1, expected.len() as u64),
+        &mut |words| {
+            tally.note(words, expected.get(k..=k).unwrap_or(&[]), || {
+                format!("entry {k}")
+            });
+            k += 1;
+        },
+    )?;
     Ok(tally.finish(expected.len() as u64))
 }
 
@@ -148,6 +157,7 @@ pub fn table(
 /// A test driver that cannot be run.
 pub fn function(language: Language, harness: &Harness, model: &Model) -> Result<Compared> {
     if let [range] = model.inputs.as_slice()
+        && model.state == 0
         && range.high - range.low < 1 << EXHAUSTIVE_BITS
     {
         let count = (range.high - range.low + 1) as u64;
@@ -161,27 +171,34 @@ pub fn function(language: Language, harness: &Harness, model: &Model) -> Result<
         tally.outcome.exhaustive = true;
         let mut input = range.low;
         let mut expected = vec![0; model.outputs + 1];
-        harness.run(&arguments, Vec::new(), model.outputs + 1, &mut |words| {
-            expected[model.outputs] =
-                i128::from(model.call(&[input], &mut expected[..model.outputs]));
-            tally.note(words, &expected, || format!("input {input}"));
-            input += 1;
-        })?;
+        harness.run(
+            &arguments,
+            Vec::new(),
+            (model.outputs + 1, count),
+            &mut |words| {
+                expected[model.outputs] =
+                    i128::from(model.call(&[input], &mut expected[..model.outputs]));
+                tally.note(words, &expected, || format!("input {input}"));
+                input += 1;
+            },
+        )?;
         return Ok(tally.finish(count));
     }
-    let inputs = stimulus::inputs(&model.inputs, RANDOM_INPUTS, SEED + 3);
-    let expected = inputs.iter().map(|input| {
-        let mut outputs = vec![0; model.outputs + 1];
-        outputs[model.outputs] = i128::from(model.call(input, &mut outputs[..model.outputs]));
-        outputs
-    });
-    calls(
-        language,
-        harness,
-        &model.name,
-        &inputs,
-        &expected.collect::<Vec<_>>(),
-    )
+    let count = match model.state {
+        0 => RANDOM_INPUTS,
+        _ => RANDOM_STATES,
+    };
+    let mut inputs = stimulus::inputs(&model.inputs, count, SEED + 3);
+    inputs.iter_mut().for_each(|words| model.repair(words));
+    if model.state > 0 {
+        inputs.extend(search::vectors(model, SEED + 3));
+    }
+    let expected: Vec<Vec<i128>> = inputs.iter().map(|input| model.record(input)).collect();
+    let inputs: Vec<Vec<i128>> = inputs
+        .iter()
+        .map(|input| model.input_words(input))
+        .collect();
+    calls(language, harness, &model.name, &inputs, &expected)
 }
 
 /// Compares a function on given inputs; the last expected word is the fault.
@@ -198,19 +215,19 @@ pub fn calls(
     records(language, harness, "call", name, inputs, expected)
 }
 
-/// Compares a function with a state, called once a reading, on given inputs from its state at zeros; the
+/// Compares the calls in order of a function with a state, once a reading, on given inputs from its state at zeros; the
 /// last expected word is the fault.
 ///
 /// # Errors
 /// A test driver that cannot be run.
-pub fn stream(
+pub fn sequence(
     language: Language,
     harness: &Harness,
     name: &str,
     inputs: &[Vec<i128>],
     expected: &[Vec<i128>],
 ) -> Result<Compared> {
-    records(language, harness, "stream", name, inputs, expected)
+    records(language, harness, "sequence", name, inputs, expected)
 }
 
 fn records(
@@ -229,7 +246,7 @@ fn records(
     harness.run(
         &[mode.to_owned(), name.to_owned()],
         bytes,
-        record,
+        (record, expected.len() as u64),
         &mut |words| {
             let due = expected.get(k).map_or(&[][..], Vec::as_slice);
             tally.note(words, due, || {
@@ -243,8 +260,7 @@ fn records(
     Ok(tally.finish(expected.len() as u64))
 }
 
-/// Compares a function of one input over every input there is, block by block with checksums: rows of
-/// first input, number of inputs, FNV-1a of all `words` words of their records.
+/// Compares a function over every input there is, by a checksum of all records.
 ///
 /// # Errors
 /// A test driver that cannot be run.
@@ -253,42 +269,55 @@ pub fn every_input(
     harness: &Harness,
     name: &str,
     words: usize,
-    blocks: &[Vec<i128>],
+    due: &EveryEntry,
+) -> Result<Compared> {
+    let of = (due.inputs, words as u64, due.checksum.as_str());
+    let mut compared = checksum(language, harness, &["every", name], name, of)?;
+    compared.exhaustive = true;
+    Ok(compared)
+}
+
+/// Compares the chain, or the calls of a function with a state, over a long stimulus that the harness makes, by a
+/// checksum of all rows and of the last state.
+///
+/// # Errors
+/// A test driver that cannot be run.
+pub fn long_run(
+    language: Language,
+    harness: &Harness,
+    words: usize,
+    due: &LongEntry,
+) -> Result<Compared> {
+    let of = (due.steps, words as u64, due.checksum.as_str());
+    checksum(language, harness, &["long"], "long run", of)
+}
+
+fn checksum(
+    language: Language,
+    harness: &Harness,
+    arguments: &[&str],
+    name: &str,
+    (inputs, words, due): (u64, u64, &str),
 ) -> Result<Compared> {
     let mut tally = Tally::new(language, name);
-    tally.outcome.exhaustive = true;
-    let (Some(first), Some(last)) = (blocks.first(), blocks.last()) else {
-        return Ok(tally.finish(0));
-    };
-    let count = last[0] + last[1] - first[0];
-    let arguments = ["range", name, &first[0].to_string(), &count.to_string()];
-    let mut due = blocks.iter();
-    let (mut input, mut h) = (first[0], views::BASIS);
-    let mut block = due.next();
-    harness.run(
-        &arguments.map(str::to_owned),
-        Vec::new(),
-        words,
-        &mut |record| {
-            h = record.iter().fold(h, |h, word| views::mix(h, *word));
-            input += 1;
-            let Some([low, size, checksum]) = block.map(Vec::as_slice) else {
-                return;
-            };
-            if input == low + size {
-                tally.outcome.inputs += *size as u64;
-                tally.outcome.compared += *size as u64 * (words as u64 - 1);
-                if h != *checksum as u64 {
-                    tally.outcome.mismatches += 1;
-                    let place = format!("inputs {low} .. {}: another checksum", low + size - 1);
-                    tally.outcome.first.get_or_insert(place);
-                }
-                h = views::BASIS;
-                block = due.next();
-            }
-        },
-    )?;
-    Ok(tally.finish(count as u64))
+    let due = due
+        .strip_prefix("0x")
+        .map(|hex| u64::from_str_radix(hex, 16));
+    let arguments: Vec<String> = arguments.iter().map(|&a| a.to_owned()).collect();
+    let mut found = None;
+    harness.run(&arguments, Vec::new(), (1, 1), &mut |word| {
+        found = word.first().copied()
+    })?;
+    tally.outcome.inputs = inputs;
+    tally.outcome.compared = inputs.saturating_mul(words);
+    if found.map(Ok) != due {
+        tally.outcome.mismatches = 1;
+        tally.outcome.first = Some(match found {
+            Some(word) => format!("all {inputs} inputs: checksum {word:#x}, model another"),
+            None => "all inputs: the emitted code gave no checksum".to_owned(),
+        });
+    }
+    Ok(tally.outcome)
 }
 
 /// Compares the chain row by row on captured codes.
@@ -302,7 +331,7 @@ pub fn chain(
     drive: &[i32],
     sense: &[i32],
 ) -> Result<Compared> {
-    let rows = expected_rows(design, drive, sense);
+    let rows = chain::rows(design, drive, sense);
     let mut compared = chain_rows(language, harness, drive, sense, &rows)?;
     compared.inputs = drive.len() as u64;
     Ok(compared)
@@ -327,7 +356,8 @@ pub fn chain_rows(
     let record = rows.first().map_or(1, Vec::len);
     let mut tally = Tally::new(language, "chain");
     let mut k = 0;
-    harness.run(&["chain".to_owned()], bytes, record, &mut |words| {
+    let most = rows.len() as u64;
+    harness.run(&["chain".to_owned()], bytes, (record, most), &mut |words| {
         let due = rows.get(k).map_or(&[][..], Vec::as_slice);
         tally.note(words, due, || format!("row {k}"));
         k += 1;

@@ -6,29 +6,32 @@ use crate::emit::views::Language;
 use crate::error::{Result, io_error};
 use crate::firmware::files;
 use crate::firmware::files::EmittedFile;
+use crate::firmware::replace;
 use crate::leftovers::TemporaryFolder;
 use crate::parallel::both;
 use crate::verify::compare::{self, Compared};
 use crate::verify::toolchain::{self, Harness};
+use std::path::Path;
 
-/// Both bundles, with their built test drivers.
+/// Both languages' bundles, with the test drivers of those that were built.
 #[derive(Debug)]
 pub struct Firmware {
     /// What was traced.
     pub bundle: Bundle,
-    /// C: files and driver.
-    pub c: Built,
-    /// Rust: files and driver.
-    pub rust: Built,
+    /// C, Rust.
+    emitted: [Vec<EmittedFile>; 2],
+    /// C first.
+    built: Vec<Built>,
 }
 
-/// One language's bundle.
+/// Names of the folders of both languages' bundles.
+const FOLDERS: [&str; 2] = ["firmware/c", "firmware/rust"];
+
+/// One language's bundle, built.
 #[derive(Debug)]
 pub struct Built {
     /// Which.
     pub language: Language,
-    /// The bundle's files.
-    pub files: Vec<EmittedFile>,
     /// The built driver.
     pub harness: Harness,
     // Holds the sources while the driver is built.
@@ -36,11 +39,11 @@ pub struct Built {
 }
 
 impl Firmware {
-    /// Emits and builds both.
+    /// Emits both and builds those of `languages`.
     ///
     /// # Errors
     /// No compiler; sources that do not compile.
-    pub fn make(design: &Design, command: &str) -> Result<Self> {
+    pub fn make(design: &Design, command: &str, languages: &[Language]) -> Result<Self> {
         let on_phase = design
             .compensation
             .as_ref()
@@ -50,47 +53,85 @@ impl Firmware {
         } else {
             Part::Compensation
         };
-        let (c, rust) = both(
-            || build(design, part, Language::C, command),
-            || build(design, part, Language::Rust, command),
-        );
+        let emit = |language| files::emit(design, part, language, command);
+        let (c, rust) = both(|| emit(Language::C), || emit(Language::Rust));
+        Firmware::of_files(Bundle::new(design, part), c?, rust?, languages)
+    }
+
+    /// Builds emitted files.
+    ///
+    /// # Errors
+    /// No compiler; sources that do not compile.
+    pub fn of_files(
+        bundle: Bundle,
+        c: Vec<EmittedFile>,
+        rust: Vec<EmittedFile>,
+        languages: &[Language],
+    ) -> Result<Self> {
+        let prefix = bundle.prefix.clone();
+        let build = |language, files: &[EmittedFile]| match languages.contains(&language) {
+            true => Built::of_files(files, language, &prefix).map(Some),
+            false => Ok(None),
+        };
+        let (built_c, built_rust) =
+            both(|| build(Language::C, &c), || build(Language::Rust, &rust));
         Ok(Firmware {
-            bundle: Bundle::new(design, part),
-            c: c?,
-            rust: rust?,
+            bundle,
+            built: built_c?.into_iter().chain(built_rust?).collect(),
+            emitted: [c, rust],
         })
     }
 
-    /// Compares both with the model: C first.
+    /// Those that were built, C first.
+    pub fn all(&self) -> &[Built] {
+        &self.built
+    }
+
+    /// A language's, if it was built.
+    pub fn built(&self, language: Language) -> Option<&Built> {
+        self.built.iter().find(|b| b.language == language)
+    }
+
+    /// Compiler and flags of a language.
+    pub fn toolchain(&self, language: Language) -> &str {
+        self.built(language)
+            .map_or("not built", |b| b.harness.toolchain.as_str())
+    }
+
+    /// Does something with each that was built, side by side; what comes of it, C first.
     ///
     /// # Errors
-    /// A driver that cannot be run.
-    pub fn compare(&self, design: &Design) -> Result<Vec<Compared>> {
-        let one = |built: &Built| {
-            compare::with_model(design, &self.bundle, built.language, &built.harness)
-        };
-        let (c, rust) = both(|| one(&self.c), || one(&self.rust));
+    /// Those of `work`.
+    pub fn each<T: Send>(&self, work: impl Fn(&Built) -> Result<Vec<T>> + Sync) -> Result<Vec<T>> {
+        let one = |language| self.built(language).map_or(Ok(Vec::new()), &work);
+        let (c, rust) = both(|| one(Language::C), || one(Language::Rust));
         let mut all = c?;
         all.extend(rust?);
         Ok(all)
     }
 
-    /// Every emitted file with its path under the output folder.
-    pub fn files(&self) -> impl Iterator<Item = (String, &str)> {
-        let of = |folder: &'static str, built: &'_ Built| -> Vec<(String, usize)> {
-            let files = built.files.iter().enumerate();
-            files
-                .map(|(k, f)| (format!("firmware/{folder}/{}", f.path), k))
-                .collect()
-        };
-        let c = of("c", &self.c)
-            .into_iter()
-            .map(|(path, k)| (path, self.c.files[k].text.as_str()));
-        let rust = of("rust", &self.rust)
-            .into_iter()
-            .map(|(path, k)| (path, self.rust.files[k].text.as_str()));
-        c.chain(rust)
+    /// Compares what was built with the model: C first.
+    ///
+    /// # Errors
+    /// A driver that cannot be run.
+    pub fn compare(&self, design: &Design) -> Result<Vec<Compared>> {
+        self.each(|built| compare::with_model(design, &self.bundle, built.language, &built.harness))
     }
+
+    /// The bundles, each with its folder among the results.
+    pub fn bundles(&self) -> impl Iterator<Item = (&[EmittedFile], &'static str)> {
+        self.emitted.iter().map(Vec::as_slice).zip(FOLDERS)
+    }
+}
+
+/// Refuses a folder of results whose firmware was edited: to be asked before work begins.
+///
+/// # Errors
+/// Edited files of a bundle, and files that are none of it.
+pub fn refuse_edited(out: &Path) -> Result<()> {
+    FOLDERS
+        .iter()
+        .try_for_each(|name| replace::refuse(&[], &out.join(name)))
 }
 
 impl Built {
@@ -98,8 +139,17 @@ impl Built {
     ///
     /// # Errors
     /// No compiler; sources that do not compile.
-    pub fn of_files(files: Vec<EmittedFile>, language: Language, prefix: &str) -> Result<Self> {
-        built(files, language, prefix)
+    pub fn of_files(files: &[EmittedFile], language: Language, prefix: &str) -> Result<Self> {
+        let folder = TemporaryFolder::of_the_system()
+            .map_err(|e| io_error(std::env::temp_dir(), "make a folder for the firmware", &e))?;
+        files::write(files, folder.path())?;
+        let sources: Vec<String> = files.iter().map(|f| f.path.clone()).collect();
+        let harness = toolchain::build(language, prefix, folder.path(), &sources)?;
+        Ok(Built {
+            language,
+            harness,
+            _folder: folder,
+        })
     }
 
     /// Outputs of a function for each input, the fault left out; `outputs` words each.
@@ -111,15 +161,19 @@ impl Built {
         let bytes: Vec<u8> = words.flat_map(i64::to_ne_bytes).collect();
         let mut results = Vec::with_capacity(inputs.len());
         let arguments = ["call".to_owned(), name.to_owned()];
-        self.harness
-            .run(&arguments, bytes, outputs + 1, &mut |words| {
+        self.harness.run(
+            &arguments,
+            bytes,
+            (outputs + 1, inputs.len() as u64),
+            &mut |words| {
                 results.push(
                     words[..outputs]
                         .iter()
                         .map(|w| i128::from(*w as i64))
                         .collect(),
                 );
-            })?;
+            },
+        )?;
         Ok(results)
     }
 
@@ -136,30 +190,11 @@ impl Built {
         self.harness.run(
             &["chain".to_owned()],
             bytes.collect(),
-            columns + 1,
+            (columns + 1, drive.len() as u64),
             &mut |words| {
                 rows.extend(words[..columns].iter().map(|w| *w as i64));
             },
         )?;
         Ok(rows)
     }
-}
-
-fn build(design: &Design, part: Part, language: Language, command: &str) -> Result<Built> {
-    let files = files::emit(design, part, language, command)?;
-    Built::of_files(files, language, &design.name)
-}
-
-fn built(files: Vec<EmittedFile>, language: Language, prefix: &str) -> Result<Built> {
-    let folder = TemporaryFolder::of_the_system()
-        .map_err(|e| io_error(std::env::temp_dir(), "make a folder for the firmware", &e))?;
-    files::write(&files, folder.path())?;
-    let sources: Vec<String> = files.iter().map(|f| f.path.clone()).collect();
-    let harness = toolchain::build(language, prefix, folder.path(), &sources)?;
-    Ok(Built {
-        language,
-        files,
-        harness,
-        _folder: folder,
-    })
 }

@@ -4,6 +4,8 @@
 pub mod bundle;
 pub mod compare;
 pub mod correction;
+mod expected;
 pub mod firmware;
+pub mod process;
 pub mod target;
 pub mod toolchain;

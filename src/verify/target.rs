@@ -4,9 +4,10 @@
 //! C library; `RUNTIME` has the few functions that the test driver needs. qemu's user mode executes them: the
 //! instructions are the processor's, its clock and memory are not, and cycles are not counted.
 
+use super::process;
 use super::toolchain::{self, C_FLAGS, Harness};
 use crate::error::{InputError, Result, io_error};
-use crate::leftovers::{self, TemporaryFolder};
+use crate::leftovers::TemporaryFolder;
 use std::path::Path;
 use std::process::Command;
 
@@ -114,8 +115,9 @@ fn first(
     packages: &str,
 ) -> Result<&'static str> {
     let answers = |name: &&&str| {
-        let answer = leftovers::output(Command::new(name).arg("--version"));
-        answer.is_ok_and(|answer| answer.status.success())
+        let mut command = Command::new(name);
+        command.arg("--version");
+        process::output(command, "it").is_ok_and(|said| said.status.success())
     };
     names.iter().find(answers).copied().ok_or_else(|| {
         InputError::new(format!(

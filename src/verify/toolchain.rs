@@ -1,11 +1,14 @@
 //! Builds a bundle's test driver with the system's compilers and talks to it.
 
+use super::process;
 use crate::emit::views::Language;
 use crate::error::{Error, InputError, Result, io_error};
 use crate::leftovers::{self, TemporaryFolder};
-use std::io::{Read, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::mpsc::RecvTimeoutError;
+use std::time::Instant;
 
 /// What the C is compiled with, apart from paths.
 pub const C_FLAGS: [&str; 8] = [
@@ -47,20 +50,20 @@ pub fn build(
     let made = TemporaryFolder::of_the_system()
         .map_err(|e| io_error(std::env::temp_dir(), "make a folder for the build", &e))?;
     let program = made.path().join("harness");
-    let compiler = compiler(language)?;
+    let (compiler, version) = compiler(language)?;
     let toolchain = match language {
         Language::C => {
-            let mut command = Command::new(&compiler);
+            let mut command = compiler.command();
             command.args(C_FLAGS).arg("-I").arg(folder);
             let c_files = sources.iter().filter(|path| path.ends_with(".c"));
             command.args(c_files.map(|path| folder.join(path)));
             command.arg("-o").arg(&program);
             compile(command, "the emitted C", made.path())?;
-            format!("{}; {}", version(&compiler), C_FLAGS.join(" "))
+            format!("{version}; {}", C_FLAGS.join(" "))
         }
         Language::Rust => {
             let library = made.path().join(format!("lib{prefix}.rlib"));
-            let mut command = Command::new(&compiler);
+            let mut command = compiler.command();
             command
                 .args(RUST_FLAGS)
                 .args(["--crate-type", "rlib", "--crate-name", prefix]);
@@ -69,7 +72,7 @@ pub fn build(
                 .arg("-o")
                 .arg(&library);
             compile(command, "the emitted Rust", made.path())?;
-            let mut command = Command::new(&compiler);
+            let mut command = compiler.command();
             let mut library_argument = std::ffi::OsString::from(format!("{prefix}="));
             library_argument.push(&library);
             command
@@ -81,7 +84,7 @@ pub fn build(
                 .arg("-o")
                 .arg(&program);
             compile(command, "the emitted Rust", made.path())?;
-            format!("{}; {}", version(&compiler), RUST_FLAGS.join(" "))
+            format!("{version}; {}", RUST_FLAGS.join(" "))
         }
     };
     Ok(Harness {
@@ -92,59 +95,132 @@ pub fn build(
     })
 }
 
-/// The compiler that the environment names (`CC`, `RUSTC`), or the first that answers.
-fn compiler(language: Language) -> Result<String> {
+/// A compiler's command: its program and the arguments that go before all others (`gcc -m64`).
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Compiler(Vec<String>);
+
+impl Compiler {
+    /// A command, its words between blanks; what is a file's name with blanks is one word.
+    fn new(named: &str) -> Self {
+        if Path::new(named).is_file() {
+            return Compiler(vec![named.to_owned()]);
+        }
+        Compiler(named.split_whitespace().map(str::to_owned).collect())
+    }
+
+    pub(super) fn command(&self) -> Command {
+        let mut words = self.0.iter();
+        let mut command = Command::new(words.next().map_or("", String::as_str));
+        command.args(words);
+        command
+    }
+
+    /// What it says of itself; or why it is none.
+    fn answer(&self) -> std::result::Result<String, String> {
+        let mut command = self.command();
+        command.arg("--version");
+        let said = process::output(command, "the compiler").map_err(|e| e.to_string())?;
+        if !said.status.success() {
+            return Err(format!("`--version` ends with {}", said.status));
+        }
+        let text = String::from_utf8_lossy(&said.stdout).into_owned();
+        let line = text.lines().next().unwrap_or("").trim().to_owned();
+        Ok(if line.is_empty() {
+            self.to_string()
+        } else {
+            line
+        })
+    }
+}
+
+impl std::fmt::Display for Compiler {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}", self.0.join(" "))
+    }
+}
+
+/// The compiler that the environment names (`CC`, `RUSTC`), or the first that answers, and what it says of
+/// itself.
+fn compiler(language: Language) -> Result<(Compiler, String)> {
     let (variable, names): (&str, &[&str]) = match language {
         Language::C => ("CC", &["cc", "gcc", "clang"]),
         Language::Rust => ("RUSTC", &["rustc"]),
     };
-    let named = std::env::var(variable).ok().filter(|name| !name.is_empty());
-    let candidates: Vec<String> = match named {
-        Some(name) => vec![name],
-        None => names.iter().map(|&name| name.to_owned()).collect(),
-    };
-    let answers = |name: &&String| {
-        let answer = leftovers::output(Command::new(name).arg("--version"));
-        answer.is_ok_and(|answer| answer.status.success())
-    };
-    match candidates.iter().find(answers) {
-        Some(name) => Ok(name.clone()),
-        None => Err(InputError::new(format!(
-            "there is no compiler to build the emitted code with (tried {})",
-            candidates.join(", ")
-        ))
-        .help(format!(
-            "install one, or name it in the environment variable {variable}"
-        ))
-        .into()),
+    let named = std::env::var(variable)
+        .ok()
+        .filter(|name| !name.trim().is_empty());
+    if let Some(name) = named {
+        let compiler = Compiler::new(&name);
+        return match compiler.answer() {
+            Ok(version) => Ok((compiler, version)),
+            Err(why) => Err(InputError::new(format!(
+                "`{compiler}`, which {variable} names, is no compiler that can be used: {why}"
+            ))
+            .help(format!(
+                "name a working compiler in {variable}, or unset it"
+            ))
+            .into()),
+        };
     }
+    for name in names {
+        let compiler = Compiler::new(name);
+        if let Ok(version) = compiler.answer() {
+            return Ok((compiler, version));
+        }
+    }
+    Err(InputError::new(format!(
+        "there is no compiler to build the emitted code with (tried {})",
+        names.join(", ")
+    ))
+    .help(format!(
+        "install one, or name it in the environment variable {variable}"
+    ))
+    .into())
+}
+
+/// The languages that emitted code can be built in on this machine, of those that are asked for (`None`: both), and
+/// for each other one why not. To be asked before work begins.
+///
+/// # Errors
+/// No compiler for any of them.
+pub fn languages(asked: Option<Language>) -> Result<(Vec<Language>, Vec<String>)> {
+    let wanted = match asked {
+        Some(language) => vec![language],
+        None => vec![Language::C, Language::Rust],
+    };
+    let (mut found, mut lacking) = (Vec::new(), Vec::new());
+    for language in wanted {
+        match compiler(language) {
+            Ok(_) => found.push(language),
+            Err(error) => lacking.push(error),
+        }
+    }
+    if found.is_empty() {
+        return Err(lacking.swap_remove(0));
+    }
+    Ok((found, lacking.iter().map(ToString::to_string).collect()))
 }
 
 pub(super) fn version(compiler: &str) -> String {
-    let output = leftovers::output(Command::new(compiler).arg("--version"));
-    let text = output.map(|o| String::from_utf8_lossy(&o.stdout).into_owned());
-    let line = text
-        .unwrap_or_default()
-        .lines()
-        .next()
-        .unwrap_or("")
-        .to_owned();
-    if line.is_empty() {
-        compiler.to_owned()
-    } else {
-        line
-    }
+    let compiler = Compiler::new(compiler);
+    compiler.answer().unwrap_or_else(|_| compiler.to_string())
 }
 
 /// Runs a compiler; what it puts aside goes into `scratch`, which is removed with all that is in it.
 pub(super) fn compile(mut command: Command, what: &str, scratch: &Path) -> Result<()> {
-    let output = leftovers::output(command.env("TMPDIR", scratch))
-        .map_err(|e| InputError::new(format!("cannot run the compiler: {e}")))?;
-    if output.status.success() {
+    command.env("TMPDIR", scratch);
+    let said = process::output(command, "the compiler")?;
+    if said.status.success() {
         return Ok(());
     }
-    let messages = String::from_utf8_lossy(&output.stderr);
-    let shown: Vec<&str> = messages.lines().take(20).collect();
+    let messages = String::from_utf8_lossy(&said.stderr);
+    let printable = |line: &str| -> String {
+        line.chars()
+            .map(|c| if c.is_control() { ' ' } else { c })
+            .take(400)
+            .collect()
+    };
+    let shown: Vec<String> = messages.lines().take(20).map(printable).collect();
     Err(Error::Check(format!(
         "{what} does not compile:\n{}",
         shown.join("\n")
@@ -168,15 +244,16 @@ impl Harness {
     }
 
     /// Runs the driver with these arguments and input; hands its output to `each`, record by record
-    /// of `record` 64-bit words. Gives the exit status.
+    /// of `record` 64-bit words, at most `most` of them and one more: then it is ended. Gives the exit status,
+    /// `None` where it was ended.
     ///
     /// # Errors
-    /// A driver that cannot be started or that breaks off.
+    /// A driver that cannot be started or that breaks off; one that does not end in time (a check that does not hold).
     pub fn run(
         &self,
         arguments: &[String],
         input: Vec<u8>,
-        record: usize,
+        (record, most): (usize, u64),
         each: &mut dyn FnMut(&[u64]),
     ) -> Result<Option<i32>> {
         let failed = |e: std::io::Error| io_error(&self.program, "run the test driver", &e);
@@ -193,38 +270,93 @@ impl Harness {
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::null());
+        let limit = process::limit();
+        let until = Instant::now() + limit;
         let mut child = leftovers::spawn(&mut command).map_err(failed)?;
-        let stdin = child.process.stdin.take();
-        let feeder = std::thread::spawn(move || {
-            if let Some(mut stdin) = stdin {
-                // A driver that stops reading shows in its output.
-                let _ = stdin.write_all(&input);
-            }
-        });
-        if let Some(mut stdout) = child.process.stdout.take() {
-            let mut bytes = vec![0u8; 1 << 16];
-            let mut held = Vec::new();
-            let mut words = Vec::new();
-            loop {
-                let count = stdout.read(&mut bytes).map_err(failed)?;
-                if count == 0 {
-                    break;
+        let (stdin, mut stdout) = (child.process.stdin.take(), child.process.stdout.take());
+        let (send, receive) = std::sync::mpsc::sync_channel::<Vec<u8>>(16);
+        std::thread::scope(|scope| {
+            scope.spawn(move || {
+                if let Some(mut stdin) = stdin {
+                    // A driver that stops reading shows in its output.
+                    let _ = stdin.write_all(&input);
                 }
-                held.extend_from_slice(&bytes[..count]);
-                let whole = held.len() / 8 * 8;
-                words.extend(held[..whole].chunks_exact(8).map(|c| {
-                    let mut word = [0; 8];
-                    word.copy_from_slice(c);
-                    u64::from_ne_bytes(word)
-                }));
-                held.drain(..whole);
-                let complete = words.len() / record * record;
-                words[..complete].chunks_exact(record).for_each(&mut *each);
-                words.drain(..complete);
+            });
+            scope.spawn(move || {
+                let mut bytes = vec![0u8; 1 << 16];
+                while let Some(stdout) = &mut stdout {
+                    let count = std::io::Read::read(stdout, &mut bytes).unwrap_or(0);
+                    if count == 0 || send.send(bytes[..count].to_vec()).is_err() {
+                        break;
+                    }
+                }
+            });
+            let mut records = Records {
+                size: record,
+                left: most.saturating_add(1),
+                held: Vec::new(),
+            };
+            let mut ended = false;
+            loop {
+                let left = until.saturating_duration_since(Instant::now());
+                match receive.recv_timeout(left) {
+                    Ok(bytes) if records.take(&bytes, each) => {}
+                    Err(RecvTimeoutError::Disconnected) => break,
+                    // More than is due, or no end.
+                    Ok(_) | Err(RecvTimeoutError::Timeout) => {
+                        ended = true;
+                        break;
+                    }
+                }
             }
+            if ended {
+                child.end().map_err(failed)?;
+            }
+            drop(receive);
+            let status = child.wait(until).map_err(failed)?;
+            // What it started may hold its pipes open.
+            child.end().map_err(failed)?;
+            if status.is_none() || ended && records.left > 0 {
+                return Err(Error::Check(format!(
+                    "the emitted code's test driver did not end within {} s and was ended (GYROGEN_TIME_LIMIT gives \
+                     another limit, in seconds)",
+                    limit.as_secs()
+                )));
+            }
+            Ok(status.filter(|_| !ended).and_then(|status| status.code()))
+        })
+    }
+}
+
+/// Gathers records from bytes.
+struct Records {
+    size: usize,
+    /// How many more are wanted.
+    left: u64,
+    held: Vec<u8>,
+}
+
+impl Records {
+    /// Hands on what is whole; false if no more are wanted.
+    fn take(&mut self, bytes: &[u8], each: &mut dyn FnMut(&[u64])) -> bool {
+        self.held.extend_from_slice(bytes);
+        let size = 8 * self.size.max(1);
+        let whole = self.held.len() / size * size;
+        let mut words = Vec::with_capacity(self.size);
+        for record in self.held[..whole].chunks_exact(size) {
+            if self.left == 0 {
+                break;
+            }
+            words.clear();
+            words.extend(record.chunks_exact(8).map(|c| {
+                let mut word = [0; 8];
+                word.copy_from_slice(c);
+                u64::from_ne_bytes(word)
+            }));
+            each(&words);
+            self.left -= 1;
         }
-        let status = child.wait().map_err(failed)?;
-        let _ = feeder.join();
-        Ok(status.code())
+        self.held.drain(..whole);
+        self.left > 0
     }
 }

@@ -1,10 +1,19 @@
 /* {{ v.banner }}
  *
- * Host-side driver, not firmware. `selftest` runs the start-up check; `table NAME` writes a table;
- * `call NAME` reads int64 inputs and writes the outputs; `range NAME LOW COUNT` counts one input
- * up; `stream` calls a function with a state for int64 inputs from the state at zeros; `chain` reads
- * int32 pairs (drive, sense) and writes rows. Words are native int64; every record ends with the
- * number of the fault, 0 = none.
+ * Host-side driver, not firmware. Words are native int64, a wider one is its low and its high half; a
+ * record is a function's outputs, its state after the call and the number of the fault (0 = none).
+ *
+ *   selftest          runs the start-up check
+ *   table NAME        writes a table
+ *   call NAME         reads inputs and state, writes records
+ *   range NAME A N    writes the records of N inputs from A on, of a function of one input
+ *   every NAME        writes the checksum of the records of every input there is
+ *   sequence          calls a function with a state, from the state at zeros, for the inputs it reads
+ *   chain             reads int32 pairs (drive, sense), writes rows
+ *   long              writes the checksum of a long run: of all rows or records and of the last state
+ *   check NAME        reads vectors/NAME.csv and compares; `chain`, `tables` and `sequence` are names too
+ *   check every       compares every function that is run over all its inputs with its checksum
+ *   check long        compares the long run with its checksum
  */
 #include <inttypes.h>
 #include <stdio.h>
@@ -13,6 +22,9 @@
 
 #include "{{ v.p }}.h"
 #include "{{ v.p }}_tables.h"
+
+/* Words of the longest record. */
+#define MOST {{ v.most_words() }}U
 
 static size_t get(void *to, size_t size)
 {
@@ -26,24 +38,47 @@ static void put(const uint64_t *words, size_t count)
     }
 }
 
-{% for f in v.tested() %}static void call_{{ f.name }}(const int64_t *in, uint64_t *out)
+/* The next byte of the input, -1 at its end. */
+static int next(void)
 {
-{% if f.faults %}    uint32_t fault = UINT32_C(0);
-{% endif %}    const {{ f.result }} r = {{ v.p }}_{{ f.name }}({{ f.harness_arguments }});
-{% for o in f.outputs %}    out[{{ loop.index0 }}] = {{ o }};
-{% endfor %}    out[{{ f.outputs.len() }}] = {% if f.faults %}fault{% else %}UINT64_C(0){% endif %};
+    unsigned char c;
+    return (get(&c, 1U) == 1U) ? (int)c : -1;
 }
 
-{% endfor %}typedef struct {
+static uint64_t mix(uint64_t h, uint64_t word)
+{
+    return (h ^ word) * UINT64_C(0x100000001b3);
+}
+
+{% for f in v.tests %}static void call_{{ f.name }}(const int64_t *in, uint64_t *out)
+{
+{% if !f.state.is_empty() %}    {{ v.p }}_{{ f.state }}_t s;
+{% endif %}{% if f.faults %}    uint32_t fault = UINT32_C(0);
+{% endif %}{% if f.inputs == 0 %}    (void)in;
+{% endif %}{% for w in f.set %}    {{ w }};
+{% endfor %}    {% if !f.result.is_empty() %}const {{ f.result }} r = {% endif %}{{ v.p }}_{{ f.name }}({{ f.arguments }});
+{% for o in f.words %}    out[{{ loop.index0 }}] = {{ o }};
+{% endfor %}    out[{{ f.words.len() }}] = {% if f.faults %}fault{% else %}UINT64_C(0){% endif %};
+}
+
+{% if !f.domain.is_empty() %}static const int64_t low_{{ f.name }}[] = { {% for d in f.domain %}{{ d[0] }}, {% endfor %}};
+static const uint64_t span_{{ f.name }}[] = { {% for d in f.domain %}{{ d[1] }}, {% endfor %}};
+
+{% endif %}{% endfor %}typedef struct {
     const char *name;
     size_t inputs;
     size_t outputs;
     void (*call)(const int64_t *in, uint64_t *out);
+    /* Where every input is run: ends, widths, checksum. */
+    const int64_t *low;
+    const uint64_t *span;
+    uint64_t every;
 } function_t;
 
 static const function_t functions[] = {
-{% for f in v.tested() %}    {"{{ f.name }}", {{ f.inputs.len() }}U, {{ f.outputs.len() + 1 }}U, call_{{ f.name }}},
-{% endfor %}    {NULL, 0U, 0U, NULL},
+{% for f in v.tests %}{% if f.domain.is_empty() %}    {"{{ f.name }}", {{ f.inputs }}U, {{ f.outputs }}U, call_{{ f.name }}, NULL, NULL, UINT64_C(0)},
+{% else %}    {"{{ f.name }}", {{ f.inputs }}U, {{ f.outputs }}U, call_{{ f.name }}, low_{{ f.name }}, span_{{ f.name }}, UINT64_C({{ f.every }})},
+{% endif %}{% endfor %}    {NULL, 0U, 0U, NULL, NULL, NULL, UINT64_C(0)},
 };
 
 static const function_t *find(const char *name)
@@ -57,8 +92,8 @@ static const function_t *find(const char *name)
 
 static int call(const function_t *f)
 {
-    int64_t in[8];
-    uint64_t out[16];
+    int64_t in[MOST];
+    uint64_t out[MOST];
     while (get(in, f->inputs * sizeof(int64_t)) == 1U) {
         f->call(in, out);
         put(out, f->outputs);
@@ -68,13 +103,53 @@ static int call(const function_t *f)
 
 static int range(const function_t *f, int64_t low, int64_t count)
 {
-    uint64_t out[16];
+    uint64_t out[MOST];
+    if (f->inputs != 1U) {
+        return 2;
+    }
     for (int64_t k = 0; k < count; ++k) {
         const int64_t in = low + k;
         f->call(&in, out);
         put(out, f->outputs);
     }
     return 0;
+}
+
+/* Counts through all inputs, the last one fastest; a checksum of each {{ v.every_block() }}, and one of these. */
+static uint64_t every(const function_t *f)
+{
+    const uint64_t basis = UINT64_C(0xcbf29ce484222325);
+    uint64_t place[MOST] = {0};
+    int64_t in[MOST] = {0};
+    uint64_t out[MOST];
+    uint64_t whole = basis;
+    uint64_t h = basis;
+    uint64_t count = 0U;
+    size_t k = 1U;
+    while (k > 0U) {
+        for (size_t i = 0U; i < f->inputs; ++i) {
+            in[i] = f->low[i] + (int64_t)place[i];
+        }
+        f->call(in, out);
+        for (size_t i = 0U; i < f->outputs; ++i) {
+            h = mix(h, out[i]);
+        }
+        ++count;
+        k = f->inputs;
+        while (k > 0U) {
+            if (place[k - 1U] < f->span[k - 1U]) {
+                ++place[k - 1U];
+                break;
+            }
+            place[k - 1U] = 0U;
+            --k;
+        }
+        if (((count % {{ v.every_block() }}U) == 0U) || (k == 0U)) {
+            whole = mix(whole, h);
+            h = basis;
+        }
+    }
+    return whole;
 }
 
 static int table(const char *name)
@@ -90,42 +165,327 @@ static int table(const char *name)
     return 2;
 }
 
-{% if let Some(t) = v.stream %}static int stream(void)
+{% if let Some(t) = v.stream %}static void step({{ v.p }}_{{ t.state }}_t *state, const int64_t *in, uint64_t *out)
+{
+    const {{ t.function.result }} r = {{ v.p }}_{{ t.function.name }}(state, {{ t.function.harness_arguments }});
+{% for o in t.function.outputs %}    out[{{ loop.index0 }}] = {{ o }};
+{% endfor %}    out[{{ t.function.outputs.len() }}] = UINT64_C(0);
+}
+
+static int sequence(void)
 {
     static {{ v.p }}_{{ t.state }}_t s;
-    int64_t in[16];
+    int64_t in[MOST];
+    uint64_t out[MOST];
+    (void)memset(&s, 0xA5, sizeof s);
     {{ v.p }}_init(&s);
     while (get(in, {{ t.function.inputs.len() }}U * sizeof(int64_t)) == 1U) {
-        const {{ t.function.result }} r = {{ v.p }}_{{ t.function.name }}(&s, {{ t.function.harness_arguments }});
-        uint64_t out[{{ t.function.outputs.len() + 1 }}U];
-{% for o in t.function.outputs %}        out[{{ loop.index0 }}] = {{ o }};
-{% endfor %}        out[{{ t.function.outputs.len() }}] = UINT64_C(0);
+        step(&s, in, out);
         put(out, {{ t.function.outputs.len() + 1 }}U);
     }
     return 0;
 }
 
-{% endif %}{% if v.chain %}static int chain(void)
+{% endif %}{% if v.chain %}static bool push({{ v.p }}_t *g, int32_t drive, int32_t sense, uint64_t *out)
+{
+    {{ v.p }}_period_out_t row;
+    if (!{{ v.p }}_push(g, ({{ v.code }})drive, ({{ v.code }})sense, &row)) {
+        return false;
+    }
+{% for o in v.row_at() %}    out[{{ loop.index0 }}] = {{ o }};
+{% endfor %}    out[{{ v.row.len() }}] = g->fault;
+    return true;
+}
+
+static int chain(void)
 {
     static {{ v.p }}_t g;
-    {{ v.p }}_period_out_t row;
     int32_t codes[2];
-    uint64_t out[16];
+    uint64_t out[MOST];
+    (void)memset(&g, 0xA5, sizeof g);
     {{ v.p }}_init(&g);
     while (get(codes, sizeof codes) == 1U) {
-        if ({{ v.p }}_push(&g, ({{ v.code }})codes[0], ({{ v.code }})codes[1], &row)) {
-{% for o in v.row %}            out[{{ loop.index0 }}] = {{ o }};
-{% endfor %}            out[{{ v.row.len() }}] = g.fault;
+        if (push(&g, codes[0], codes[1], out)) {
             put(out, {{ v.row.len() + 1 }}U);
         }
     }
     return 0;
 }
 
-{% endif %}int main(int argc, char **argv)
+{% endif %}{% if !v.long_words.is_empty() %}/* Triangles of changing amplitude beside the given frequencies, with noise and without, random words, squares. */
+static const int64_t long_low[] = { {% for w in v.long_words %}{{ w[0] }}, {% endfor %}};
+static const uint64_t long_span[] = { {% for w in v.long_words %}{{ w[1] }}, {% endfor %}};
+static const uint32_t long_rate[] = { {% for w in v.long_words %}{{ w[2] }}, {% endfor %}};
+
+typedef struct {
+    uint64_t x;
+    uint64_t amplitude;
+    uint32_t detuning;
+} stimulus_t;
+
+static uint64_t draw(stimulus_t *s)
+{
+    s->x = (s->x * UINT64_C(6364136223846793005)) + UINT64_C(1442695040888963407);
+    return s->x;
+}
+
+static void stimulus(stimulus_t *s, uint64_t step, int64_t *in)
+{
+    if ((step % {{ v.long_segment() }}U) == 0U) {
+        s->amplitude = draw(s) >> 48U;
+        s->detuning = (uint32_t)(draw(s) >> 52U);
+    }
+    for (size_t k = 0U; k < {{ v.long_words.len() }}U; ++k) {
+        const uint64_t noise = draw(s) >> 32U;
+        const uint32_t turn = ((uint32_t)step * (long_rate[k] + s->detuning)) + ((uint32_t)k << 30U);
+        const uint32_t up = turn * 2U;
+        const uint64_t triangle = ((turn >> 31U) == 0U) ? up : (uint32_t)~up;
+        const uint64_t scaled = ((triangle * s->amplitude) >> 16U) + ((UINT64_C(65535) - s->amplitude) << 15U);
+        uint64_t place = scaled;
+        switch ((step / {{ v.long_segment() }}U) % 4U) {
+        case 0U:
+            break;
+        case 1U:
+            place = scaled + (noise >> 12U);
+            place = (place > UINT32_MAX) ? UINT32_MAX : place;
+            break;
+        case 2U:
+            place = noise;
+            break;
+        default:
+            place = (uint64_t)UINT32_MAX * (turn >> 31U);
+            break;
+        }
+        const uint64_t high = (long_span[k] >> 32U) * place;
+        const uint64_t low = (((long_span[k] & UINT32_MAX) * place) + UINT32_MAX) >> 32U;
+        in[k] = (int64_t)((uint64_t)long_low[k] + high + low);
+    }
+}
+
+static uint64_t long_run(void)
+{
+    static {{ v.p }}_{% if v.chain %}t g{% else %}{{ v.stream_state() }}_t s{% endif %};
+    stimulus_t stimuli = {UINT64_C({{ v.seed }}), 0U, 0U};
+    uint64_t h = UINT64_C(0xcbf29ce484222325);
+    int64_t in[MOST];
+    uint64_t out[MOST];
+    (void)memset(&{% if v.chain %}g, 0xA5, sizeof g{% else %}s, 0xA5, sizeof s{% endif %});
+    {{ v.p }}_init(&{% if v.chain %}g{% else %}s{% endif %});
+{% for o in v.long_state() %}    h = mix(h, {{ o }});
+{% endfor %}    for (uint64_t n = 0U; n < UINT64_C({{ v.long_steps }}); ++n) {
+        {% if v.chain %}stimulus(&stimuli, n, in);
+        if (push(&g, (int32_t)in[0], (int32_t)in[1], out)) {
+            for (size_t k = 0U; k < {{ v.row.len() + 1 }}U; ++k) {
+                h = mix(h, out[k]);
+            }
+        }
+{% else %}stimulus(&stimuli, n, &in[1]);
+        in[0] = ((n % {{ v.long_segment() }}U) == 0U) ? 1 : 0;
+        step(&s, in, out);
+        for (size_t k = 0U; k < {{ v.stream_outputs() }}U; ++k) {
+            h = mix(h, out[k]);
+        }
+{% endif %}    }
+{% for o in v.long_state() %}    h = mix(h, {{ o }});
+{% endfor %}    return h;
+}
+
+{% endif %}/* A line of vectors: words between commas, of which the first `skip` are text. 0 at the end, MOST + 1 if it is no such line. */
+static size_t line(uint64_t *words, size_t skip)
+{
+    size_t count = 0U;
+    size_t cell = 0U;
+    bool digits = false;
+    bool minus = false;
+    uint64_t word = 0U;
+    for (int c = next(); c >= 0; c = next()) {
+        if ((c == ',') || (c == '\n')) {
+            if ((cell >= skip) && ((!digits) || (count == MOST))) {
+                return MOST + 1U;
+            }
+            if (cell >= skip) {
+                words[count] = minus ? (UINT64_C(0) - word) : word;
+                ++count;
+            }
+            ++cell;
+            word = 0U;
+            digits = false;
+            minus = false;
+            if (c == '\n') {
+                return count;
+            }
+        } else if ((c >= '0') && (c <= '9')) {
+            word = (word * 10U) + (uint64_t)(c - '0');
+            digits = true;
+        } else if (c == '-') {
+            minus = true;
+        } else if (cell >= skip) {
+            return MOST + 1U;
+        } else {
+            /* Text. */
+        }
+    }
+    return digits ? (MOST + 1U) : 0U;
+}
+
+static void header(void)
+{
+    int c = next();
+    while ((c >= 0) && (c != '\n')) {
+        c = next();
+    }
+}
+
+static int verdict(const char *name, uint64_t compared, uint64_t differing)
+{
+    const bool good = (compared > 0U) && (differing == 0U);
+    (void)printf("%s: %s, %lu compared, %lu differ\n", name, good ? "pass" : "FAIL",
+                 (unsigned long)compared, (unsigned long)differing);
+    return good ? 0 : 1;
+}
+
+/* Compares the end of a line with what was computed. */
+static uint64_t differs(const uint64_t *due, const uint64_t *found, size_t count)
+{
+    uint64_t differing = 0U;
+    for (size_t k = 0U; k < count; ++k) {
+        differing += (due[k] != found[k]) ? 1U : 0U;
+    }
+    return differing;
+}
+
+static int check_function(const function_t *f)
+{
+    uint64_t words[MOST + 1U];
+    int64_t in[MOST];
+    uint64_t out[MOST];
+    uint64_t compared = 0U;
+    uint64_t differing = 0U;
+    header();
+    for (size_t count = line(words, 0U); count > 0U; count = line(words, 0U)) {
+        if (count != (f->inputs + f->outputs)) {
+            return verdict(f->name, compared, differing + 1U);
+        }
+        for (size_t k = 0U; k < f->inputs; ++k) {
+            in[k] = (int64_t)words[k];
+        }
+        f->call(in, out);
+        differing += differs(&words[f->inputs], out, f->outputs);
+        compared += f->outputs;
+    }
+    return verdict(f->name, compared, differing);
+}
+
+static int check_every(void)
+{
+    int failed = 0;
+    for (const function_t *f = functions; f->name != NULL; ++f) {
+        if (f->low != NULL) {
+            failed |= verdict(f->name, 1U, (every(f) == f->every) ? 0U : 1U);
+        }
+    }
+    return failed;
+}
+
+static int check_tables(void)
+{
+    uint64_t words[MOST + 1U];
+    uint64_t compared = 0U;
+    uint64_t differing = 0U;
+    header();
+{% for t in v.tables %}    for (size_t k = 0U; k < {{ t.len }}U; ++k) {
+        const bool good = (line(words, 1U) == 2U) && (words[0] == k)
+            && (words[1] == (uint64_t)(int64_t){{ v.p }}_{{ t.name }}[k]);
+        differing += good ? 0U : 1U;
+        ++compared;
+    }
+{% endfor %}    differing += (line(words, 1U) == 0U) ? 0U : 1U;
+    return ((compared == 0U) && (differing == 0U)) ? 0 : verdict("tables", compared, differing);
+}
+
+{% if let Some(t) = v.stream %}static int check_sequence(void)
+{
+    static {{ v.p }}_{{ t.state }}_t s;
+    uint64_t words[MOST + 1U];
+    int64_t in[MOST];
+    uint64_t out[MOST];
+    uint64_t compared = 0U;
+    uint64_t differing = 0U;
+    (void)memset(&s, 0xA5, sizeof s);
+    {{ v.p }}_init(&s);
+    header();
+    for (size_t count = line(words, 0U); count > 0U; count = line(words, 0U)) {
+        if (count != {{ t.function.inputs.len() + t.function.outputs.len() + 1 }}U) {
+            return verdict("sequence", compared, differing + 1U);
+        }
+        for (size_t k = 0U; k < {{ t.function.inputs.len() }}U; ++k) {
+            in[k] = (int64_t)words[k];
+        }
+        step(&s, in, out);
+        differing += differs(&words[{{ t.function.inputs.len() }}], out, {{ t.function.outputs.len() + 1 }}U);
+        compared += {{ t.function.outputs.len() + 1 }}U;
+    }
+    return verdict("sequence", compared, differing);
+}
+
+{% endif %}{% if v.chain %}/* Reads chain_input.csv and then chain_output.csv. */
+static int check_chain(void)
+{
+    static {{ v.p }}_t g;
+    static uint64_t rows[{{ v.vector_rows }}U][MOST];
+    uint64_t words[MOST + 1U];
+    size_t pushed = 0U;
+    uint64_t compared = 0U;
+    uint64_t differing = 0U;
+    (void)memset(&g, 0xA5, sizeof g);
+    {{ v.p }}_init(&g);
+    header();
+    size_t count = line(words, 0U);
+    while (count == 2U) {
+        if ((pushed < {{ v.vector_rows }}U) && push(&g, (int32_t)(int64_t)words[0], (int32_t)(int64_t)words[1], rows[pushed])) {
+            ++pushed;
+        }
+        count = line(words, 0U);
+    }
+    header();
+    for (size_t k = 0U; k < pushed; ++k) {
+        const bool whole = line(words, 0U) == {{ v.row.len() + 1 }}U;
+        differing += whole ? differs(words, rows[k], {{ v.row.len() + 1 }}U) : 1U;
+        compared += {{ v.row.len() + 1 }}U;
+    }
+    differing += (line(words, 0U) == 0U) ? 0U : 1U;
+    return verdict("chain", compared, differing);
+}
+
+{% endif %}static int check(const char *name)
+{
+    const function_t *f = find(name);
+    if (f != NULL) {
+        return check_function(f);
+    }
+    if (strcmp(name, "every") == 0) {
+        return check_every();
+    }
+    if (strcmp(name, "tables") == 0) {
+        return check_tables();
+    }
+{% if v.stream.is_some() %}    if (strcmp(name, "sequence") == 0) {
+        return check_sequence();
+    }
+{% endif %}{% if v.chain %}    if (strcmp(name, "chain") == 0) {
+        return check_chain();
+    }
+{% endif %}{% if !v.long_words.is_empty() %}    if (strcmp(name, "long") == 0) {
+        return verdict("long", UINT64_C({{ v.long_steps }}), (long_run() == UINT64_C({{ v.long_checksum }})) ? 0U : 1U);
+    }
+{% endif %}    return 2;
+}
+
+int main(int argc, char **argv)
 {
     const char *mode = (argc > 1) ? argv[1] : "selftest";
-    const function_t *f = (argc > 2) ? find(argv[2]) : NULL;
+    const char *name = (argc > 2) ? argv[2] : "";
+    const function_t *f = find(name);
     static char buffer[1U << 16U];
     (void)setvbuf(stdout, buffer, _IOFBF, sizeof buffer);
     if (strcmp(mode, "selftest") == 0) {
@@ -139,14 +499,27 @@ static int table(const char *name)
     if ((strcmp(mode, "range") == 0) && (f != NULL) && (argc > 4)) {
         return range(f, strtoll(argv[3], NULL, 10), strtoll(argv[4], NULL, 10));
     }
-    if ((strcmp(mode, "table") == 0) && (argc > 2)) {
-        return table(argv[2]);
+    if ((strcmp(mode, "every") == 0) && (f != NULL) && (f->low != NULL)) {
+        const uint64_t word = every(f);
+        put(&word, 1U);
+        return 0;
     }
-{% if v.stream.is_some() %}    if (strcmp(mode, "stream") == 0) {
-        return stream();
+    if ((strcmp(mode, "table") == 0) && (argc > 2)) {
+        return table(name);
+    }
+    if (strcmp(mode, "check") == 0) {
+        return check(name);
+    }
+{% if v.stream.is_some() %}    if (strcmp(mode, "sequence") == 0) {
+        return sequence();
     }
 {% endif %}{% if v.chain %}    if (strcmp(mode, "chain") == 0) {
         return chain();
+    }
+{% endif %}{% if !v.long_words.is_empty() %}    if (strcmp(mode, "long") == 0) {
+        const uint64_t word = long_run();
+        put(&word, 1U);
+        return 0;
     }
 {% endif %}    (void)fprintf(stderr, "unknown mode or function\n");
     return 2;

@@ -1,7 +1,7 @@
 /* {{ v.banner }}
  *
- * Each function runs on a stimulus from a linear congruential generator, laid over its input range;
- * the outputs' FNV-1a checksum is compared with the model's.
+ * Each function runs on a stimulus from a linear congruential generator, laid over the ranges of its
+ * inputs and of its state; the FNV-1a checksum of all outputs and of the state is compared with the model's.
  */
 #include "{{ v.p }}.h"
 {% if v.tables.len() > 0 %}#include "{{ v.p }}_tables.h"
@@ -11,7 +11,7 @@ static uint64_t {{ v.p }}_mix(uint64_t h, uint64_t word)
     return (h ^ word) * UINT64_C(0x100000001b3);
 }
 
-{% if v.stimulated %}static int64_t {{ v.p }}_stimulus(uint64_t *x, int64_t low, uint64_t span)
+{% if v.is_stimulated() %}static int64_t {{ v.p }}_stimulus(uint64_t *x, int64_t low, uint64_t span)
 {
     *x = (*x * UINT64_C(6364136223846793005)) + UINT64_C(1442695040888963407);
     const uint64_t r = *x >> 1U;
@@ -31,21 +31,23 @@ static uint64_t {{ v.p }}_mix(uint64_t h, uint64_t word)
         return UINT32_C({{ t.number }}); /* table {{ t.name }} */
     }
     h = basis;
-{% endfor %}{% for f in v.tested() %}
+{% endfor %}{% for f in v.tests %}{% if f.alone %}
     {
         uint64_t x = UINT64_C({{ v.seed }});
-{% if f.faults %}        uint32_t fault = UINT32_C(0);
-{% endif %}        for (uint32_t k = UINT32_C(0); k < UINT32_C({{ f.count }}); ++k) {
-{% for i in f.inputs %}            const {{ i.ty }} a{{ loop.index0 }} = ({{ i.ty }}){{ v.p }}_stimulus(&x, {{ i.low }}, {{ i.span }});
-{% endfor %}            const {{ f.result }} r = {{ v.p }}_{{ f.name }}({{ f.arguments }});
-{% for o in f.outputs %}            h = {{ v.p }}_mix(h, {{ o }});
+{% if !f.state.is_empty() %}        {{ v.p }}_{{ f.state }}_t s;
+{% endif %}{% if f.faults %}        uint32_t fault = UINT32_C(0);
+{% endif %}        for (uint32_t k = UINT32_C(0); k < UINT32_C({{ v.draws }}); ++k) {
+{% for d in f.drawn %}            {% if d.declared %}const {{ d.ty }} {% endif %}{{ d.target }} = ({{ d.ty }}){{ v.p }}_stimulus(&x, {{ d.low }}, {{ d.span }});
+{% endfor %}            {% if !f.result.is_empty() %}const {{ f.result }} r = {% endif %}{{ v.p }}_{{ f.name }}({{ f.drawn_arguments }});
+{% for o in f.words %}            h = {{ v.p }}_mix(h, {{ o }});
 {% endfor %}        }
-    }
+{% if f.faults %}        h = {{ v.p }}_mix(h, fault);
+{% endif %}    }
     if (h != UINT64_C({{ f.checksum }})) {
         return UINT32_C({{ f.number }}); /* {{ f.name }} */
     }
     h = basis;
-{% endfor %}{% if v.chain %}
+{% endif %}{% endfor %}{% if v.chain %}
     {
         {{ v.p }}_t g;
         {{ v.p }}_period_out_t row;
@@ -56,9 +58,11 @@ static uint64_t {{ v.p }}_mix(uint64_t h, uint64_t word)
             const {{ v.code }} sense = ({{ v.code }}){{ v.p }}_stimulus(&x, {{ v.code_low }}, {{ v.code_span }});
             if ({{ v.p }}_push(&g, drive, sense, &row)) {
 {% for o in v.row %}                h = {{ v.p }}_mix(h, {{ o }});
-{% endfor %}            }
+{% endfor %}                h = {{ v.p }}_mix(h, g.fault);
+            }
         }
-    }
+{% for o in v.chain_state %}        h = {{ v.p }}_mix(h, {{ o }});
+{% endfor %}    }
     if (h != UINT64_C({{ v.chain_checksum }})) {
         return UINT32_C({{ v.chain_number }}); /* chain */
     }
@@ -73,9 +77,10 @@ static uint64_t {{ v.p }}_mix(uint64_t h, uint64_t word)
 {% endif %}{% endfor %}            const {{ t.function.result }} r = {{ v.p }}_{{ t.function.name }}(&s, {{ t.function.arguments }});
 {% for o in t.function.outputs %}            h = {{ v.p }}_mix(h, {{ o }});
 {% endfor %}        }
-    }
+{% for o in t.final_state %}        h = {{ v.p }}_mix(h, {{ o }});
+{% endfor %}    }
     if (h != UINT64_C({{ t.checksum }})) {
-        return UINT32_C({{ t.number }}); /* {{ t.function.name }} */
+        return UINT32_C({{ t.number }}); /* {{ t.name }} */
     }
 {% endif %}    return UINT32_C(0);
 }

@@ -1,6 +1,7 @@
 //! The emitted correction, built with the host's compilers, beside the model's block on the record.
 
 use super::stream;
+use crate::emit::views::Language;
 use crate::error::Result;
 use crate::firmware::files::EmittedFile;
 use crate::record::{ThermalRecord, condensed};
@@ -68,7 +69,7 @@ pub fn check(
     closed: &Closed,
     record: &ThermalRecord,
     prefix: &str,
-    [c, rust]: [Vec<EmittedFile>; 2],
+    files: [Vec<EmittedFile>; 2],
 ) -> Result<Option<Emitted>> {
     let Some(correction) = &closed.correction else {
         return Ok(None);
@@ -76,14 +77,14 @@ pub fn check(
     let condensed = condensed(record);
     let record = condensed.as_ref().map_or(record, |(short, _)| short);
     let (readings, places) = stream(&correction.plan, record, &closed.channels)?;
-    let firmware = Firmware::of_files(correction, prefix, c, rust)?;
+    let languages = [Language::C, Language::Rust];
+    let firmware = Firmware::of_files(correction, prefix, files, &languages)?;
     let functions = firmware.compare(correction, &readings)?;
-    let toolchain = |built: &crate::verify::firmware::Built| built.harness.toolchain.clone();
     Ok(Some(Emitted {
         readings: places.len() as u64,
         words_compared: functions.iter().map(|f| f.compared).sum(),
         mismatches: functions.iter().map(|f| f.mismatches).sum(),
-        toolchains: [toolchain(&firmware.c), toolchain(&firmware.rust)],
+        toolchains: languages.map(|language| firmware.toolchain(language).to_owned()),
         functions,
     }))
 }

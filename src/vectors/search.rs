@@ -1,0 +1,354 @@
+//! Which inputs and states a function is compared at: ends, random words, both sides of each branch and
+//! limit, ties of each rounding, and what tells damaged operations from the function.
+
+use super::interpreter::{Damage, Interpreter};
+use super::model::Model;
+use super::stimulus;
+use crate::numeric::cast::round_shift;
+use crate::numeric::trace::ir::{Function, Id, Op};
+
+/// Random vectors of a function of few words.
+const RANDOM: usize = 1024;
+/// Random vectors of a function of many words, a block of blocks.
+const RANDOM_OF_MANY: usize = 256;
+/// Words beyond which a function has many.
+const MANY: usize = 12;
+/// Vectors that a damage is told by, where so many are found.
+const EACH: usize = 2;
+/// Random vectors among which damage is searched: fewer, the longer the function.
+const CANDIDATES: usize = 1 << 14;
+/// Operations of the whole search for one damage.
+const OPERATIONS: usize = 1 << 20;
+/// Vectors from which both sides of a branch are sought.
+const STARTS: usize = 6;
+/// Entries of a sine table that are swept one by one.
+const SWEPT: u32 = 16;
+
+/// Vectors of a model: inputs and state of each.
+pub fn vectors(model: &Model, seed: u64) -> Vec<Vec<i128>> {
+    let random = match model.inputs.len() {
+        0..MANY => RANDOM,
+        _ => RANDOM_OF_MANY,
+    };
+    let mut chosen = stimulus::inputs(&model.inputs, random, seed);
+    chosen.iter_mut().for_each(|words| model.repair(words));
+    let Some((program, number)) = &model.recorded else {
+        return chosen;
+    };
+    let search = Search {
+        model,
+        program,
+        number: *number,
+        function: &program.program().functions[*number],
+    };
+    search.directed(&mut chosen);
+    search.swept(&mut chosen, seed);
+    search.telling(&mut chosen, seed);
+    let mut seen = std::collections::BTreeSet::new();
+    chosen.retain(|words| seen.insert(words.clone()));
+    chosen
+}
+
+struct Search<'a> {
+    model: &'a Model,
+    program: &'a Interpreter,
+    number: usize,
+    function: &'a Function,
+}
+
+impl Search<'_> {
+    fn split<'a>(&self, words: &'a [i128]) -> (&'a [i128], &'a [i128]) {
+        words.split_at(self.function.inputs.len())
+    }
+
+    /// The values of all nodes.
+    fn values(&self, words: &[i128]) -> Vec<i128> {
+        let (inputs, state) = self.split(words);
+        self.program.values(self.number, inputs, state)
+    }
+
+    fn is_allowed(&self, words: &[i128]) -> bool {
+        let mut repaired = words.to_vec();
+        self.model.repair(&mut repaired);
+        let ranges = words.iter().zip(&self.model.inputs);
+        repaired == words
+            && ranges
+                .into_iter()
+                .all(|(word, range)| (range.low..=range.high).contains(word))
+    }
+
+    /// Adds both sides of each branch and limit, and ties.
+    fn directed(&self, chosen: &mut Vec<Vec<i128>>) {
+        let starts: Vec<Vec<i128>> = {
+            let step = (chosen.len() / 64).max(1);
+            chosen.iter().step_by(step).cloned().collect()
+        };
+        let values: Vec<Vec<i128>> = starts.iter().map(|words| self.values(words)).collect();
+        let of = |id: Id| values.iter().map(move |v| v[id]);
+        for node in &self.function.nodes {
+            match node.op {
+                Op::IsNegative(a) => {
+                    for edge in [0, 1] {
+                        self.edge(&starts, of(a), &|words| self.values(words)[a], edge, chosen);
+                    }
+                }
+                Op::Limit(a, low, high) => {
+                    for edge in [low, low + 1, high, high + 1] {
+                        self.edge(&starts, of(a), &|words| self.values(words)[a], edge, chosen);
+                    }
+                }
+                Op::Wrap(a, bits) if bits < 127 => {
+                    for edge in [-1i128 << (bits - 1), 1i128 << (bits - 1)] {
+                        self.edge(&starts, of(a), &|words| self.values(words)[a], edge, chosen);
+                    }
+                }
+                Op::Cast(a, number) => {
+                    let program = self.program.program();
+                    let cast = &program.casts[number];
+                    let round = |v: i128| round_shift(v, cast.shift, cast.rounding);
+                    if !program.is_proved_in_range(number) && cast.overflow.is_some() {
+                        let (low, high) = cast.limits();
+                        for edge in [low, low + 1, high, high + 1] {
+                            let rounded = of(a).map(round);
+                            let at = |words: &[i128]| round(self.values(words)[a]);
+                            self.edge(&starts, rounded, &at, edge, chosen);
+                        }
+                    }
+                    if (1..=62).contains(&cast.shift) {
+                        let half = 1i128 << (cast.shift - 1);
+                        let about = |v: i128| [v - 1, v, v + 1];
+                        for target in about(0).into_iter().chain(about(half)) {
+                            self.tie(&starts, a, cast.shift as u32, target, chosen);
+                        }
+                    }
+                }
+                Op::Sine(phase, number) => {
+                    let table = &self.program.program().sine_tables[number];
+                    let dropped = table.phase_bits - table.address_bits;
+                    if (1..=62).contains(&dropped) {
+                        let half = if table.half_step {
+                            1i128 << (dropped - 1)
+                        } else {
+                            0
+                        };
+                        for target in [-half - 1, -half] {
+                            self.tie(&starts, phase, dropped, target, chosen);
+                        }
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// Between vectors on both sides of `value < edge`, neighbours that differ in one word by one.
+    fn edge(
+        &self,
+        starts: &[Vec<i128>],
+        values: impl Iterator<Item = i128>,
+        value: &dyn Fn(&[i128]) -> i128,
+        edge: i128,
+        chosen: &mut Vec<Vec<i128>>,
+    ) {
+        let (mut below, mut above) = (Vec::new(), Vec::new());
+        for (words, value) in starts.iter().zip(values) {
+            if value < edge { &mut below } else { &mut above }.push(words);
+        }
+        for (a, b) in below.iter().zip(&above).take(STARTS) {
+            let mut at = a.to_vec();
+            for k in 0..at.len() {
+                let (mut near, mut far) = (at[k], b[k]);
+                at[k] = far;
+                if value(&at) < edge {
+                    continue;
+                }
+                while near.abs_diff(far) > 1 {
+                    at[k] = near + (far - near) / 2;
+                    let side = if value(&at) < edge {
+                        &mut near
+                    } else {
+                        &mut far
+                    };
+                    *side = at[k];
+                }
+                for word in [near, far] {
+                    at[k] = word;
+                    if self.is_allowed(&at) {
+                        chosen.push(at.clone());
+                    }
+                }
+                break;
+            }
+        }
+    }
+
+    /// Vectors at which the node is `target` modulo 2^bits: one word is moved, along which the node is linear.
+    fn tie(
+        &self,
+        starts: &[Vec<i128>],
+        node: Id,
+        bits: u32,
+        target: i128,
+        chosen: &mut Vec<Vec<i128>>,
+    ) {
+        let modulus = 1i128 << bits;
+        let mut found = 0;
+        let step = (starts.len() / STARTS).max(1);
+        for start in starts.iter().step_by(step) {
+            let mut words = start.clone();
+            let value = self.values(&words)[node];
+            for k in 0..words.len() {
+                let range = self.model.inputs[k];
+                let unit = if words[k] < range.high { 1 } else { -1 };
+                words[k] += unit;
+                let slope = self.values(&words)[node]
+                    .wrapping_sub(value)
+                    .wrapping_mul(unit);
+                words[k] = start[k];
+                let free = slope.trailing_zeros().min(127);
+                let off = target.wrapping_sub(value).rem_euclid(modulus);
+                if slope == 0 || free >= bits || off.trailing_zeros().min(127) < free {
+                    continue;
+                }
+                let period = 1i128 << (bits - free);
+                let step = (off >> free)
+                    .wrapping_mul(inverse(slope >> free))
+                    .rem_euclid(period);
+                let centred = if step > period / 2 {
+                    step - period
+                } else {
+                    step
+                };
+                for step in [centred, centred + period, centred - period] {
+                    words[k] = start[k] + step;
+                    let hits = self.is_allowed(&words)
+                        && (self.values(&words)[node] - target).rem_euclid(modulus) == 0;
+                    if hits {
+                        chosen.push(words.clone());
+                        found += 1;
+                    }
+                }
+                words[k] = start[k];
+            }
+            if found > 2 * STARTS {
+                return;
+            }
+        }
+    }
+
+    /// Every entry of a sine table, once through each node that reads it.
+    fn swept(&self, chosen: &mut Vec<Vec<i128>>, seed: u64) {
+        let Some((phase, number)) = self.function.nodes.iter().find_map(|node| match node.op {
+            Op::Sine(phase, number) => Some((phase, number)),
+            _ => None,
+        }) else {
+            return;
+        };
+        let table = &self.program.program().sine_tables[number];
+        if table.address_bits > SWEPT {
+            return;
+        }
+        let dropped = table.phase_bits - table.address_bits;
+        let mut lcg = stimulus::Lcg(seed + 6);
+        for address in 0..1i128 << table.address_bits {
+            let mut words: Vec<i128> = self.model.inputs.iter().map(|r| lcg.word(*r)).collect();
+            let is = self.values(&words)[phase];
+            let inside = i128::from(lcg.draw() >> 1) & ((1 << dropped) - 1);
+            let due = (address << dropped) + inside;
+            // The first word that moves the phase by as much.
+            for k in 0..words.len() {
+                let before = words[k];
+                words[k] = (before + due - is).rem_euclid(1i128 << table.phase_bits);
+                if self.is_allowed(&words) && self.values(&words)[phase] == due {
+                    break;
+                }
+                words[k] = before;
+            }
+            chosen.push(words);
+        }
+    }
+
+    /// Vectors that tell damage, of which the others do not tell enough.
+    fn telling(&self, chosen: &mut Vec<Vec<i128>>, seed: u64) {
+        let work: usize = self.function.nodes.len()
+            + self
+                .function
+                .loops
+                .iter()
+                .map(|l| (l.end - l.start) * l.count as usize)
+                .sum::<usize>();
+        let count = (OPERATIONS / work.max(1)).clamp(256, CANDIDATES);
+        let mut candidates = stimulus::random(&self.model.inputs, count / 2, seed + 4);
+        candidates.extend(self.shaken(chosen, count / 2, seed + 8));
+        candidates
+            .iter_mut()
+            .for_each(|words| self.model.repair(words));
+        let outcome = |damage: Option<Damage>, words: &Vec<i128>| {
+            let (inputs, state) = self.split(words);
+            let mut state = state.to_vec();
+            let mut outputs = Vec::new();
+            let program = self.program;
+            let fault = program.damaged(self.number, damage, inputs, &mut state, &mut outputs);
+            (outputs, state, fault)
+        };
+        let known: Vec<_> = chosen.iter().map(|words| outcome(None, words)).collect();
+        let others: Vec<_> = candidates
+            .iter()
+            .map(|words| outcome(None, words))
+            .collect();
+        let mut more: Vec<Vec<i128>> = Vec::new();
+        for damage in self.program.damages(self.number) {
+            let tells = |(words, due): &(&Vec<i128>, &_)| outcome(Some(damage), words) != **due;
+            let told = chosen.iter().zip(&known).filter(tells).take(EACH).count();
+            let lacking = EACH - told;
+            if lacking > 0 {
+                let found = candidates.iter().zip(&others).filter(tells).take(lacking);
+                more.extend(found.map(|(words, _)| words.clone()));
+            }
+        }
+        chosen.extend(more);
+    }
+}
+
+impl Search<'_> {
+    /// Vectors in which some words are those of a chosen one, so that it may stay on its branch or tie, and the
+    /// others ends or random words.
+    fn shaken(&self, chosen: &[Vec<i128>], count: usize, seed: u64) -> Vec<Vec<i128>> {
+        let mut lcg = stimulus::Lcg(seed);
+        let mut shake = |words: &Vec<i128>| {
+            let ranges = words.iter().zip(&self.model.inputs);
+            let moved = ranges.map(|(word, range)| match lcg.draw() >> 62 {
+                0 => lcg.word(*range),
+                1 => [range.low, range.high][(lcg.draw() >> 63) as usize],
+                _ => *word,
+            });
+            moved.collect()
+        };
+        let step = |k: usize| k * chosen.len() / count.max(1);
+        (0..count)
+            .filter_map(|k| chosen.get(step(k)).map(&mut shake))
+            .collect()
+    }
+}
+
+/// The inverse of an odd number modulo 2^127.
+fn inverse(odd: i128) -> i128 {
+    let mut x = odd;
+    // Each round doubles the bits that are right, of which there are three at first.
+    for _ in 0..6 {
+        x = x.wrapping_mul(2i128.wrapping_sub(odd.wrapping_mul(x)));
+    }
+    x
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_inverse_gives_one() {
+        for odd in [1i128, 3, -5, 5_094_007, i128::MAX] {
+            assert_eq!(inverse(odd).wrapping_mul(odd), 1);
+        }
+    }
+}

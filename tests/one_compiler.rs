@@ -1,0 +1,43 @@
+//! `run` and `equiv` with a compiler for one language, with none, and with one that is none.
+
+use serde_json::Value;
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn equiv(here: &Path, more: &[&str], variables: &[(&str, &str)]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_gyrogen"));
+    command
+        .args(["equiv", "--samples", "20000", "--out", "out"])
+        .args(more);
+    command.current_dir(here).envs(variables.iter().copied());
+    command.output().expect("the program runs")
+}
+
+#[test]
+fn what_can_be_built_is_compared_and_the_rest_is_said() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let here = folder.path();
+    let output = equiv(here, &[], &[("RUSTC", "/bin/false")]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        said.contains("note: only the emitted code of one language (c)")
+            && said.contains("/bin/false"),
+        "{said}"
+    );
+    let json = std::fs::read_to_string(here.join("out/equiv.json")).expect("a result");
+    let json: Value = serde_json::from_str(&json).expect("JSON");
+    assert!(json["model_vs_c"].is_object() && json["model_vs_rust"].is_null());
+    assert_eq!(json["model_vs_c"]["mismatches"], 0);
+
+    let output = equiv(here, &["--lang", "c"], &[("RUSTC", "/bin/false")]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(!said.contains("/bin/false"), "{said}");
+
+    let output = equiv(here, &[], &[("CC", "/bin/false"), ("RUSTC", "/bin/false")]);
+    assert_eq!(output.status.code(), Some(2));
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        said.contains("which CC names") && !said.contains("there is no compiler"),
+        "{said}"
+    );
+}

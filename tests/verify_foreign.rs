@@ -1,0 +1,401 @@
+//! `gyrogen verify` knows what a bundle must hold, takes nothing on trust that comes with it, and waits for no
+//! program without end. Regeneration: what somebody edited is not lost.
+
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::OnceLock;
+use std::time::{Duration, Instant};
+
+fn gyrogen(arguments: &[&str], folder: &Path) -> Output {
+    gyrogen_with(arguments, folder, &[])
+}
+
+fn gyrogen_with(arguments: &[&str], folder: &Path, variables: &[(&str, &str)]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_gyrogen"));
+    command.args(arguments).current_dir(folder);
+    command.envs(variables.iter().copied());
+    command.output().expect("the program runs")
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// A correction's bundle in C: small, and with vectors, tables in no number and a sequence.
+const DESIGN: &str = r#"
+name = "tested"
+[correction]
+period_s = 1.0
+full_scale_dps = 100.0
+noise_dps = 1e-2
+inputs = [{ column = "die_degc", offset = 25.0, scale = 50.0 }]
+terms = [
+    { kind = "product", gain_dps = 10.0, factors = [] },
+    { kind = "product", gain_dps = 5.0, factors = [[0, 1]] },
+    { kind = "lag", gain_dps = 1.0, input = 0, tau_s = 60.0 },
+]
+"#;
+
+/// The bundle, emitted once, and its digest.
+fn whole() -> &'static (tempfile::TempDir, String) {
+    static WHOLE: OnceLock<(tempfile::TempDir, String)> = OnceLock::new();
+    WHOLE.get_or_init(|| {
+        let folder = tempfile::tempdir().expect("a folder");
+        std::fs::write(folder.path().join("design.toml"), DESIGN).expect("written");
+        let emitted = gyrogen(
+            &["emit", "design.toml", "--lang", "c", "--out", "c"],
+            folder.path(),
+        );
+        assert!(emitted.status.success(), "{}", said(&emitted));
+        let digest = said(&emitted)
+            .lines()
+            .find_map(|l| l.strip_prefix("digest ").map(str::to_owned));
+        (folder, digest.expect("a digest"))
+    })
+}
+
+fn copy(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).expect("a writable folder");
+    for entry in std::fs::read_dir(from).expect("a readable folder") {
+        let entry = entry.expect("a readable folder");
+        let target = to.join(entry.file_name());
+        if entry.path().is_dir() {
+            copy(&entry.path(), &target);
+        } else {
+            std::fs::copy(entry.path(), target).expect("a writable folder");
+        }
+    }
+}
+
+/// A copy of the bundle in a folder of its own.
+fn bundle() -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path().join("c");
+    copy(&whole().0.path().join("c"), &at);
+    (folder, at)
+}
+
+fn sha256(bytes: &[u8]) -> String {
+    gyrogen::digest::sha256(bytes)
+}
+
+/// Changes the manifest and seals it again, with the files as they are.
+fn reseal(at: &Path, change: impl FnOnce(&mut Value)) {
+    let path = at.join("manifest.json");
+    let text = std::fs::read_to_string(&path).expect("a manifest");
+    let mut value: Value = serde_json::from_str(&text).expect("JSON");
+    for file in value["files"].as_array_mut().expect("files") {
+        let bytes = std::fs::read(at.join(file["path"].as_str().expect("a path")));
+        if let Ok(bytes) = bytes {
+            file["sha256"] = sha256(&bytes).into();
+        }
+    }
+    change(&mut value);
+    let typed: Result<gyrogen::firmware::manifest::Manifest, _> =
+        serde_json::from_value(value.clone());
+    let text = match typed {
+        Ok(manifest) => manifest.to_json(),
+        Err(_) => value.to_string(),
+    };
+    std::fs::write(path, text).expect("written");
+}
+
+/// `verify` fails with this status and says so.
+fn refused(at: &Path, status: i32, text: &str) {
+    let output = gyrogen(&["verify", "c"], at.parent().expect("a parent"));
+    assert_eq!(
+        output.status.code(),
+        Some(status),
+        "{text}: {}",
+        said(&output)
+    );
+    assert!(said(&output).contains(text), "{text}: {}", said(&output));
+}
+
+#[test]
+fn a_bundle_holds_against_its_digest_and_its_design() {
+    let (folder, digest) = whole();
+    let output = gyrogen(
+        &[
+            "verify",
+            "c",
+            "--digest",
+            digest,
+            "--design",
+            "design.toml",
+            "--out",
+            ".",
+        ],
+        folder.path(),
+    );
+    assert!(output.status.success(), "{}", said(&output));
+    let json = std::fs::read_to_string(folder.path().join("verify.json")).expect("a result");
+    assert!(json.contains(digest), "{json}");
+    let (other, at) = bundle();
+    std::fs::write(
+        other.path().join("design.toml"),
+        DESIGN.replace("10.0, factors", "10.1, factors"),
+    )
+    .expect("written");
+    let output = gyrogen(&["verify", "c", "--design", "design.toml"], other.path());
+    assert_eq!(output.status.code(), Some(1));
+    assert!(
+        said(&output).contains("tested.c is not what the design emits"),
+        "{}",
+        said(&output)
+    );
+    // Sealed again with another command, all of it is right but for the digest.
+    let command = "gyrogen emit other.toml --lang c --part correction";
+    let before = "gyrogen emit design.toml --lang c --part correction";
+    for name in [
+        "tested.c",
+        "tested.h",
+        "tested_arith.h",
+        "tested_selftest.c",
+        "tested_tables.c",
+        "tested_tables.h",
+        "test/tested_harness.c",
+    ] {
+        let text = std::fs::read_to_string(at.join(name)).expect("a source");
+        std::fs::write(at.join(name), text.replace(before, command)).expect("written");
+    }
+    reseal(&at, |m| m["command"] = command.into());
+    let output = gyrogen(&["verify", "c"], other.path());
+    assert!(output.status.success(), "{}", said(&output));
+    let output = gyrogen(&["verify", "c", "--digest", digest], other.path());
+    assert_eq!(output.status.code(), Some(1));
+    assert!(said(&output).contains("digest"), "{}", said(&output));
+    let output = gyrogen(&["verify", "c", "--digest", "12"], other.path());
+    assert_eq!(output.status.code(), Some(2));
+}
+
+#[test]
+fn what_a_bundle_must_hold_is_not_read_from_its_manifest() {
+    let damages: [(&str, fn(&mut Value)); 9] = [
+        ("lacks tested.c", |m| m["files"] = Value::Array(Vec::new())),
+        ("no vectors of `correct`", |m| {
+            m["functions"] = Value::Array(Vec::new())
+        }),
+        ("lacks `sequence`", |m| m["sequence"] = Value::Null),
+        ("lacks `long_run`", |m| m["long_run"] = Value::Null),
+        ("fewer than", |m| m["long_run"]["steps"] = 1.into()),
+        ("comes from", |m| m["version"] = "9.9.9".into()),
+        ("comes from", |m| m["design_sha256"] = "0".into()),
+        ("count from 1", |m| m["functions"][0]["number"] = 7.into()),
+        ("which no such bundle has", |m| {
+            let files = m["files"].as_array_mut().expect("files");
+            files.push(serde_json::json!({ "path": "more.c", "sha256": "" }));
+        }),
+    ];
+    for (text, change) in damages {
+        let (_folder, at) = bundle();
+        reseal(&at, change);
+        refused(&at, 1, text);
+    }
+    // Values that nothing else knows: the seal.
+    let (_folder, at) = bundle();
+    let path = at.join("manifest.json");
+    let text = std::fs::read_to_string(&path).expect("a manifest");
+    let sealed = text.find("\"seal\": \"").expect("a seal") + 9;
+    std::fs::write(
+        &path,
+        format!("{}0000{}", &text[..sealed], &text[sealed + 4..]),
+    )
+    .expect("written");
+    refused(&at, 1, "seal");
+    // Vectors cut to their header, a source that is not listed, a wrecked source that is.
+    let (_folder, at) = bundle();
+    for name in ["correct", "sequence"] {
+        let path = at.join(format!("vectors/{name}.csv"));
+        let text = std::fs::read_to_string(&path).expect("vectors");
+        std::fs::write(
+            &path,
+            text.lines().next().expect("a header").to_owned() + "\n",
+        )
+        .expect("written");
+    }
+    reseal(&at, |_| ());
+    refused(&at, 1, "nothing of `correct` was compared");
+    let (_folder, at) = bundle();
+    std::fs::write(at.join("extra.c"), "int extra;\n").expect("written");
+    refused(&at, 1, "extra.c");
+    let (_folder, at) = bundle();
+    std::fs::write(at.join("tested.c"), "int nothing;\n").expect("written");
+    refused(&at, 1, "");
+}
+
+#[test]
+fn dropped_outputs_and_states_are_noticed() {
+    let (_folder, at) = bundle();
+    let path = at.join("tested.c");
+    let text = std::fs::read_to_string(&path).expect("a source");
+    let store = text
+        .lines()
+        .find(|l| l.trim().starts_with("s->lag_input_1 = "))
+        .expect("a store");
+    std::fs::write(&path, text.replace(store, "")).expect("written");
+    reseal(&at, |_| ());
+    refused(&at, 1, "correct (c): first difference");
+}
+
+#[test]
+fn manifests_that_cannot_be_are_refused_without_a_panic() {
+    let damages: [(&str, fn(&mut Value)); 7] = [
+        ("more than", |m| {
+            m["functions"][0]["inputs"] = u64::MAX.into()
+        }),
+        ("no name", |m| {
+            m["functions"][0]["name"] = "../../../etc/passwd".into()
+        }),
+        ("no name", |m| m["prefix"] = "-o".into()),
+        ("plain path", |m| {
+            m["files"][0]["path"] = "../../etc/passwd".into()
+        }),
+        ("its part", |m| m["part"] = "all of it".into()),
+        ("its language", |m| m["language"] = "cobol".into()),
+        ("control character", |m| m["command"] = "\u{1b}[2J".into()),
+    ];
+    for (text, change) in damages {
+        let (_folder, at) = bundle();
+        reseal(&at, change);
+        refused(&at, 2, text);
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn links_pipes_and_endless_files_are_not_opened() {
+    let link = std::os::unix::fs::symlink::<&Path, &Path>;
+    for name in ["tested.c", "vectors/correct.csv", "manifest.json"] {
+        for target in ["/dev/zero", "/etc/passwd"] {
+            let (_folder, at) = bundle();
+            std::fs::remove_file(at.join(name)).expect("removed");
+            link(target.as_ref(), &at.join(name)).expect("a link");
+            let output = gyrogen(&["verify", "c"], at.parent().expect("a parent"));
+            assert_ne!(output.status.code(), Some(0));
+            assert!(!said(&output).contains("root:"), "{}", said(&output));
+        }
+        let (_folder, at) = bundle();
+        std::fs::remove_file(at.join(name)).expect("removed");
+        let made = Command::new("mkfifo")
+            .arg(at.join(name))
+            .status()
+            .expect("mkfifo");
+        assert!(made.success());
+        let started = Instant::now();
+        let output = gyrogen(&["verify", "c"], at.parent().expect("a parent"));
+        assert_ne!(output.status.code(), Some(0));
+        assert!(started.elapsed() < Duration::from_secs(30), "{name}");
+    }
+    // The result replaces no file elsewhere.
+    let (folder, at) = bundle();
+    std::fs::write(folder.path().join("victim"), "mine").expect("written");
+    link("../victim".as_ref(), &at.join("verify.json")).expect("a link");
+    refused(&at, 2, "link");
+    assert_eq!(
+        std::fs::read_to_string(folder.path().join("victim")).expect("read"),
+        "mine"
+    );
+}
+
+#[test]
+fn a_folder_with_the_name_of_an_option_is_a_folder() {
+    let folder = tempfile::tempdir().expect("a folder");
+    copy(&whole().0.path().join("c"), &folder.path().join("-dir"));
+    let output = gyrogen(&["verify", "--", "-dir"], folder.path());
+    assert!(output.status.success(), "{}", said(&output));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_compiler_may_have_arguments_and_may_not_hang() {
+    use std::os::unix::fs::PermissionsExt;
+    let (folder, _) = bundle();
+    let here = folder.path();
+    let output = gyrogen_with(&["verify", "c"], here, &[("CC", "cc -O1")]);
+    assert!(output.status.success(), "{}", said(&output));
+    let output = gyrogen_with(&["verify", "c"], here, &[("CC", "/bin/false")]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        said(&output).contains("/bin/false") && !said(&output).contains("there is no compiler"),
+        "{}",
+        said(&output)
+    );
+    let slow = here.join("slow");
+    std::fs::write(
+        &slow,
+        "#!/bin/sh\n[ \"$1\" = --version ] && { echo slow 1; exit; }\nsleep 100 & wait\n",
+    )
+    .expect("written");
+    std::fs::set_permissions(&slow, std::fs::Permissions::from_mode(0o755)).expect("allowed");
+    let name = slow.to_str().expect("a name");
+    let started = Instant::now();
+    let output = gyrogen_with(
+        &["verify", "c"],
+        here,
+        &[("CC", name), ("GYROGEN_TIME_LIMIT", "1")],
+    );
+    assert_eq!(output.status.code(), Some(1));
+    assert!(
+        said(&output).contains("did not end within 1 s"),
+        "{}",
+        said(&output)
+    );
+    assert!(started.elapsed() < Duration::from_secs(20));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_harness_that_hangs_or_floods_is_ended() {
+    for body in ["for (;;) { }", "for (;;) { (void)puts(\"flood\"); }"] {
+        let (folder, at) = bundle();
+        let path = at.join("test/tested_harness.c");
+        let text = std::fs::read_to_string(&path).expect("a source");
+        let start = text
+            .find("    const char *mode = ")
+            .expect("the main function");
+        let damaged = format!("{}    {body}\n{}", &text[..start], &text[start..]);
+        std::fs::write(&path, damaged).expect("written");
+        reseal(&at, |_| ());
+        let started = Instant::now();
+        let output = gyrogen_with(
+            &["verify", "c"],
+            folder.path(),
+            &[("GYROGEN_TIME_LIMIT", "5")],
+        );
+        assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+        assert!(started.elapsed() < Duration::from_secs(60));
+    }
+}
+
+#[test]
+fn an_edited_bundle_is_not_overwritten_and_an_unedited_one_leaves_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let here = folder.path();
+    std::fs::write(here.join("design.toml"), DESIGN).expect("written");
+    std::fs::write(here.join("other.toml"), DESIGN.replace("tested", "other")).expect("written");
+    let emit = |design: &str, more: &[&str]| {
+        gyrogen(
+            &[&["emit", design, "--lang", "c", "--out", "c"], more].concat(),
+            here,
+        )
+    };
+    assert!(emit("design.toml", &[]).status.success());
+    assert!(emit("other.toml", &[]).status.success());
+    assert!(here.join("c/other.c").exists() && !here.join("c/tested.c").exists());
+    std::fs::write(here.join("c/other.c"), "mine").expect("written");
+    let refused = emit("other.toml", &[]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(
+        said(&refused).contains("other.c (edited)"),
+        "{}",
+        said(&refused)
+    );
+    let forced = emit("other.toml", &["--force"]);
+    assert!(
+        forced.status.success() && said(&forced).contains("other.c (edited)"),
+        "{}",
+        said(&forced)
+    );
+}
