@@ -266,12 +266,12 @@ fn manifests_that_cannot_be_are_refused_without_a_panic() {
 #[cfg(unix)]
 #[test]
 fn links_pipes_and_endless_files_are_not_opened() {
-    let link = std::os::unix::fs::symlink::<&Path, &Path>;
+    let link = |to: &str, at: &Path| std::os::unix::fs::symlink(to, at);
     for name in ["tested.c", "vectors/correct.csv", "manifest.json"] {
         for target in ["/dev/zero", "/etc/passwd"] {
             let (_folder, at) = bundle();
             std::fs::remove_file(at.join(name)).expect("removed");
-            link(target.as_ref(), &at.join(name)).expect("a link");
+            link(target, &at.join(name)).expect("a link");
             let output = gyrogen(&["verify", "c"], at.parent().expect("a parent"));
             assert_ne!(output.status.code(), Some(0));
             assert!(!said(&output).contains("root:"), "{}", said(&output));
@@ -291,7 +291,7 @@ fn links_pipes_and_endless_files_are_not_opened() {
     // The result replaces no file elsewhere.
     let (folder, at) = bundle();
     std::fs::write(folder.path().join("victim"), "mine").expect("written");
-    link("../victim".as_ref(), &at.join("verify.json")).expect("a link");
+    link("../victim", &at.join("verify.json")).expect("a link");
     refused(&at, 2, "link");
     assert_eq!(
         std::fs::read_to_string(folder.path().join("victim")).expect("read"),

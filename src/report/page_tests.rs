@@ -86,8 +86,8 @@ impl Made {
                 float: drift(|p| p.float_dps),
                 fixed,
                 emitted: fixed,
-                c: fixed,
-                rust: fixed,
+                c: Some(fixed),
+                rust: Some(fixed),
             },
             ratio: 0.1,
             fit: FitSummary {

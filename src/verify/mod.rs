@@ -1,5 +1,6 @@
 //! Model against emitted code: [`toolchain`] builds a bundle, [`compare`] runs it beside [`crate::vectors`] and finds the first
-//! difference; [`firmware`] and [`correction`] emit, build and compare, [`bundle`] does it from a bundle's own files.
+//! difference; [`firmware`] and [`correction`] emit, build and compare; [`bundle`] does it from a bundle's own files, which it
+//! holds against what such a bundle must have; [`process`] ends what hangs.
 
 pub mod bundle;
 pub mod compare;
