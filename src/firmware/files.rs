@@ -170,35 +170,6 @@ pub fn write(files: &[EmittedFile], folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The paths of a bundle's sources, as [`emit`] gives them: of tables alone, or with code.
-pub fn paths(prefix: &str, only_tables: bool, language: Language) -> Vec<String> {
-    let p = prefix;
-    match language {
-        Language::C => {
-            let mut paths = vec![format!("{p}_tables.h"), format!("{p}_tables.c")];
-            if !only_tables {
-                paths.extend([
-                    format!("{p}_arith.h"),
-                    format!("{p}.h"),
-                    format!("{p}.c"),
-                    format!("{p}_selftest.c"),
-                    format!("test/{p}_harness.c"),
-                ]);
-            }
-            paths
-        }
-        Language::Rust => {
-            let paths = [
-                "src/lib.rs",
-                "src/selftest.rs",
-                "Cargo.toml",
-                "src/bin/harness.rs",
-            ];
-            paths.map(str::to_owned).to_vec()
-        }
-    }
-}
-
 pub(super) fn sources(view: &View, part: Part, language: Language) -> Result<Vec<EmittedFile>> {
     let p = &view.p;
     let v = view;

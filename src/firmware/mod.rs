@@ -12,6 +12,7 @@ pub mod folder;
 pub mod function;
 pub mod manifest;
 mod outside;
+pub mod paths;
 pub mod replace;
 pub mod stepped;
 pub mod tested;

@@ -205,7 +205,7 @@ impl LongRun {
                 .wrapping_add((k as u32) << 30);
             let up = turn.wrapping_mul(2);
             let triangle = u64::from(if turn >> 31 == 0 { up } else { !up });
-            let scaled = (triangle * self.amplitude >> 16) + ((65535 - self.amplitude) << 15);
+            let scaled = ((triangle * self.amplitude) >> 16) + ((65535 - self.amplitude) << 15);
             let place = match kind {
                 0 => scaled,
                 1 => (scaled + (noise >> 12)).min(u64::from(u32::MAX)),

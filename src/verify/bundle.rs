@@ -117,7 +117,7 @@ pub fn verify(
         // Built from copies: no name of the folder's reaches a compiler.
         let made = TemporaryFolder::of_the_system()
             .map_err(|e| io_error(std::env::temp_dir(), "make a folder for the build", &e))?;
-        let sources = crate::firmware::files::paths(&manifest.prefix, false, language);
+        let sources = crate::firmware::paths::sources(&manifest.prefix, false, language);
         for source in &sources {
             let to = made.path().join(source);
             if let Some(parent) = to.parent() {
@@ -207,6 +207,9 @@ fn other_than(due: &[EmittedFile], folder: &Folder) -> Vec<String> {
         .collect()
 }
 
+/// Lines of vectors.
+type Lines = Vec<Vec<i128>>;
+
 /// The comparisons of one bundle.
 struct Run<'a> {
     language: Language,
@@ -289,10 +292,7 @@ impl Run<'_> {
     }
 
     /// The vectors of a function: inputs and outputs.
-    fn split(
-        &self,
-        function: &manifest::FunctionEntry,
-    ) -> Result<(Vec<Vec<i128>>, Vec<Vec<i128>>)> {
+    fn split(&self, function: &manifest::FunctionEntry) -> Result<(Lines, Lines)> {
         let columns = function
             .inputs
             .saturating_add(function.outputs)

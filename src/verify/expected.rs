@@ -3,9 +3,9 @@
 
 use crate::emit::views::Language;
 use crate::error::Result;
-use crate::firmware::files;
 use crate::firmware::folder::{Folder, is_plain};
 use crate::firmware::manifest::{self, Manifest};
+use crate::firmware::paths;
 
 /// Functions without which there is no such part.
 const FUNCTIONS: [(&str, &[&str]); 5] = [
@@ -120,7 +120,7 @@ pub(super) fn problems(manifest: &Manifest, folder: &Folder) -> Result<Vec<Strin
     let mut problems = Vec::new();
     let language = language(manifest);
     let only_tables = manifest.part == "tables";
-    let mut due = files::paths(&manifest.prefix, only_tables, language);
+    let mut due = paths::sources(&manifest.prefix, only_tables, language);
     due.extend(vectors(manifest));
     let listed: Vec<&str> = manifest.files.iter().map(|f| f.path.as_str()).collect();
     for path in &due {

@@ -1,0 +1,58 @@
+//! Which files a bundle has.
+
+use crate::emit::views::Language;
+
+/// The paths of a bundle's sources, as [`emit`](super::files::emit) gives them: of tables alone, or with code.
+pub fn sources(prefix: &str, only_tables: bool, language: Language) -> Vec<String> {
+    let p = prefix;
+    match language {
+        Language::C => {
+            let mut paths = vec![format!("{p}_tables.h"), format!("{p}_tables.c")];
+            if !only_tables {
+                paths.extend([
+                    format!("{p}_arith.h"),
+                    format!("{p}.h"),
+                    format!("{p}.c"),
+                    format!("{p}_selftest.c"),
+                    format!("test/{p}_harness.c"),
+                ]);
+            }
+            paths
+        }
+        Language::Rust => {
+            let paths = [
+                "src/lib.rs",
+                "src/selftest.rs",
+                "Cargo.toml",
+                "src/bin/harness.rs",
+            ];
+            paths.map(str::to_owned).to_vec()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::emit::bundle::Part;
+    use crate::firmware::{files, manifest};
+
+    /// What `verify` holds a bundle against is what is emitted.
+    #[test]
+    fn emitted_sources_are_those_that_are_known() {
+        let design = crate::design::reader::read(None).expect("the default design");
+        for (part, only_tables) in [(Part::Tables, true), (Part::Compensation, false)] {
+            for language in [Language::C, Language::Rust] {
+                let emitted = files::emit(&design, part, language, "test").expect("emitted");
+                let paths = emitted.iter().map(|f| f.path.clone());
+                let mut found: Vec<String> = paths
+                    .filter(|p| !p.starts_with("vectors/") && p != manifest::NAME)
+                    .collect();
+                let mut due = sources(&design.name, only_tables, language);
+                found.sort();
+                due.sort();
+                assert_eq!(found, due);
+            }
+        }
+    }
+}
