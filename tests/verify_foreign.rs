@@ -80,6 +80,9 @@ fn sha256(bytes: &[u8]) -> String {
     gyrogen::digest::sha256(bytes)
 }
 
+/// What is said of a manifest, and how it is changed.
+type Damage = (&'static str, fn(&mut Value));
+
 /// Changes the manifest and seals it again, with the files as they are.
 fn reseal(at: &Path, change: impl FnOnce(&mut Value)) {
     let path = at.join("manifest.json");
@@ -172,7 +175,7 @@ fn a_bundle_holds_against_its_digest_and_its_design() {
 
 #[test]
 fn what_a_bundle_must_hold_is_not_read_from_its_manifest() {
-    let damages: [(&str, fn(&mut Value)); 9] = [
+    let damages: [Damage; 9] = [
         ("lacks tested.c", |m| m["files"] = Value::Array(Vec::new())),
         ("no vectors of `correct`", |m| {
             m["functions"] = Value::Array(Vec::new())
@@ -241,7 +244,7 @@ fn dropped_outputs_and_states_are_noticed() {
 
 #[test]
 fn manifests_that_cannot_be_are_refused_without_a_panic() {
-    let damages: [(&str, fn(&mut Value)); 7] = [
+    let damages: [Damage; 7] = [
         ("more than", |m| {
             m["functions"][0]["inputs"] = u64::MAX.into()
         }),
