@@ -3,6 +3,7 @@
 
 use super::bundle::Bundle;
 use super::machine::{Expr, Lowered, Statement, Type, Typed, Value, Width};
+use super::views::table_type;
 use crate::numeric::trace::ir::{Function, Interval};
 use std::fmt::Write as _;
 
@@ -95,7 +96,11 @@ pub fn definition(bundle: &Bundle, number: usize) -> String {
         several => {
             _ = writeln!(text, "    {}Out {{", camel(name));
             for (name, v) in several {
-                _ = writeln!(text, "        {name}: {},", printer.value(v));
+                let value = printer.value(v);
+                _ = match value == *name {
+                    true => writeln!(text, "        {name},"),
+                    false => writeln!(text, "        {name}: {value},"),
+                };
             }
             text.push_str("    }\n");
         }
@@ -265,19 +270,23 @@ impl Printer<'_> {
                 constant(*high, ty)
             ),
             Expr::Sine(k, index) => {
-                format!(
-                    "SINE_{k}.get({} as usize).copied().unwrap_or(0) as {name}",
-                    v(index)
+                let entries = &self.bundle.program.sine_tables[*k].entries;
+                entry(
+                    &format!("SINE_{k}"),
+                    &v(index),
+                    table_type(entries, false).1,
+                    name,
                 )
             }
             Expr::Lookup(k, index) => {
-                let table = self.bundle.program.tables[*k].name.to_uppercase();
-                let index = v(index);
-                format!("{table}.get({index} as usize).copied().unwrap_or(0) as {name}")
+                let table = &self.bundle.program.tables[*k];
+                let ty = table_type(&table.entries, true).1;
+                entry(&table.name.to_uppercase(), &v(index), ty, name)
             }
             Expr::Entry(k) => {
-                let table = self.bundle.program.index_tables[*k].name.to_uppercase();
-                format!("{table}.get(i as usize).copied().unwrap_or(0) as {name}")
+                let table = &self.bundle.program.index_tables[*k];
+                let ty = table_type(&table.entries, false).1;
+                entry(&table.name.to_uppercase(), "i", ty, name)
             }
             Expr::Load(slot, element) => self.state(*slot, *element),
         }
@@ -291,5 +300,15 @@ fn comment(note: Option<&String>, range: Option<Interval>) -> String {
     match words.as_slice() {
         [] => String::new(),
         words => format!(" // {}", words.join("; ")),
+    }
+}
+
+/// An entry of a table of words of type `held`, as one of type `wanted`; an index is in range, and nothing panics.
+fn entry(table: &str, index: &str, held: &str, wanted: &str) -> String {
+    let entry = format!("{table}.get({index} as usize).copied().unwrap_or(0)");
+    if held == wanted {
+        entry
+    } else {
+        format!("{entry} as {wanted}")
     }
 }

@@ -155,7 +155,21 @@ pub fn entry_type(entries: &[i64]) -> (usize, bool) {
     (bytes, signed)
 }
 
-/// `narrow`: in the narrowest type that holds all entries, else in 16 bits at least and signed.
+/// The type of a table's entries in C and in Rust. `narrow`: the narrowest that holds all, else 16 bits at least and
+/// signed.
+pub(super) fn table_type(entries: &[i64], narrow: bool) -> (&'static str, &'static str) {
+    let largest = entries.iter().map(|v| v.unsigned_abs()).max().unwrap_or(0);
+    match (narrow, entry_type(entries), largest) {
+        (true, (1, true), _) => ("int8_t", "i8"),
+        (true, (1, false), _) => ("uint8_t", "u8"),
+        (true, (2, false), _) => ("uint16_t", "u16"),
+        (true, (4, false), _) => ("uint32_t", "u32"),
+        (_, _, 0..=0x7fff) | (true, (2, true), _) => ("int16_t", "i16"),
+        (_, _, 0x8000..=0x7fff_ffff) | (true, (4, true), _) => ("int32_t", "i32"),
+        _ => ("int64_t", "i64"),
+    }
+}
+
 fn table(
     k: usize,
     name: String,
@@ -164,16 +178,7 @@ fn table(
     language: Language,
     narrow: bool,
 ) -> TableView {
-    let largest = entries.iter().map(|v| v.unsigned_abs()).max().unwrap_or(0);
-    let (c_type, rust_type) = match (narrow, entry_type(&entries), largest) {
-        (true, (1, true), _) => ("int8_t", "i8"),
-        (true, (1, false), _) => ("uint8_t", "u8"),
-        (true, (2, false), _) => ("uint16_t", "u16"),
-        (true, (4, false), _) => ("uint32_t", "u32"),
-        (_, _, 0..=0x7fff) | (true, (2, true), _) => ("int16_t", "i16"),
-        (_, _, 0x8000..=0x7fff_ffff) | (true, (4, true), _) => ("int32_t", "i32"),
-        _ => ("int64_t", "i64"),
-    };
+    let (c_type, rust_type) = table_type(&entries, narrow);
     let entry = |v: &i64| match (language, c_type) {
         (Language::C, "int64_t") if *v == i64::MIN => "INT64_MIN".to_owned(),
         (Language::C, "int64_t") => format!("INT64_C({v})"),
@@ -393,6 +398,7 @@ pub fn word_64(expression: &str, ty: Type, language: Language) -> String {
         }
         (Language::C, Type::Signed(_)) => format!("(uint64_t)(int64_t){expression}"),
         (Language::C, _) => format!("(uint64_t){expression}"),
+        (Language::Rust, Type::Unsigned(Width::W64)) => expression.to_owned(),
         (Language::Rust, _) => format!("{expression} as u64"),
     }
 }

@@ -1,8 +1,9 @@
 //! The bundle of one function that stands alone: no chain, no state, one word in, one word out.
 
-use super::files::{self, EmittedFile, View};
+use super::files::{self, EmittedFile};
 use super::manifest::{self, Header, Manifest};
 use super::vectors::{self, Checked};
+use super::view::View;
 use crate::emit::bundle::{Bundle, Part};
 use crate::emit::lower::lower;
 use crate::emit::views::Language;
@@ -44,6 +45,7 @@ pub fn emit(what: &Standalone, language: Language) -> Result<Vec<EmittedFile>> {
     let mut emitted = files::sources(&view, Part::Compensation, language)?;
     emitted.extend_from_slice(what.vectors);
     emitted.push(vectors::of_tables(&view.tables));
+    emitted.push(files::sums(&emitted));
     let header = Header {
         design_sha256: what.request_sha256,
         command: what.command,

@@ -1,6 +1,7 @@
 //! What a bundle says of itself: the manifest, and the banner and facts at the head of each file.
 
-use super::files::{EmittedFile, View};
+use super::files::EmittedFile;
+use super::view::View;
 use crate::design::{CompensationInput, Design, Outside};
 use crate::digest::sha256;
 use crate::emit::bundle::Bundle;

@@ -1,6 +1,6 @@
 //! Firmware bundles, as files in memory: sources with self-test, harness, vectors and manifest.
 //!
-//! [`files`] assembles the chain or its compensation, [`function`] one function alone, [`stepped`] one with a state,
+//! [`files`] assembles ([`view`]: what its templates see) the chain or its compensation, [`function`] one function alone, [`stepped`] one with a state,
 //! [`correction`] the step of a correction, [`approximation`] what `gyrogen approx` found; [`manifest`] says what is in a bundle, [`calibrated`] where it holds,
 //! [`vectors`] and [`tested`] how it is compared; [`replace`] puts it in the place of an older one, of whose [`folder`] only plain files are read.
 
@@ -17,3 +17,4 @@ pub mod replace;
 pub mod stepped;
 pub mod tested;
 pub mod vectors;
+pub mod view;

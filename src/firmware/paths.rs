@@ -2,6 +2,11 @@
 
 use crate::emit::views::Language;
 
+/// What a bundle says to its user.
+pub const README: &str = "README.md";
+/// SHA-256 of every other file but the manifest, as `sha256sum -c` reads them.
+pub const SUMS: &str = "SHA256SUMS";
+
 /// The paths of a bundle's sources, as [`emit`](super::files::emit) gives them: of tables alone, or with code.
 pub fn sources(prefix: &str, only_tables: bool, language: Language) -> Vec<String> {
     let p = prefix;
@@ -15,18 +20,25 @@ pub fn sources(prefix: &str, only_tables: bool, language: Language) -> Vec<Strin
                     format!("{p}.c"),
                     format!("{p}_selftest.c"),
                     format!("test/{p}_harness.c"),
+                    "Makefile".to_owned(),
+                    "CMakeLists.txt".to_owned(),
+                    README.to_owned(),
+                    SUMS.to_owned(),
                 ]);
             }
             paths
         }
         Language::Rust => {
-            let paths = [
+            let mut paths = vec![
                 "src/lib.rs",
                 "src/selftest.rs",
                 "Cargo.toml",
                 "src/bin/harness.rs",
             ];
-            paths.map(str::to_owned).to_vec()
+            if !only_tables {
+                paths.extend(["tests/vectors.rs", README, SUMS]);
+            }
+            paths.into_iter().map(str::to_owned).collect()
         }
     }
 }

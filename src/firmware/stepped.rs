@@ -2,10 +2,11 @@
 //!
 //! Its first input restarts the state where it is 1. The state starts at zeros.
 
-use super::files::{self, EmittedFile, View};
+use super::files::{self, EmittedFile};
 use super::manifest::{self, Header, Manifest};
 use super::tested;
 use super::vectors::{self, csv_line};
+use super::view::View;
 use crate::correction::Calls;
 use crate::emit::bundle::{Bundle, Part, states};
 use crate::emit::lower::lower;
@@ -135,6 +136,7 @@ pub fn emit(what: &Stepped, language: Language) -> Result<Vec<EmittedFile>> {
     );
     emitted.push(in_order(what.model, &ranges, names));
     emitted.push(vectors::of_tables(&view.tables));
+    emitted.push(files::sums(&emitted));
     let header = Header {
         design_sha256: what.request_sha256,
         command: what.command,

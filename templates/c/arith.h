@@ -1,4 +1,5 @@
 /* {{ v.banner }}
+ * SPDX-License-Identifier: MIT OR Apache-2.0
  *
  * Integer helpers with defined behaviour on every C99 target: floor shifts, sign extension,
  * limits, and 128-bit words for the few values that need more than 64 bits.

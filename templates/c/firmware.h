@@ -1,4 +1,5 @@
 /* {{ v.banner }}
+ * SPDX-License-Identifier: MIT OR Apache-2.0
  *
 {% for line in v.facts %} * {{ line }}
 {% endfor %} */

@@ -1,4 +1,5 @@
 /* {{ v.banner }}
+ * SPDX-License-Identifier: MIT OR Apache-2.0
  *
  * Host-side driver, not firmware. Words are native int64, a wider one is its low and its high half; a
  * record is a function's outputs, its state after the call and the number of the fault (0 = none).
@@ -11,7 +12,8 @@
  *   sequence          calls a function with a state, from the state at zeros, for the inputs it reads
  *   chain             reads int32 pairs (drive, sense), writes rows
  *   long              writes the checksum of a long run: of all rows or records and of the last state
- *   check NAME        reads vectors/NAME.csv and compares; `chain`, `tables` and `sequence` are names too
+ *   check NAME FILE   compares with vectors/NAME.csv; `chain` (two files), `tables` and `sequence` are names too;
+ *                     without files the vectors come from the standard input
  *   check every       compares every function that is run over all its inputs with its checksum
  *   check long        compares the long run with its checksum
  */
@@ -428,8 +430,8 @@ static int check_tables(void)
     return verdict("sequence", compared, differing);
 }
 
-{% endif %}{% if v.chain %}/* Reads chain_input.csv and then chain_output.csv. */
-static int check_chain(void)
+{% endif %}{% if v.chain %}/* Reads chain_input.csv and then chain_output.csv, which is `second` or follows it. */
+static int check_chain(const char *second)
 {
     static {{ v.p }}_t g;
     static uint64_t rows[{{ v.vector_rows }}U][MOST];
@@ -447,6 +449,9 @@ static int check_chain(void)
         }
         count = line(words, 0U);
     }
+    if ((second != NULL) && (freopen(second, "r", stdin) == NULL)) {
+        return 2;
+    }
     header();
     for (size_t k = 0U; k < pushed; ++k) {
         const bool whole = line(words, 0U) == {{ v.row.len() + 1 }}U;
@@ -457,8 +462,13 @@ static int check_chain(void)
     return verdict("chain", compared, differing);
 }
 
-{% endif %}static int check(const char *name)
+{% endif %}static int check(const char *name, const char *first, const char *second)
 {
+{% if !v.chain %}    (void)second;
+{% endif %}    if ((first != NULL) && (freopen(first, "r", stdin) == NULL)) {
+        (void)printf("%s: FAIL, cannot read %s\n", name, first);
+        return 2;
+    }
     const function_t *f = find(name);
     if (f != NULL) {
         return check_function(f);
@@ -473,7 +483,7 @@ static int check_chain(void)
         return check_sequence();
     }
 {% endif %}{% if v.chain %}    if (strcmp(name, "chain") == 0) {
-        return check_chain();
+        return check_chain(second);
     }
 {% endif %}{% if !v.long_words.is_empty() %}    if (strcmp(name, "long") == 0) {
         return verdict("long", UINT64_C({{ v.long_steps }}), (long_run() == UINT64_C({{ v.long_checksum }})) ? 0U : 1U);
@@ -508,7 +518,7 @@ int main(int argc, char **argv)
         return table(name);
     }
     if (strcmp(mode, "check") == 0) {
-        return check(name);
+        return check(name, (argc > 3) ? argv[3] : NULL, (argc > 4) ? argv[4] : NULL);
     }
 {% if v.stream.is_some() %}    if (strcmp(mode, "sequence") == 0) {
         return sequence();

@@ -1,4 +1,5 @@
 /* {{ v.banner }}
+ * SPDX-License-Identifier: MIT OR Apache-2.0
  *
  * Each function runs on a stimulus from a linear congruential generator, laid over the ranges of its
  * inputs and of its state; the FNV-1a checksum of all outputs and of the state is compared with the model's.

@@ -1,4 +1,6 @@
-/* {{ v.banner }} */
+/* {{ v.banner }}
+ * SPDX-License-Identifier: MIT OR Apache-2.0
+ */
 #ifndef {{ v.guard }}_TABLES_H
 #define {{ v.guard }}_TABLES_H
 

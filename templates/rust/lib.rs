@@ -1,4 +1,5 @@
 // {{ v.banner }}
+// SPDX-License-Identifier: MIT OR Apache-2.0
 
 //! Firmware in integers: no float, no heap, nothing that can panic.
 //!
@@ -14,6 +15,8 @@
 #![allow(clippy::let_and_return, clippy::manual_clamp)]
 // Numbers are printed as the model has them, and functions as long as the circuit's blocks are.
 #![allow(clippy::unreadable_literal, clippy::too_many_lines)]
+// Roundings are called as in the design: half_up.
+#![allow(clippy::doc_markdown)]
 // Names are the circuit's: `phase` beside `phases`, x, y and z.
 #![allow(clippy::similar_names, clippy::many_single_char_names)]
 

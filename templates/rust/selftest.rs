@@ -1,7 +1,10 @@
 // {{ v.banner }}
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //
 // Each function runs on a stimulus from a linear congruential generator, laid over the ranges of its
 // inputs and of its state; the FNV-1a checksum of all outputs and of the state is compared with the model's.
+// It calls all that the crate has.
+#[allow(clippy::wildcard_imports)]
 use super::*;
 
 /// One step of the checksum.
