@@ -88,10 +88,15 @@ fn reseal(at: &Path, change: impl FnOnce(&mut Value)) {
     let path = at.join("manifest.json");
     let text = std::fs::read_to_string(&path).expect("a manifest");
     let mut value: Value = serde_json::from_str(&text).expect("JSON");
+    let mut sums = String::new();
     for file in value["files"].as_array_mut().expect("files") {
-        let bytes = std::fs::read(at.join(file["path"].as_str().expect("a path")));
-        if let Ok(bytes) = bytes {
+        let name = file["path"].as_str().expect("a path").to_owned();
+        if name == "SHA256SUMS" {
+            std::fs::write(at.join(&name), &sums).expect("written");
+        }
+        if let Ok(bytes) = std::fs::read(at.join(&name)) {
             file["sha256"] = sha256(&bytes).into();
+            sums += &format!("{}  {name}\n", sha256(&bytes));
         }
     }
     change(&mut value);
@@ -144,7 +149,7 @@ fn a_bundle_holds_against_its_digest_and_its_design() {
     let output = gyrogen(&["verify", "c", "--design", "design.toml"], other.path());
     assert_eq!(output.status.code(), Some(1));
     assert!(
-        said(&output).contains("tested.c is not what the design emits"),
+        said(&output).contains("tested_correction.c is not what the design emits"),
         "{}",
         said(&output)
     );
@@ -152,13 +157,16 @@ fn a_bundle_holds_against_its_digest_and_its_design() {
     let command = "gyrogen emit other.toml --lang c --part correction";
     let before = "gyrogen emit design.toml --lang c --part correction";
     for name in [
-        "tested.c",
-        "tested.h",
-        "tested_arith.h",
-        "tested_selftest.c",
-        "tested_tables.c",
-        "tested_tables.h",
-        "test/tested_harness.c",
+        "tested_correction.c",
+        "tested_correction.h",
+        "tested_correction_arith.h",
+        "tested_correction_selftest.c",
+        "tested_correction_tables.c",
+        "tested_correction_tables.h",
+        "test/tested_correction_harness.c",
+        "Makefile",
+        "CMakeLists.txt",
+        "README.md",
     ] {
         let text = std::fs::read_to_string(at.join(name)).expect("a source");
         std::fs::write(at.join(name), text.replace(before, command)).expect("written");
@@ -176,7 +184,9 @@ fn a_bundle_holds_against_its_digest_and_its_design() {
 #[test]
 fn what_a_bundle_must_hold_is_not_read_from_its_manifest() {
     let damages: [Damage; 9] = [
-        ("lacks tested.c", |m| m["files"] = Value::Array(Vec::new())),
+        ("lacks tested_correction.c", |m| {
+            m["files"] = Value::Array(Vec::new())
+        }),
         ("no vectors of `correct`", |m| {
             m["functions"] = Value::Array(Vec::new())
         }),
@@ -207,6 +217,15 @@ fn what_a_bundle_must_hold_is_not_read_from_its_manifest() {
     )
     .expect("written");
     refused(&at, 1, "seal");
+    // Checksums for who has no gyrogen that are those of other files.
+    let (_folder, at) = bundle();
+    reseal(&at, |m| {
+        let files = m["files"].as_array_mut().expect("files");
+        let sums = files.iter_mut().find(|f| f["path"] == "SHA256SUMS");
+        sums.expect("an entry")["sha256"] = sha256(b"").into();
+    });
+    std::fs::write(at.join("SHA256SUMS"), "").expect("written");
+    refused(&at, 1, "SHA256SUMS is not of these files");
     // Vectors cut to their header, a source that is not listed, a wrecked source that is.
     let (_folder, at) = bundle();
     for name in ["correct", "sequence"] {
@@ -224,14 +243,14 @@ fn what_a_bundle_must_hold_is_not_read_from_its_manifest() {
     std::fs::write(at.join("extra.c"), "int extra;\n").expect("written");
     refused(&at, 1, "extra.c");
     let (_folder, at) = bundle();
-    std::fs::write(at.join("tested.c"), "int nothing;\n").expect("written");
+    std::fs::write(at.join("tested_correction.c"), "int nothing;\n").expect("written");
     refused(&at, 1, "");
 }
 
 #[test]
 fn dropped_outputs_and_states_are_noticed() {
     let (_folder, at) = bundle();
-    let path = at.join("tested.c");
+    let path = at.join("tested_correction.c");
     let text = std::fs::read_to_string(&path).expect("a source");
     let store = text
         .lines()
@@ -270,7 +289,11 @@ fn manifests_that_cannot_be_are_refused_without_a_panic() {
 #[test]
 fn links_pipes_and_endless_files_are_not_opened() {
     let link = |to: &str, at: &Path| std::os::unix::fs::symlink(to, at);
-    for name in ["tested.c", "vectors/correct.csv", "manifest.json"] {
+    for name in [
+        "tested_correction.c",
+        "vectors/correct.csv",
+        "manifest.json",
+    ] {
         for target in ["/dev/zero", "/etc/passwd"] {
             let (_folder, at) = bundle();
             std::fs::remove_file(at.join(name)).expect("removed");
@@ -353,7 +376,7 @@ fn a_compiler_may_have_arguments_and_may_not_hang() {
 fn a_harness_that_hangs_or_floods_is_ended() {
     for body in ["for (;;) { }", "for (;;) { (void)puts(\"flood\"); }"] {
         let (folder, at) = bundle();
-        let path = at.join("test/tested_harness.c");
+        let path = at.join("test/tested_correction_harness.c");
         let text = std::fs::read_to_string(&path).expect("a source");
         let start = text
             .find("    const char *mode = ")
@@ -386,18 +409,20 @@ fn an_edited_bundle_is_not_overwritten_and_an_unedited_one_leaves_nothing() {
     };
     assert!(emit("design.toml", &[]).status.success());
     assert!(emit("other.toml", &[]).status.success());
-    assert!(here.join("c/other.c").exists() && !here.join("c/tested.c").exists());
-    std::fs::write(here.join("c/other.c"), "mine").expect("written");
+    assert!(
+        here.join("c/other_correction.c").exists() && !here.join("c/tested_correction.c").exists()
+    );
+    std::fs::write(here.join("c/other_correction.c"), "mine").expect("written");
     let refused = emit("other.toml", &[]);
     assert_eq!(refused.status.code(), Some(2));
     assert!(
-        said(&refused).contains("other.c (edited)"),
+        said(&refused).contains("other_correction.c (edited)"),
         "{}",
         said(&refused)
     );
     let forced = emit("other.toml", &["--force"]);
     assert!(
-        forced.status.success() && said(&forced).contains("other.c (edited)"),
+        forced.status.success() && said(&forced).contains("other_correction.c (edited)"),
         "{}",
         said(&forced)
     );

@@ -149,11 +149,22 @@ pub(super) fn problems(manifest: &Manifest, folder: &Folder) -> Result<Vec<Strin
     if !only_tables {
         declared(manifest, language, folder, &mut problems);
     }
+    if !only_tables && folder.read_text(paths::SUMS).ok() != Some(sums(manifest)) {
+        problems.push(format!("{} is not of these files", paths::SUMS));
+    }
     banners(manifest, folder, &mut problems);
     if manifest.seal != manifest.sealed() {
         problems.push("the manifest is not as it was written (its seal is another)".to_owned());
     }
     Ok(problems)
+}
+
+/// The lines of the checksums for who has no gyrogen.
+fn sums(manifest: &Manifest) -> String {
+    let files = manifest.files.iter().filter(|f| f.path != paths::SUMS);
+    files
+        .map(|f| format!("{}  {}\n", f.sha256, f.path))
+        .collect()
 }
 
 /// Functions, tables and chain that the part has to have, and their numbers in the self-test.

@@ -4,7 +4,7 @@
  * Host-side driver, not firmware. Words are native int64, a wider one is its low and its high half; a
  * record is a function's outputs, its state after the call and the number of the fault (0 = none).
  *
- *   selftest          runs the start-up check
+ *   selftest          runs the start-up check, and compares the helpers of *_arith.h with plain arithmetic
  *   table NAME        writes a table
  *   call NAME         reads inputs and state, writes records
  *   range NAME A N    writes the records of N inputs from A on, of a function of one input
@@ -338,6 +338,56 @@ static void header(void)
     }
 }
 
+/* The helpers of {{ v.p }}_arith.h over their whole domains, wider than the ranges that the functions use. */
+{% for w in [32, 64] %}static uint64_t arith_{{ w }}(int{{ w }}_t a, int{{ w }}_t b)
+{
+    uint64_t differing = 0U;
+    for (uint32_t n = 0U; n < {{ w }}U; ++n) {
+        const uint{{ w }}_t sign = UINT{{ w }}_C(1) << n;
+        const uint{{ w }}_t mask = sign | (sign - 1U);
+        const uint{{ w }}_t low = (uint{{ w }}_t)a & mask;
+        int{{ w }}_t floored = a;
+        for (uint32_t k = 0U; k < n; ++k) {
+            floored = (floored / 2) - (((floored % 2) < 0) ? 1 : 0);
+        }
+        const int{{ w }}_t extended = ((low & sign) != 0U) ? ((-(int{{ w }}_t)(mask - low)) - 1) : (int{{ w }}_t)low;
+        differing += ((n < {{ w - 1 }}U) && ({{ v.p }}_asr_{{ w }}(a, n) != floored)) ? 1U : 0U;
+        differing += ({{ v.p }}_asr_by_{{ w }}(a, n) != floored) ? 1U : 0U;
+        differing += ({{ v.p }}_sign_extend_{{ w }}((uint{{ w }}_t)a, sign) != extended) ? 1U : 0U;
+    }
+    const int{{ w }}_t least = (a < b) ? a : b;
+    const int{{ w }}_t most = (a < b) ? b : a;
+    for (int c = -2; c <= 2; ++c) {
+        const bool fits = (c < 0) ? (least > (INT{{ w }}_MIN - c)) : (most < (INT{{ w }}_MAX - c));
+        const int{{ w }}_t x = !fits ? 0 : ((c < 0) ? (least + c) : (most + c));
+        const int{{ w }}_t due = (x < least) ? least : ((x > most) ? most : x);
+        uint32_t fault = 0U;
+        uint32_t first = 3U;
+        differing += ({{ v.p }}_clamp_{{ w }}(x, least, most) != due) ? 1U : 0U;
+        differing += ({{ v.p }}_check_{{ w }}(x, least, most, 7U, &fault) != due) ? 1U : 0U;
+        differing += ({{ v.p }}_check_{{ w }}(x, least, most, 7U, &first) != due) ? 1U : 0U;
+        differing += ((fault != ((x != due) ? 7U : 0U)) || (first != 3U)) ? 1U : 0U;
+    }
+    differing += ({{ v.p }}_word_{{ w }}((uint{{ w }}_t)a) != a) ? 1U : 0U;
+    return differing;
+}
+
+{% endfor %}static bool arith(void)
+{
+    uint64_t differing = 0U;
+    for (uint32_t n = 0U; n < 64U; ++n) {
+        for (uint32_t k = 0U; k < 5U; ++k) {
+            const uint64_t word = (UINT64_C(1) << n) + k - 2U;
+            const uint64_t other = (k * UINT64_C(0x9E3779B97F4A7C15)) ^ ~word;
+            differing += arith_64({{ v.p }}_word_64(word), {{ v.p }}_word_64(other));
+            differing += arith_64({{ v.p }}_word_64(~word), {{ v.p }}_word_64(word));
+            differing += arith_32({{ v.p }}_word_32((uint32_t)word), {{ v.p }}_word_32((uint32_t)other));
+            differing += arith_32({{ v.p }}_word_32(~(uint32_t)word), {{ v.p }}_word_32((uint32_t)word));
+        }
+    }
+    return differing == 0U;
+}
+
 static int verdict(const char *name, uint64_t compared, uint64_t differing)
 {
     const bool good = (compared > 0U) && (differing == 0U);
@@ -500,6 +550,10 @@ int main(int argc, char **argv)
     (void)setvbuf(stdout, buffer, _IOFBF, sizeof buffer);
     if (strcmp(mode, "selftest") == 0) {
         const uint32_t failed = {{ v.p }}_selftest();
+        if (!arith()) {
+            (void)printf("arith: FAIL\n");
+            return 1;
+        }
         (void)printf("selftest: %s (%" PRIu32 ")\n", (failed == 0U) ? "pass" : "FAIL", failed);
         return (failed == 0U) ? 0 : 1;
     }
