@@ -14,9 +14,11 @@ use gyrogen::firmware::files::EmittedFile;
 use std::path::Path;
 
 /// Texts in an ordinary run.
-const TEXTS: usize = 240;
+const TEXTS: usize = 1000;
 /// Columns of a correction.
 const COLUMNS: usize = 8;
+/// Texts that one column or command is made of: a bundle takes a second to emit.
+const JOINED: usize = 6;
 
 /// What closes, opens, splices, escapes, reorders or commands.
 const PIECES: [&str; 30] = [
@@ -62,6 +64,10 @@ impl Dice {
             .wrapping_mul(6_364_136_223_846_793_005)
             .wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 33) as usize % n
+    }
+
+    fn joined(&mut self) -> String {
+        (0..JOINED).map(|_| self.hostile()).collect()
     }
 
     fn hostile(&mut self) -> String {
@@ -217,9 +223,9 @@ fn texts(count: usize) {
     for language in [Language::C, Language::Rust] {
         let expected = code(&bundle(&plain, "gyrogen emit", language));
         assert!(expected.len() >= 2 && expected.iter().any(|(_, text)| text.len() > 1000));
-        for _ in 0..count.div_ceil(COLUMNS + 1) {
-            let columns: Vec<String> = (0..COLUMNS).map(|_| dice.hostile()).collect();
-            let command = format!("gyrogen emit {}", dice.hostile());
+        for _ in 0..count.div_ceil(2 * JOINED * (COLUMNS + 1)) {
+            let columns: Vec<String> = (0..COLUMNS).map(|_| dice.joined()).collect();
+            let command = format!("gyrogen emit {}", dice.joined());
             let files = bundle(&columns, &command, language);
             assert_eq!(code(&files), expected, "{columns:?} {command:?}");
             for file in files.iter().filter(|f| !f.path.ends_with(".csv")) {
@@ -238,9 +244,45 @@ fn hostile_columns_and_commands_stay_in_comments_and_strings() {
 }
 
 #[test]
-#[ignore = "ten thousand texts take a minute"]
+#[ignore = "ten thousand texts take some minutes"]
 fn ten_thousand_hostile_texts_stay_in_comments_and_strings() {
     texts(10_000);
+}
+
+/// Sources of hostile columns and commands, as compilers see them.
+#[test]
+#[ignore = "two hundred bundles are compiled: a minute"]
+fn two_hundred_hostile_bundles_compile() {
+    let mut dice = Dice(1997);
+    for round in 0..100 {
+        let columns: Vec<String> = (0..COLUMNS).map(|_| dice.hostile()).collect();
+        let command = format!("gyrogen emit {}", dice.hostile());
+        for language in [Language::C, Language::Rust] {
+            let made = tempfile::tempdir().expect("a folder");
+            let files = bundle(&columns, &command, language);
+            gyrogen::firmware::files::write(&files, made.path()).expect("written");
+            let arguments: &[&str] = match language {
+                Language::C => &[
+                    "-c",
+                    "cc -std=c99 -Wall -Wextra -Wconversion -Wshadow -pedantic -Werror -fsyntax-only -I. *.c test/*.c",
+                ],
+                Language::Rust => &[
+                    "-c",
+                    "rustc --edition 2021 -D warnings --crate-type rlib --crate-name hostile --emit metadata src/lib.rs",
+                ],
+            };
+            let output = std::process::Command::new("sh")
+                .args(arguments)
+                .current_dir(made.path())
+                .output()
+                .expect("a shell");
+            assert!(
+                output.status.success(),
+                "{round} {columns:?} {command:?}: {}",
+                String::from_utf8_lossy(&output.stderr)
+            );
+        }
+    }
 }
 
 #[test]

@@ -30,11 +30,11 @@ static inline int{{ w }}_t {{ v.p }}_asr_{{ w }}(int{{ w }}_t a, uint32_t n)
     return (a >= 0) ? (a / unit) : ((-1) - (((-1) - a) / unit));
 }
 
-/* The same where n < {{ w }} is not a constant: the word is shifted with 2^{{ w - 1 }} on it, which comes off again. */
+/* The same where n < {{ w }} is not a constant: of a word below zero the complement is shifted. */
 static inline int{{ w }}_t {{ v.p }}_asr_by_{{ w }}(int{{ w }}_t a, uint32_t n)
 {
-    const uint{{ w }}_t lift = UINT{{ w }}_C(1) << {{ w - 1 }}U;
-    return {{ v.p }}_word_{{ w }}((((uint{{ w }}_t)a + lift) >> n) - (lift >> n));
+    return (a >= 0) ? (int{{ w }}_t)((uint{{ w }}_t)a >> n)
+                    : ((-1) - (int{{ w }}_t)((uint{{ w }}_t)((-1) - a) >> n));
 }
 
 /* The bits up to and with `sign` as a two's-complement number. */

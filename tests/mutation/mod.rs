@@ -194,7 +194,7 @@ impl Bundle {
         for name in &bundle.names {
             let source = bundle.source(name);
             assert!(
-                bundle.compile(&source, name, &bundle.object(name), &[]),
+                bundle.compile(&source, &bundle.object(name), &[]),
                 "{name} compiles"
             );
         }
@@ -215,7 +215,7 @@ impl Bundle {
     }
 
     /// Compiles a source with headers from `before`, then from the bundle.
-    fn compile(&self, source: &Path, _name: &str, object: &Path, before: &[&Path]) -> bool {
+    fn compile(&self, source: &Path, object: &Path, before: &[&Path]) -> bool {
         let mut command = Command::new("cc");
         command.args(["-std=c99", "-O1", "-w", "-c"]);
         command.args(
@@ -297,33 +297,34 @@ impl Bundle {
         std::fs::write(&path, damaged.join("\n") + "\n").expect("written");
         let is_header = mutant.file.ends_with(".h");
         let main = format!("{}.c", self.prefix);
-        let source = if is_header {
-            // The header that comes first is the damaged one: a copy beside the source.
-            let copy = place.join(&main);
-            std::fs::copy(self.folder.join(&main), &copy).expect("copied");
-            std::fs::copy(
-                self.folder.join(format!("{}.h", self.prefix)),
-                place.join(format!("{}.h", self.prefix)),
-            )
-            .expect("copied");
-            copy
-        } else {
-            path
+        // All that a damaged header goes into is compiled with it: copies beside it.
+        let damaged: Vec<&String> = match is_header {
+            true => self.names.iter().collect(),
+            false => vec![&mutant.file],
         };
-        let name = if is_header { &main } else { &mutant.file };
-        let object = place.join("mutant.o");
-        if !self.compile(&source, name, &object, &[place]) {
-            return Fate::Killed;
+        if is_header {
+            let headers = ["", "_tables"].map(|part| format!("{}{part}.h", self.prefix));
+            for name in headers {
+                std::fs::copy(self.folder.join(&name), place.join(&name)).expect("copied");
+            }
+            for name in &damaged {
+                std::fs::copy(self.source(name), place.join(name)).expect("copied");
+            }
         }
+        let object = |name: &String| place.join(format!("{name}.o"));
+        for name in &damaged {
+            if !self.compile(&place.join(name), &object(name), &[place]) {
+                return Fate::Killed;
+            }
+        }
+        let name = if is_header { &main } else { &mutant.file };
+        let source = place.join(name);
         let program = place.join("harness");
         let mut link = Command::new("cc");
-        link.arg(&object);
-        link.args(
-            self.names
-                .iter()
-                .filter(|n| *n != name)
-                .map(|n| self.object(n)),
-        );
+        link.args(self.names.iter().map(|n| match damaged.contains(&n) {
+            true => object(n),
+            false => self.object(n),
+        }));
         let linked = link.arg("-o").arg(&program).stderr(Stdio::null()).status();
         if !linked.expect("a C compiler").success() {
             return Fate::Killed;

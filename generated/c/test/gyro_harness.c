@@ -4,7 +4,7 @@
  * Host-side driver, not firmware. Words are native int64, a wider one is its low and its high half; a
  * record is a function's outputs, its state after the call and the number of the fault (0 = none).
  *
- *   selftest          runs the start-up check
+ *   selftest          runs the start-up check, and compares the helpers of *_arith.h with plain arithmetic
  *   table NAME        writes a table
  *   call NAME         reads inputs and state, writes records
  *   range NAME A N    writes the records of N inputs from A on, of a function of one input
@@ -535,6 +535,89 @@ static void header(void)
     }
 }
 
+/* The helpers of gyro_arith.h over their whole domains, wider than the ranges that the functions use. */
+static uint64_t arith_32(int32_t a, int32_t b)
+{
+    uint64_t differing = 0U;
+    for (uint32_t n = 0U; n < 32U; ++n) {
+        const uint32_t sign = UINT32_C(1) << n;
+        const uint32_t mask = sign | (sign - 1U);
+        const uint32_t low = (uint32_t)a & mask;
+        int32_t floored = a;
+        for (uint32_t k = 0U; k < n; ++k) {
+            floored = (floored / 2) - (((floored % 2) < 0) ? 1 : 0);
+        }
+        const int32_t extended = ((low & sign) != 0U) ? ((-(int32_t)(mask - low)) - 1) : (int32_t)low;
+        differing += ((n < 31U) && (gyro_asr_32(a, n) != floored)) ? 1U : 0U;
+        differing += (gyro_asr_by_32(a, n) != floored) ? 1U : 0U;
+        differing += (gyro_sign_extend_32((uint32_t)a, sign) != extended) ? 1U : 0U;
+    }
+    const int32_t least = (a < b) ? a : b;
+    const int32_t most = (a < b) ? b : a;
+    for (int c = -2; c <= 2; ++c) {
+        const bool fits = (c < 0) ? (least > (INT32_MIN - c)) : (most < (INT32_MAX - c));
+        const int32_t x = !fits ? 0 : ((c < 0) ? (least + c) : (most + c));
+        const int32_t due = (x < least) ? least : ((x > most) ? most : x);
+        uint32_t fault = 0U;
+        uint32_t first = 3U;
+        differing += (gyro_clamp_32(x, least, most) != due) ? 1U : 0U;
+        differing += (gyro_check_32(x, least, most, 7U, &fault) != due) ? 1U : 0U;
+        differing += (gyro_check_32(x, least, most, 7U, &first) != due) ? 1U : 0U;
+        differing += ((fault != ((x != due) ? 7U : 0U)) || (first != 3U)) ? 1U : 0U;
+    }
+    differing += (gyro_word_32((uint32_t)a) != a) ? 1U : 0U;
+    return differing;
+}
+
+static uint64_t arith_64(int64_t a, int64_t b)
+{
+    uint64_t differing = 0U;
+    for (uint32_t n = 0U; n < 64U; ++n) {
+        const uint64_t sign = UINT64_C(1) << n;
+        const uint64_t mask = sign | (sign - 1U);
+        const uint64_t low = (uint64_t)a & mask;
+        int64_t floored = a;
+        for (uint32_t k = 0U; k < n; ++k) {
+            floored = (floored / 2) - (((floored % 2) < 0) ? 1 : 0);
+        }
+        const int64_t extended = ((low & sign) != 0U) ? ((-(int64_t)(mask - low)) - 1) : (int64_t)low;
+        differing += ((n < 63U) && (gyro_asr_64(a, n) != floored)) ? 1U : 0U;
+        differing += (gyro_asr_by_64(a, n) != floored) ? 1U : 0U;
+        differing += (gyro_sign_extend_64((uint64_t)a, sign) != extended) ? 1U : 0U;
+    }
+    const int64_t least = (a < b) ? a : b;
+    const int64_t most = (a < b) ? b : a;
+    for (int c = -2; c <= 2; ++c) {
+        const bool fits = (c < 0) ? (least > (INT64_MIN - c)) : (most < (INT64_MAX - c));
+        const int64_t x = !fits ? 0 : ((c < 0) ? (least + c) : (most + c));
+        const int64_t due = (x < least) ? least : ((x > most) ? most : x);
+        uint32_t fault = 0U;
+        uint32_t first = 3U;
+        differing += (gyro_clamp_64(x, least, most) != due) ? 1U : 0U;
+        differing += (gyro_check_64(x, least, most, 7U, &fault) != due) ? 1U : 0U;
+        differing += (gyro_check_64(x, least, most, 7U, &first) != due) ? 1U : 0U;
+        differing += ((fault != ((x != due) ? 7U : 0U)) || (first != 3U)) ? 1U : 0U;
+    }
+    differing += (gyro_word_64((uint64_t)a) != a) ? 1U : 0U;
+    return differing;
+}
+
+static bool arith(void)
+{
+    uint64_t differing = 0U;
+    for (uint32_t n = 0U; n < 64U; ++n) {
+        for (uint32_t k = 0U; k < 5U; ++k) {
+            const uint64_t word = (UINT64_C(1) << n) + k - 2U;
+            const uint64_t other = (k * UINT64_C(0x9E3779B97F4A7C15)) ^ ~word;
+            differing += arith_64(gyro_word_64(word), gyro_word_64(other));
+            differing += arith_64(gyro_word_64(~word), gyro_word_64(word));
+            differing += arith_32(gyro_word_32((uint32_t)word), gyro_word_32((uint32_t)other));
+            differing += arith_32(gyro_word_32(~(uint32_t)word), gyro_word_32((uint32_t)word));
+        }
+    }
+    return differing == 0U;
+}
+
 static int verdict(const char *name, uint64_t compared, uint64_t differing)
 {
     const bool good = (compared > 0U) && (differing == 0U);
@@ -674,6 +757,10 @@ int main(int argc, char **argv)
     (void)setvbuf(stdout, buffer, _IOFBF, sizeof buffer);
     if (strcmp(mode, "selftest") == 0) {
         const uint32_t failed = gyro_selftest();
+        if (!arith()) {
+            (void)printf("arith: FAIL\n");
+            return 1;
+        }
         (void)printf("selftest: %s (%" PRIu32 ")\n", (failed == 0U) ? "pass" : "FAIL", failed);
         return (failed == 0U) ? 0 : 1;
     }
