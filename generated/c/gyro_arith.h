@@ -30,11 +30,11 @@ static inline int32_t gyro_asr_32(int32_t a, uint32_t n)
     return (a >= 0) ? (a / unit) : ((-1) - (((-1) - a) / unit));
 }
 
-/* The same where n < 32 is not a constant: the word is shifted with 2^31 on it, which comes off again. */
+/* The same where n < 32 is not a constant: of a word below zero the complement is shifted. */
 static inline int32_t gyro_asr_by_32(int32_t a, uint32_t n)
 {
-    const uint32_t lift = UINT32_C(1) << 31U;
-    return gyro_word_32((((uint32_t)a + lift) >> n) - (lift >> n));
+    return (a >= 0) ? (int32_t)((uint32_t)a >> n)
+                    : ((-1) - (int32_t)((uint32_t)((-1) - a) >> n));
 }
 
 /* The bits up to and with `sign` as a two's-complement number. */
@@ -73,11 +73,11 @@ static inline int64_t gyro_asr_64(int64_t a, uint32_t n)
     return (a >= 0) ? (a / unit) : ((-1) - (((-1) - a) / unit));
 }
 
-/* The same where n < 64 is not a constant: the word is shifted with 2^63 on it, which comes off again. */
+/* The same where n < 64 is not a constant: of a word below zero the complement is shifted. */
 static inline int64_t gyro_asr_by_64(int64_t a, uint32_t n)
 {
-    const uint64_t lift = UINT64_C(1) << 63U;
-    return gyro_word_64((((uint64_t)a + lift) >> n) - (lift >> n));
+    return (a >= 0) ? (int64_t)((uint64_t)a >> n)
+                    : ((-1) - (int64_t)((uint64_t)((-1) - a) >> n));
 }
 
 /* The bits up to and with `sign` as a two's-complement number. */

@@ -189,7 +189,8 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
         s.fit.unit
     );
     say!(
-        "model against emitted C and Rust: {} words compared, {} mismatches",
+        "model against emitted {}: {} words compared, {} mismatches",
+        s.built(),
         s.equivalence.compared,
         s.equivalence.mismatches
     );

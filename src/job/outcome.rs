@@ -99,6 +99,17 @@ pub struct Summary {
     pub warnings: Vec<Warning>,
 }
 
+impl Summary {
+    /// The languages whose emitted code was built and compared, in words.
+    pub fn built(&self) -> &'static str {
+        match (self.after.c.is_some(), self.after.rust.is_some()) {
+            (true, false) => "C",
+            (false, true) => "Rust",
+            _ => "C and Rust",
+        }
+    }
+}
+
 /// How far the rate output drifts over the record.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Drift {

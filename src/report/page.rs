@@ -9,6 +9,9 @@ use crate::output::name_of;
 use crate::verify::compare::Compared;
 use askama::Template;
 
+/// Both languages, as [`Summary::built`](crate::job::outcome::Summary::built) names them.
+const BOTH: &str = "C and Rust";
+
 /// The page.
 #[derive(Debug, Template)]
 #[template(path = "report/run.html")]
@@ -19,6 +22,10 @@ pub struct Page {
     pub headline: String,
     /// True if emitted code and model agree everywhere.
     pub holds: bool,
+    /// The languages that were built and compared.
+    pub built: &'static str,
+    /// The same with the model, as equal things.
+    pub equal: String,
     /// What limits the result, in a sentence.
     pub finding: String,
     /// Drift by path: name, peak to peak, rms, share of before.
@@ -134,6 +141,11 @@ impl Page {
             name: shown.design.name.clone(),
             headline: headline(shown),
             holds: s.equivalence.mismatches == 0,
+            built: s.built(),
+            equal: format!(
+                "model = emitted {}",
+                s.built().replace(" and ", " = emitted ")
+            ),
             finding: s.finding.clone(),
             drift: drift(shown),
             apart: significant(s.equivalence.fixed_minus_float_max_dps, 3),
@@ -200,18 +212,20 @@ fn headline(shown: &Shown) -> String {
     let digits = 2.0 - before.min(after).max(f64::MIN_POSITIVE).log10().floor();
     let decimals = digits.clamp(0.0, decimals_of(shown.output_lsb) as f64) as usize;
     let change = if after <= before { "falls" } else { "rises" };
-    let verdict = if s.equivalence.mismatches == 0 {
-        "carry"
-    } else {
-        "do not carry"
+    let verdict = match (s.equivalence.mismatches == 0, s.built() == BOTH) {
+        (true, true) => "carry",
+        (true, false) => "carries",
+        (false, true) => "do not carry",
+        (false, false) => "does not carry",
     };
     format!(
         "Bias drift over temperature {change} from {} to {} deg/s peak to peak ({} of what it was), \
-         computed in fixed point; the emitted C and Rust {verdict} the model's bits: {} in {} words \
+         computed in fixed point; the emitted {} {verdict} the model's bits: {} in {} words \
          compared. What is left: {}.",
         fixed(before, decimals),
         fixed(after, decimals),
         percent(after, before),
+        s.built(),
         mismatches(s.equivalence.mismatches),
         grouped(s.equivalence.compared),
         s.word_lengths.clause(s.fit.heldout_rms_dps)
@@ -318,13 +332,18 @@ fn provenance(shown: &Shown) -> Vec<[String; 2]> {
 }
 
 fn limits(shown: &Shown) -> Vec<String> {
+    let built = shown.summary.built();
     let bits = if shown.summary.equivalence.mismatches == 0 {
-        "The bits of model, emitted C and emitted Rust are equal on the inputs that were compared: on \
-         every input there is where the table says all, elsewhere on corner cases, pseudo-random words \
-         and the record, and nothing is claimed beyond them."
+        format!(
+            "The bits of the model and of the emitted {built} are equal on the inputs that were compared: on \
+             every input there is where the table says all, elsewhere on corner cases, pseudo-random words \
+             and the record, and nothing is claimed beyond them."
+        )
     } else {
-        "The bits of model, emitted C and emitted Rust differ on at least one of the inputs that were \
-         compared: do not use this firmware."
+        format!(
+            "The bits of the model and of the emitted {built} differ on at least one of the inputs that were \
+             compared: do not use this firmware."
+        )
     };
     let compilers = "This holds for the compilers and flags listed under provenance; for another compiler, \
          other flags or a target processor, run the self-test that is emitted with the firmware there.";
@@ -335,7 +354,7 @@ fn limits(shown: &Shown) -> Vec<String> {
         "The drift figures come from a simulated gyro: the plant is a model, and they say nothing of a \
          device until a record of it has been run."
     };
-    [bits, compilers, plant].map(str::to_owned).to_vec()
+    vec![bits, compilers.to_owned(), plant.to_owned()]
 }
 
 #[cfg(test)]
