@@ -88,7 +88,11 @@ fn take(body: &mut Vec<Statement>, kept: &[usize], taken: &mut BTreeMap<usize, (
 /// machine computes, for those who count it.
 pub fn with_conversions(lowered: &Lowered) -> Vec<Statement> {
     let mut made = BTreeSet::new();
-    put_back(&lowered.body, &lowered.written_out, &mut made)
+    let mut whole = put_back(&lowered.body, &lowered.written_out, &mut made);
+    for (_, v) in &lowered.outputs {
+        convert_before(v, &lowered.written_out, &mut made, &mut whole);
+    }
+    whole
 }
 
 fn put_back(
