@@ -66,6 +66,7 @@ pub fn sweeps(bench: &Bench) -> Vec<Lengths> {
 /// A journal that cannot be written.
 pub fn search(bench: &mut Bench, scale: &Scale, effort: Effort) -> Result<Vec<Vec<Point>>> {
     let swept = sweeps(bench);
+    bench.expect(effort.runs, true);
     bench.run(&swept)?;
     bench.price(&swept);
     let given = bench.space.given();
@@ -126,6 +127,9 @@ pub fn exhaust(bench: &mut Bench, scale: &Scale) -> Result<Vec<Vec<Point>>> {
         .collect();
     // The one-word sweeps are shown, and the given design may be outside the ranges.
     all.extend(sweeps(bench));
+    all.sort();
+    all.dedup();
+    bench.expect(all.len(), false);
     bench.run(&all)?;
     let worst = worst_merit(bench, scale);
     let good: Vec<Lengths> = all
@@ -147,7 +151,8 @@ pub fn worst_merit(bench: &Bench, scale: &Scale) -> f64 {
     }
 }
 
-fn fronts(bench: &Bench, scale: &Scale, worst: f64) -> Vec<Vec<Point>> {
+/// The fronts of all that has run, by objective.
+pub fn fronts(bench: &Bench, scale: &Scale, worst: f64) -> Vec<Vec<Point>> {
     let all = bench.all();
     let given = bench.space.given();
     let inside = |l: &&Lengths| bench.space.contains(l) || **l == given;
