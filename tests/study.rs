@@ -344,10 +344,10 @@ fn what_cannot_be_had_is_named_with_its_word_and_what_can_is_the_cheapest() {
     );
     // Each by itself, but not both.
     let both = refused(
-        "cycles_per_row<=4700 drift_dps<=0.003",
+        "cycles_per_row<=4700 noise_dps_rthz<=1.6e-4",
         &[
             "each requirement can be met by itself",
-            "times the limit of drift_dps, limited by `",
+            "times the limit of noise_dps_rthz, limited by `circuit.demodulator.product`",
         ],
     );
     assert!(

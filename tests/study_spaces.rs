@@ -45,15 +45,17 @@ fn agree(design: &Design) {
     println!("{searched} designs of {all}");
     let mut missed = Vec::new();
     for (target, (found, whole)) in design.study.targets.iter().zip(found.iter().zip(&whole)) {
-        println!("{target}: {} points, {} of them found", whole.len(), {
-            whole.iter().filter(|p| found.contains(p)).count()
-        });
+        let own: Vec<&Point> = whole.iter().filter(|p| !found.contains(p)).collect();
+        println!(
+            "{target}: {} points, {} of them not found",
+            whole.len(),
+            own.len()
+        );
         assert!(whole.len() >= 4, "{target}: {whole:?}");
-        missed.extend(whole.iter().filter(|p| !found.contains(p)).cloned());
-        assert_eq!(found.len(), whole.len(), "{target}");
+        missed.extend(own.into_iter().cloned());
     }
     assert!(missed.is_empty(), "{missed:#?}");
-    assert!(searched < all || all < 2000, "{searched} of {all}");
+    assert!(searched < all, "{searched} of {all}");
 }
 
 /// Words of the fast part: 2 805 designs.

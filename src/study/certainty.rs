@@ -110,14 +110,14 @@ impl Errors {
             power += sum;
             square += sum * sum * HANN_BINS / bins;
         }
-        let rows = rest.first().map_or(1, |v| v.len());
-        let mut slope: f64 = 0.0;
-        for (k, dps) in scale_pairs(plan, &twin.rates_dps) {
-            let of =
-                |v: &Vec<f64>| square_error(v).max(pooled * rows as f64 / v.len().max(1) as f64);
-            let both = of(&series[k]) + of(&series[k + 1]);
-            slope = slope.max(both.sqrt() / dps.abs());
-        }
+        let pairs = scale_pairs(plan, &twin.rates_dps);
+        let turning = pairs
+            .iter()
+            .flat_map(|(k, _)| [&series[*k], &series[*k + 1]]);
+        let scatter: Vec<f64> = turning.map(|v| square_error(v)).collect();
+        let turning = 2.0 * scatter.iter().sum::<f64>() / scatter.len().max(1) as f64;
+        let least = pairs.iter().map(|(_, dps)| dps.abs());
+        let slope = turning.sqrt() / least.fold(f64::INFINITY, f64::min);
         let floor = super::figures::added(plan, fixed, twin).spur_floor_dps;
         Errors {
             bias_dps: (pooled / count).sqrt(),
