@@ -215,12 +215,12 @@ impl InTheWay {
         let length = word.length(design).unwrap_or(0);
         let given = i64::from(word.length(work.design).unwrap_or(0));
         let variables = work.space.variables.iter();
-        let own = variables.filter(|v| v.words.contains(&word)).map(|v| {
+        let mut own = variables.filter(|v| v.words.contains(&word)).map(|v| {
             // Of tied words the ends move with the first.
             let end = if up { v.high } else { v.low };
             i64::from(end) - i64::from(v.given) + given
         });
-        let end = own.last();
+        let end = own.next_back();
         InTheWay {
             name: word.key(),
             length,
