@@ -214,6 +214,196 @@ fn limits_are_met_by_the_cheapest_or_the_word_in_the_way_is_named() {
     }
 }
 
+/// The default with some of its text changed, and a space of 70 designs, searched whole.
+fn changed(folder: &Path, changes: &[(&str, &str)]) -> PathBuf {
+    let mut text = include_str!("../src/design/default.toml").to_owned();
+    let space = "[study]\nwords = [\"circuit.demodulator.product\", \"circuit.cordic.angle_bits\"]";
+    let ranges = "[study.ranges]\n\"circuit.demodulator.product\" = [12, 25]\n\"circuit.cordic.angle_bits\" = [16, 24]";
+    for (from, to) in changes
+        .iter()
+        .copied()
+        .chain([("[study]", space), ("#[study.ranges]", ranges)])
+    {
+        assert!(text.contains(from), "{from}");
+        text = text.replacen(from, to, 1);
+    }
+    let path = folder.join("changed.toml");
+    std::fs::write(&path, text).expect("writes");
+    path
+}
+
+/// Loops, a coarse converter and an oscillator off its grid: each study ends, every point's bounds are around its
+/// figures, its start ends within the limit of the bias, and its file is a design that `check` takes.
+#[test]
+fn designs_with_a_phase_loop_a_coarse_converter_and_a_free_tuning_word_are_studied() {
+    let with_loop = [
+        ("#[circuit.phase_loop]", "[circuit.phase_loop]"),
+        ("#setpoint_raw = -4194304", "setpoint_raw = -4194304"),
+        ("#proportional = {", "proportional = {"),
+        ("#integral = {", "integral = {"),
+        ("#integrator_bits", "integrator_bits"),
+    ];
+    let converter = [("format = \"Q1.15\"", "format = \"Q1.11\"")];
+    let free = [("tuning_word = 134217728", "tuning_word = 134230000")];
+    for (what, changes) in [
+        ("loop", &with_loop[..]),
+        ("12 bits", &converter),
+        ("free", &free),
+    ] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = changed(folder.path(), changes);
+        let out = folder.path().join("out");
+        let done = study(&[file.to_str().expect("UTF-8")], &out);
+        let said = String::from_utf8_lossy(&done.stderr).into_owned();
+        assert!(done.status.success(), "{what}: {said}");
+        let result = json(&bytes(&out));
+        // A phase loop sets the tuning word itself: there is no detuned run.
+        assert_eq!(
+            result["conditions"]["detuned_hz"].is_null(),
+            what == "loop",
+            "{what}"
+        );
+        let points = result["front"].as_array().expect("a front");
+        assert!(
+            !points.is_empty() && result["chosen"][0]["point"].is_u64(),
+            "{what}"
+        );
+        let limit = result["limits"]["bias_dps"].as_f64().expect("a limit");
+        for point in points {
+            let inside = |name: &str, field: &str| {
+                let ends: Vec<f64> = point["bounds"][name]
+                    .as_array()
+                    .expect("two")
+                    .iter()
+                    .filter_map(Value::as_f64)
+                    .collect();
+                let value = point[field].as_f64().expect("a number");
+                assert!(
+                    ends[0] <= value && value <= ends[1],
+                    "{what}: {name} {value} {ends:?}"
+                );
+                ends[0].abs().max(ends[1].abs())
+            };
+            inside("bias_dps", "bias_error_dps");
+            inside("drift_dps", "drift_residual_dps");
+            inside("noise_dps_rthz", "noise_dps_rthz");
+            inside("scale_factor_ppm", "scale_factor_ppm");
+            let start = inside("startup_error_dps", "startup_error_dps");
+            let merit = point["merit"].as_f64().expect("a number").max(1.0);
+            assert!(start <= limit * merit, "{what}: {start} of {limit}");
+        }
+        let point = out.join(points[0]["design"].as_str().expect("a file"));
+        let check = Command::new(env!("CARGO_BIN_EXE_gyrogen"))
+            .arg("check")
+            .arg(&point)
+            .args(["--samples", "20000"])
+            .output()
+            .expect("gyrogen starts");
+        assert!(
+            check.status.success(),
+            "{what}: {}",
+            String::from_utf8_lossy(&check.stderr)
+        );
+    }
+}
+
+#[test]
+fn what_cannot_be_had_is_named_with_its_word_and_what_can_is_the_cheapest() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = changed(folder.path(), &[]);
+    let file = file.to_str().expect("UTF-8");
+    let out = folder.path().join("out");
+    let refused = |limits: &str, expected: &[&str]| {
+        let done = study(&[file, "--for", limits], &out);
+        let said = String::from_utf8_lossy(&done.stderr).into_owned();
+        assert_eq!(done.status.code(), Some(1), "{limits}: {said}");
+        for text in expected {
+            assert!(said.contains(text), "{limits}: {said}");
+        }
+        json(&bytes(&out))
+    };
+    // Of the detuned oscillator, whose table's address this study does not vary.
+    let spur = refused(
+        "spur_dps<=0.005",
+        &[
+            "spur_dps cannot be met",
+            "`circuit.nco.table_address_bits` with 12, which this study does not vary",
+        ],
+    );
+    assert_eq!(spur["required"][0]["varied"], false);
+    refused(
+        "rom_bytes<=5000",
+        &[
+            "rom_bytes cannot be met",
+            "`circuit.nco.table_address_bits` with 12",
+        ],
+    );
+    refused(
+        "bandwidth_hz>=900",
+        &["bandwidth_hz cannot be met", "`circuit.decimator.ratio`"],
+    );
+    // Each by itself, but not both.
+    let both = refused(
+        "cycles_per_row<=4700 noise_dps_rthz<=1.6e-4",
+        &[
+            "each requirement can be met by itself",
+            "times the limit of noise_dps_rthz, limited by `circuit.demodulator.product`",
+        ],
+    );
+    assert!(
+        both["required"]
+            .as_array()
+            .expect("two")
+            .iter()
+            .all(|r| r["can_be_met"] == true)
+    );
+    // Bytes and cycles alone: the finest design that holds them.
+    let done = study(&[file, "--for", "cycles_per_row<=4700"], &out);
+    assert!(
+        done.status.success(),
+        "{}",
+        String::from_utf8_lossy(&done.stderr)
+    );
+    let result = json(&bytes(&out));
+    let chosen = &result["chosen"][0];
+    assert!(
+        chosen["reason"]
+            .as_str()
+            .expect("text")
+            .starts_with("the finest point"),
+        "{chosen}"
+    );
+    let number = chosen["point"].as_u64().expect("a point") as usize;
+    let cost = &result["front"][number - 1]["cost"]["cortex-m4"];
+    assert!(cost["cycles_per_row"].as_f64() <= Some(4700.0));
+    // A met limit with the whole of the interval.
+    let done = study(&[file, "--for", "noise_dps_rthz<=5e-4"], &out);
+    assert!(
+        done.status.success(),
+        "{}",
+        String::from_utf8_lossy(&done.stderr)
+    );
+    let result = json(&bytes(&out));
+    let number = result["chosen"][0]["point"].as_u64().expect("a point") as usize;
+    assert!(result["front"][number - 1]["bounds"]["noise_dps_rthz"][1].as_f64() <= Some(5e-4));
+    // Cycles of no processor.
+    let path = folder.path().join("fpga.toml");
+    std::fs::write(&path, "[study]\ntargets = [\"fpga\"]\n").expect("writes");
+    let done = study(
+        &[
+            path.to_str().expect("UTF-8"),
+            "--for",
+            "cycles_per_row<=4000",
+        ],
+        &out,
+    );
+    let said = String::from_utf8_lossy(&done.stderr).into_owned();
+    assert!(
+        done.status.code() == Some(2) && said.contains("names no processor"),
+        "{said}"
+    );
+}
+
 #[test]
 fn an_overflow_is_said_first_and_a_wrong_word_in_its_place() {
     let folder = tempfile::tempdir().expect("a folder");

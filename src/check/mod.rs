@@ -1,12 +1,14 @@
 //! `gyrogen check`: what can be said of a design before anything is built. Ranges are proved for every ADC code
 //! and state ([`proved`], by the traced program); codes of the design's own simulated gyro say what does
 //! happen ([`crate::nodes::run`]) and what each word's rounding does to the rate ([`budget`]);
-//! [`remarks`] name what could be better, with the change that makes it so.
+//! [`remarks`] name what could be better, with the change that makes it so; [`requirements`] holds the figures
+//! against the design's own limits.
 
 pub mod budget;
 pub mod outcome;
 pub mod proved;
 pub mod remarks;
+pub mod requirements;
 
 use crate::circuit::engine;
 use crate::cosim::stream::stimulus;
@@ -18,6 +20,7 @@ use crate::error::Result;
 use crate::nodes::run;
 use outcome::{Check, NodeCheck, Overflows, Witness};
 use proved::Proved;
+use requirements::Requirement;
 
 /// ADC samples of the design's own gyro that are run if nobody says how many.
 pub const SAMPLES: usize = 1_000_000;
@@ -25,7 +28,7 @@ pub const SAMPLES: usize = 1_000_000;
 /// Checks a design; `samples` codes of its own gyro are run.
 ///
 /// # Errors
-/// A design whose gyro cannot be simulated.
+/// A design whose gyro cannot be simulated; cycles that are required of no processor.
 pub fn check(design: &Design, command: &str, samples: usize) -> Result<Check> {
     let program = engine::trace(design);
     let mut all = proved::nodes(design, &program);
@@ -63,7 +66,9 @@ pub fn check(design: &Design, command: &str, samples: usize) -> Result<Check> {
     let targets = Target::ALL.into_iter().filter(|t| *t != Target::Host);
     let costs = targets.map(|t| cost::of_bundle(&bundle, t)).collect();
     let remarks = remarks::remarks(design, &nodes, &budget);
-    let reasons: Vec<String> = nodes.iter().filter_map(NodeCheck::failure).collect();
+    let (requirements, confidence) = requirements::requirements(design)?;
+    let mut reasons: Vec<String> = nodes.iter().filter_map(NodeCheck::failure).collect();
+    reasons.extend(requirements.iter().filter_map(Requirement::failure));
     Ok(Check {
         schema: "gyrogen.check/1",
         version: env!("CARGO_PKG_VERSION"),
@@ -75,6 +80,8 @@ pub fn check(design: &Design, command: &str, samples: usize) -> Result<Check> {
         predicted_rate_rms_dps: budget.predicted_rate_rms_dps(),
         costs,
         remarks,
+        requirements,
+        confidence,
         holds: reasons.is_empty(),
         reasons,
     })

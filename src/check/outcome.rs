@@ -2,8 +2,10 @@
 
 use super::budget::Line;
 use super::remarks::Remark;
+use super::requirements::Requirement;
 use crate::cost::Cost;
 use crate::numeric::format::Rounding;
+use crate::study::certainty::Confidence;
 use serde::Serialize;
 
 /// What is known of a word's overflow.
@@ -120,6 +122,10 @@ pub struct Check {
     pub costs: Vec<Cost>,
     /// What could be better.
     pub remarks: Vec<Remark>,
+    /// What the design requires, each with what was obtained; empty without `[requirements]`.
+    pub requirements: Vec<Requirement>,
+    /// With which confidence the bounds of these hold; null without any.
+    pub confidence: Option<Confidence>,
     /// Nothing overflows for certain, and every requirement is met.
     pub holds: bool,
     /// Why not.

@@ -136,3 +136,86 @@ fn a_detuned_coarse_table_has_spurs_in_band() {
         codes(&c)
     );
 }
+
+/// The default with requirements: a 12-bit product, so that there is something to see.
+fn required(requirements: &str) -> Check {
+    let text = template::DEFAULT.replacen(PRODUCT, "product = \"Q2.12\"", 1);
+    let text = text.replacen(
+        "#[requirements]",
+        &format!("[requirements]\n{requirements}"),
+        1,
+    );
+    check(&reader::parse(&text, None).unwrap(), "test", 20_000).unwrap()
+}
+
+fn requirement<'a>(check: &'a Check, name: &str) -> &'a requirements::Requirement {
+    check.requirements.iter().find(|r| r.name == name).unwrap()
+}
+
+#[test]
+fn requirements_are_each_met_or_not_with_what_mends_them() {
+    let c = required(
+        "drift_dps = 1.0\nnoise_dps_rthz = 3e-4\nbandwidth_hz = 100.0\ncycles_per_row = 9e3\n",
+    );
+    assert_eq!(c.confidence.unwrap().intervals, 2);
+    let noise = requirement(&c, "noise_dps_rthz");
+    assert!(!noise.met && noise.obtained > 3e-4, "{noise:?}");
+    let mend = noise.mend.as_ref().unwrap();
+    assert!(
+        mend.starts_with("`circuit.demodulator.product` of 1"),
+        "{mend}"
+    );
+    for name in ["drift_dps", "bandwidth_hz", "cycles_per_row"] {
+        let r = requirement(&c, name);
+        assert!(r.met && r.mend.is_none(), "{r:?}");
+    }
+    // Cycles are a processor's: of the FPGA there is no such line.
+    assert_eq!(c.requirements.len(), 4);
+    assert!(!c.holds);
+    assert_eq!(c.reasons.len(), 1);
+    assert!(
+        c.reasons[0].contains("noise_dps_rthz <= 3e-4 is not met"),
+        "{:?}",
+        c.reasons
+    );
+    assert_eq!(checked(&[]).requirements, []);
+}
+
+#[test]
+fn a_figure_that_only_seems_to_be_within_its_limit_does_not_meet_it() {
+    let limit = |value: f64| format!("noise_dps_rthz = {value:e}\n");
+    let found = requirement(&required(&limit(1.0)), "noise_dps_rthz").clone();
+    let [_, high] = found.bounds.unwrap();
+    assert!(found.met && high > found.obtained * 1.01, "{found:?}");
+    let between = required(&limit(0.5 * (found.obtained + high)));
+    let r = requirement(&between, "noise_dps_rthz");
+    assert!(
+        !r.met && r.failure().unwrap().contains("not shown"),
+        "{r:?}"
+    );
+    assert!(requirement(&required(&limit(1.001 * high)), "noise_dps_rthz").met);
+}
+
+#[test]
+fn costs_and_bandwidth_that_are_too_much_name_the_word_or_the_ratio() {
+    let c = required("bandwidth_hz = 600.0\nrom_bytes = 5000.0\n");
+    let ratio = requirement(&c, "bandwidth_hz").mend.clone().unwrap();
+    // 458.6 Hz at a ratio of 32.
+    assert!(
+        ratio.starts_with("`circuit.decimator.ratio = 24`"),
+        "{ratio}"
+    );
+    let roms: Vec<_> = c
+        .requirements
+        .iter()
+        .filter(|r| r.name == "rom_bytes")
+        .collect();
+    assert_eq!(roms.len(), 2, "{roms:?}");
+    for rom in roms {
+        let mend = rom.mend.as_ref().unwrap();
+        assert!(
+            mend.starts_with("`circuit.nco.table_address_bits` of 11"),
+            "{mend}"
+        );
+    }
+}

@@ -32,7 +32,7 @@ const PLANNED: [&str; 2] = ["check.json", timing::NAME];
 /// Runs the command.
 ///
 /// # Errors
-/// An unusable design (exit 2); a word that overflows for certain (exit 1).
+/// An unusable design (exit 2); a word that overflows for certain, a requirement that is not met (exit 1).
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let watch = Stopwatch::start("proving and running");
     let design = super::design(arguments.design.as_deref())?;
@@ -140,6 +140,7 @@ fn print(check: &Check) {
             f.rom_bits
         );
     }
+    requirements(check);
     for remark in &check.remarks {
         say!(
             "{} [{}]: {}; {}",
@@ -157,6 +158,40 @@ fn print(check: &Check) {
             "does not hold"
         }
     );
+}
+
+fn requirements(check: &Check) {
+    if check.requirements.is_empty() {
+        return;
+    }
+    let mut table = super::table(&["required", "on", "limit", "obtained", "between", "met"]);
+    for r in &check.requirements {
+        let sign = if r.at_least { ">=" } else { "<=" };
+        let between = r.bounds.map_or("-".to_owned(), |[low, high]| {
+            format!("{low:.3e} and {high:.3e}")
+        });
+        table.add_row([
+            r.name.to_owned(),
+            r.target.clone().unwrap_or("-".to_owned()),
+            format!("{sign} {:e}", r.limit),
+            format!("{:.4e}", r.obtained),
+            between,
+            if r.met { "yes" } else { "NO" }.to_owned(),
+        ]);
+    }
+    for column in table.column_iter_mut().skip(2) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    say!("{table}");
+    if let Some(c) = &check.confidence {
+        say!(
+            "the {} intervals hold at once with {:.0} % confidence ({}: each by itself with {:.2} %)",
+            c.intervals,
+            100.0 * c.joint,
+            c.correction,
+            100.0 * c.each
+        );
+    }
 }
 
 fn row(n: &NodeCheck) -> Vec<String> {

@@ -8,10 +8,12 @@ use crate::output::Results;
 use crate::study::job::{self, Request};
 use crate::study::journal;
 use crate::study::outcome::{Point, Study};
+use crate::study::progress::{Progress, Step};
 use crate::study::shard::Part;
 use crate::timing::{self, Stopwatch};
 use std::io::IsTerminal;
 use std::path::PathBuf;
+use std::sync::Mutex;
 use std::time::Instant;
 
 /// Study the word lengths: the cheapest designs for each error, verified bit for bit, and what each bit does.
@@ -48,7 +50,6 @@ const PLANNED: [&str; 3] = ["study.json", "report.html", timing::NAME];
 /// An unusable design, words that it does not have, an incomplete study (exit 2); a design that overflows, a
 /// requirement that cannot be met (exit 1).
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
-    let started = Instant::now();
     let watch = Stopwatch::start("searching and verifying");
     let design = super::design(arguments.design.as_deref())?;
     let limits = match &arguments.limits {
@@ -61,10 +62,17 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         .map_err(|e| io_error(&arguments.out, "make the folder", &e))?;
     let mut results = Results::claim(&arguments.out, &PLANNED, &recorded.inputs)?;
     let loud = std::io::stderr().is_terminal();
-    let said = |count: usize| {
-        if loud {
-            let seconds = started.elapsed().as_secs_f64();
-            eprint!("\r{count} designs run, {seconds:.0} s ");
+    let begun: Mutex<Option<(Step, Instant)>> = Mutex::new(None);
+    let said = |progress: Progress| {
+        if let Ok(mut begun) = begun.lock()
+            && loud
+        {
+            let since = match *begun {
+                Some((step, since)) if step == progress.step => since,
+                _ => begun.insert((progress.step, Instant::now())).1,
+            };
+            // Blanks over what is left of a longer line.
+            eprint!("\r{:<72}", progress.line(since.elapsed().as_secs_f64()));
         }
     };
     if let Some(part) = arguments.shard {
@@ -157,6 +165,18 @@ fn print(s: &Study) {
             Some(point) => say!("{}: point {point}, {}", chosen.target, chosen.reason),
             None => say!("{}: {}", chosen.target, chosen.reason),
         }
+    }
+    say!(
+        "bounds of every figure in study.json: {} intervals that hold at once with {:.0} % confidence ({}: each by itself \
+         with {:.3} %, {:.2} standard errors)",
+        s.confidence.intervals,
+        100.0 * s.confidence.joint,
+        s.confidence.correction,
+        100.0 * s.confidence.each,
+        s.confidence.standard_errors
+    );
+    for line in crate::report::study::quarter_less(s) {
+        say!("{line}");
     }
     for note in &s.notes {
         say!("note: {note}");

@@ -1,12 +1,18 @@
 //! What a study answers: which point to take, what a bit more or less of a word does there, and which requirement
 //! cannot be met because of which word.
 
+use super::bench::Bench;
+use super::certainty::largest;
 use super::figures::Figures;
-use super::job::{Reporting, Request};
+use super::merit::Scale;
 use super::outcome::{Chosen, Point, Required, Step};
+use super::reporting::{Checked, RESOLUTION, Reporting};
+use super::retune;
+use super::search::{self, FINEST_MERIT};
 use super::space::Lengths;
-use crate::cost;
-use crate::design::{LimitName, Limits};
+use crate::cost::{self, Cost};
+use crate::design::word::Word;
+use crate::design::{Design, LimitName, Limits};
 use crate::parallel::in_parallel;
 use std::collections::BTreeMap;
 
@@ -16,101 +22,157 @@ pub(super) struct Answers {
     pub(super) required: Vec<Required>,
 }
 
+/// So many designs are looked at beside the fronts for bytes and cycles that are required.
+const BESIDE: usize = 16;
+
+/// True if one of the figures that words make worse is required.
+fn requires_a_figure(limits: &Limits) -> bool {
+    !Scale::of_limits(limits).is_empty()
+}
+
+/// Designs that may hold bytes or cycles that are required and that a front, which weighs the one price alone, need
+/// not have: for each target the cheapest with every figure in its limit, or the finest where no figure is limited.
+pub(super) fn beside_the_fronts(bench: &Bench, scale: &Scale, limits: &Limits) -> Vec<Lengths> {
+    let costly = |name: LimitName| limits.get(name).is_some();
+    if !costly(LimitName::RomBytes) && !costly(LimitName::CyclesPerRow) {
+        return Vec::new();
+    }
+    let by_price = requires_a_figure(limits);
+    let mut out = Vec::new();
+    for objective in 0..bench.objectives.len() {
+        let is_fabric = bench
+            .given
+            .study
+            .targets
+            .get(objective)
+            .is_some_and(|t| t == "fpga");
+        let mut able: Vec<(f64, Lengths)> = bench
+            .all()
+            .into_iter()
+            .filter(|l| {
+                let cost = bench.costs(l).and_then(|c| c.get(objective));
+                cost.is_some_and(|c| costs_hold(c, is_fabric, limits))
+            })
+            .map(|l| (bench.merit(scale, &l), bench.cost(objective, &l), l))
+            .filter(|(merit, _, _)| *merit <= 1.0 || !by_price)
+            .map(|(merit, cost, l)| (if by_price { cost } else { merit }, l))
+            .collect();
+        able.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)));
+        out.extend(able.into_iter().take(BESIDE).map(|(_, l)| l));
+    }
+    out
+}
+
+/// For each target the cheapest verified design that holds what is asked; where only bytes or cycles are required,
+/// the finest.
+pub(super) fn chosen(work: &Reporting, good: &BTreeMap<Lengths, Checked>) -> Vec<Option<Lengths>> {
+    let finest = !work.limits.is_empty() && !requires_a_figure(work.limits);
+    let of = |objective: usize| {
+        let able = good.values().filter(|c| holds(work, c, objective));
+        let keys = able.map(|c| {
+            let merit = work.scale.merit(&c.verified.figures).max(FINEST_MERIT);
+            let first = if finest { merit } else { 0.0 };
+            (first, work.bench.cost(objective, &c.lengths), &c.lengths)
+        });
+        let best = keys.min_by(|a, b| {
+            a.0.total_cmp(&b.0)
+                .then(a.1.total_cmp(&b.1))
+                .then_with(|| a.2.cmp(b.2))
+        });
+        best.map(|(_, _, lengths)| lengths.clone())
+    };
+    (0..work.bench.objectives.len()).map(of).collect()
+}
+
+/// True if a verified design holds what is asked on a target: every requirement with the whole of its interval, or
+/// without requirements the given design's figures.
+pub(super) fn holds(work: &Reporting, c: &Checked, objective: usize) -> bool {
+    let limits = work.limits;
+    if limits.is_empty() {
+        return work
+            .instrument
+            .holds(&c.verified.figures, &c.bounds, work.own);
+    }
+    let cost = work.bench.costs(&c.lengths).and_then(|c| c.get(objective));
+    let is_fabric = target(work, objective) == "fpga";
+    let figures = limits.iter().all(|limit| match c.bounds.of(limit.name) {
+        Some(interval) => largest(interval) <= limit.value,
+        None => limit.name != LimitName::Bandwidth || work.bandwidth_hz >= limit.value,
+    });
+    figures && cost.is_some_and(|c| costs_hold(c, is_fabric, limits))
+}
+
+/// True if bytes and cycles are within their limits. An FPGA has no cycles of a processor.
+fn costs_hold(cost: &Cost, is_fabric: bool, limits: &Limits) -> bool {
+    limits.iter().all(|limit| {
+        let value = cost_of(cost, is_fabric, limit.name);
+        value.is_none_or(|value| value <= limit.value)
+    })
+}
+
+/// What a limit on a cost limits; `None` of figures, and of the cycles of an FPGA.
+pub fn cost_of(cost: &Cost, is_fabric: bool, name: LimitName) -> Option<f64> {
+    match name {
+        LimitName::RomBytes if is_fabric => Some(cost.fabric.rom_bits as f64 / 8.0),
+        LimitName::RomBytes => Some(cost.rom_bytes as f64),
+        LimitName::CyclesPerRow if !is_fabric => Some(cost.cycles_per_row as f64),
+        _ => None,
+    }
+}
+
+fn target<'w>(work: &'w Reporting, objective: usize) -> &'w str {
+    work.design.study.targets.get(objective).map_or("", |t| t)
+}
+
 /// Answers from the reported points.
 pub(super) fn answers(
     work: &Reporting,
     points: &[(Lengths, Point)],
     given: &Point,
-    request: &Request,
-    bandwidth_hz: f64,
+    best: &[Option<Lengths>],
 ) -> Answers {
-    let limits = &request.limits;
-    let required = required(work, points, limits, bandwidth_hz);
+    let limits = work.limits;
+    let required = required(work);
     let mut chosen = Vec::new();
-    for target in &work.design.study.targets {
+    for (objective, lengths) in best.iter().enumerate() {
+        let target = target(work, objective);
         let cost = |p: &Point| p.price.get(target).copied().unwrap_or(f64::INFINITY);
-        let mut able: Vec<&(Lengths, Point)> = points
-            .iter()
-            .filter(|(_, p)| meets(p, target, limits, bandwidth_hz))
-            .filter(|(_, p)| !limits.is_empty() || p.as_good_as_given)
-            .collect();
-        able.sort_by(|a, b| {
-            cost(&a.1)
-                .total_cmp(&cost(&b.1))
-                .then_with(|| a.0.cmp(&b.0))
-        });
-        let first = able.first();
-        let reason = match first {
+        let point = points.iter().find(|(l, _)| Some(l) == lengths.as_ref());
+        let reason = match point {
             Some((_, p)) => {
                 let part = 100.0 * cost(p) / cost(given).max(f64::MIN_POSITIVE);
                 let what = if limits.is_empty() {
-                    "no figure of the data sheet more than one percent worse than the given design's"
+                    "the cheapest point with no figure of the data sheet more than one percent worse than the given design's"
+                } else if requires_a_figure(limits) {
+                    "the cheapest point with everything that is required"
                 } else {
-                    "everything that is required"
+                    "the finest point with everything that is required"
                 };
-                format!("the cheapest point with {what}: {part:.1} % of the given design's cost")
+                format!("{what}: {part:.1} % of the given design's cost")
             }
-            None => why_not(&required, limits),
+            None => why_not(work, &required, objective),
         };
         chosen.push(Chosen {
-            target: target.clone(),
-            point: first.map(|(_, p)| p.number),
+            target: target.to_owned(),
+            point: point.map(|(_, p)| p.number),
             reason,
-            sensitivity: first.map_or(Vec::new(), |(l, _)| sensitivity(work, l)),
+            sensitivity: point.map_or(Vec::new(), |(l, _)| sensitivity(work, l)),
         });
     }
     Answers { chosen, required }
 }
 
-/// True if a point is within every limit.
-fn meets(p: &Point, target: &str, limits: &Limits, bandwidth_hz: f64) -> bool {
-    limits.iter().all(|limit| {
-        let cost = p.cost.get(target);
-        match limit.name {
-            LimitName::Bandwidth => bandwidth_hz >= limit.value,
-            LimitName::RomBytes => cost.is_some_and(|c| c.rom_bytes as f64 <= limit.value),
-            LimitName::CyclesPerRow => cost.is_some_and(|c| c.cycles_per_row as f64 <= limit.value),
-            LimitName::Bias => p.bias_error_dps.abs() <= limit.value,
-            LimitName::Drift => p.drift_residual_dps <= limit.value,
-            LimitName::Noise => p.noise_dps_rthz <= limit.value,
-            LimitName::Arw => p.arw_deg_rth <= limit.value,
-            LimitName::ScaleFactor => p.scale_factor_ppm.abs() <= limit.value,
-            LimitName::Spur => p.spur_dps <= limit.value,
-        }
-    })
-}
-
 fn figure(f: &Figures, name: LimitName) -> Option<f64> {
-    match name {
-        LimitName::Bias => Some(f.bias_dps.abs()),
-        LimitName::Drift => Some(f.drift_dps),
-        LimitName::Noise => Some(f.noise_dps_rthz),
-        LimitName::Arw => Some(f.arw_deg_rth),
-        LimitName::ScaleFactor => Some(f.scale_factor_ppm.abs()),
-        LimitName::Spur => Some(f.spur_dps),
-        _ => None,
-    }
+    f.of(name).map(f64::abs)
 }
 
-/// Each limit with the best that any design has.
-fn required(
-    work: &Reporting,
-    points: &[(Lengths, Point)],
-    limits: &Limits,
-    bandwidth_hz: f64,
-) -> Vec<Required> {
+/// Each limit with the best that any design has, and the word in the way.
+fn required(work: &Reporting) -> Vec<Required> {
     let mut out = Vec::new();
-    for limit in limits.iter() {
-        let (best, limited_by) = match limit.name {
-            LimitName::Bandwidth => (bandwidth_hz, Some("circuit.decimator.ratio")),
-            LimitName::RomBytes | LimitName::CyclesPerRow => {
-                let costs = points.iter().flat_map(|(_, p)| p.cost.values());
-                let of = |c: &cost::Cost| match limit.name {
-                    LimitName::RomBytes => c.rom_bytes as f64,
-                    _ => c.cycles_per_row as f64,
-                };
-                (costs.map(of).fold(f64::INFINITY, f64::min), None)
-            }
+    for limit in work.limits.iter() {
+        let (best, word) = match limit.name {
+            LimitName::Bandwidth => (work.bandwidth_hz, None),
+            LimitName::RomBytes | LimitName::CyclesPerRow => smallest(work, limit.name),
             name => finest(work, name),
         };
         let met = if limit.name.is_least() {
@@ -118,55 +180,181 @@ fn required(
         } else {
             best <= limit.value
         };
+        let word = word.filter(|_| !met);
         out.push(Required {
             name: limit.name.name(),
             limit: limit.value,
             best,
             can_be_met: met,
-            limited_by: limited_by.filter(|_| !met),
+            limited_by: match limit.name {
+                LimitName::Bandwidth if !met => Some("circuit.decimator.ratio"),
+                _ => word.map(|w| w.name),
+            },
+            length: word.map(|w| w.length),
+            at_end_of_range: word.is_some_and(|w| w.at_end),
+            varied: word.is_some_and(|w| w.varied),
         });
     }
     out
 }
 
-/// The least value of a figure over all designs that ran, and the word that makes most of it there: that of which
-/// one bit less raises it the most.
-fn finest(work: &Reporting, name: LimitName) -> (f64, Option<&'static str>) {
-    let mut best: Option<(f64, Lengths)> = None;
-    for lengths in work.bench.all() {
-        let value = work.bench.figures(&lengths).and_then(|f| figure(f, name));
-        if let Some(value) = value
-            && best.as_ref().is_none_or(|(b, _)| value < *b)
-        {
-            best = Some((value, lengths));
-        }
-    }
-    let Some((value, lengths)) = best else {
-        return (f64::INFINITY, None);
-    };
-    let mut most: Option<(f64, &'static str)> = None;
-    for step in steps(work, &lengths, &[-1]) {
-        let rise = step.figures.and_then(|f| figure(&f, name)).unwrap_or(0.0);
-        if most.as_ref().is_none_or(|(m, _)| rise > *m) {
-            most = Some((rise, step.name));
-        }
-    }
-    (value, most.map(|(_, name)| name))
+/// A word that is in the way, as it is in the best design.
+#[derive(Debug, Clone, Copy)]
+struct InTheWay {
+    name: &'static str,
+    length: u32,
+    /// It cannot go further in the study's range.
+    at_end: bool,
+    /// The study varies it.
+    varied: bool,
 }
 
-fn why_not(required: &[Required], limits: &Limits) -> String {
-    let mut missed = required.iter().filter(|r| !r.can_be_met).peekable();
-    if limits.is_empty() {
+impl InTheWay {
+    /// The word as it is in `design`, where it would have to go up, or else down.
+    fn new(work: &Reporting, design: &Design, word: Word, up: bool) -> Self {
+        let length = word.length(design).unwrap_or(0);
+        let given = i64::from(word.length(work.design).unwrap_or(0));
+        let variables = work.space.variables.iter();
+        let mut own = variables.filter(|v| v.words.contains(&word)).map(|v| {
+            // Of tied words the ends move with the first.
+            let end = if up { v.high } else { v.low };
+            i64::from(end) - i64::from(v.given) + given
+        });
+        let end = own.next_back();
+        InTheWay {
+            name: word.key(),
+            length,
+            at_end: end.is_some_and(|end| {
+                if up {
+                    i64::from(length) >= end
+                } else {
+                    i64::from(length) <= end
+                }
+            }),
+            varied: end.is_some(),
+        }
+    }
+
+    fn text(&self) -> String {
+        let where_it_is = match (self.varied, self.at_end) {
+            (false, _) => ", which this study does not vary",
+            (true, true) => ", the end of its range",
+            (true, false) => "",
+        };
+        format!(
+            ", limited by `{}` with {}{where_it_is}",
+            self.name, self.length
+        )
+    }
+}
+
+/// The least value of a figure over all designs that ran, and the word in the way there.
+fn finest(work: &Reporting, name: LimitName) -> (f64, Option<InTheWay>) {
+    let value = |l: &Lengths| work.bench.figures(l).and_then(|f| figure(f, name));
+    let Some((value, lengths)) = least(work, &value) else {
+        return (f64::MAX, None);
+    };
+    (value, coarsest(work, &lengths, &|f| figure(f, name)))
+}
+
+/// The design that ran with the least of a value.
+fn least(work: &Reporting, of: &dyn Fn(&Lengths) -> Option<f64>) -> Option<(f64, Lengths)> {
+    let all = work.bench.all().into_iter();
+    let valued = all.filter_map(|l| Some((of(&l).filter(|v| v.is_finite())?, l)));
+    valued.min_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)))
+}
+
+/// A design with one word, of all that it has and not only of those that vary, a bit longer (`1`) or shorter (`-1`).
+fn with_one(design: &Design, by: i32) -> Vec<(Word, Design)> {
+    let words = Word::ALL.into_iter();
+    let of = |w: Word| {
+        let length = w.length(design)?.checked_add_signed(by)?;
+        let other = retune::with_lengths(design, &[(w, length)]).ok()?;
+        Some((w, other))
+    };
+    words.filter_map(of).collect()
+}
+
+/// The word that keeps a figure of a design from being less: that of which one bit more lowers it the most; or where
+/// none lowers it by more than a merit is certain to, that of which one bit less raises it the most.
+fn coarsest(
+    work: &Reporting,
+    lengths: &[u32],
+    of: &(dyn Fn(&Figures) -> Option<f64> + Sync),
+) -> Option<InTheWay> {
+    let design = work.space.design(work.design, lengths).ok()?;
+    let value = |d: &Design| of(&work.verifier.figures(&d.without_stops()).ok()?);
+    let own = value(&design)?;
+    let both = [1, -1].map(|by| {
+        let others = with_one(&design, by);
+        let values = in_parallel(&others, work.bench.threads(), &|_| {}, |(_, d)| value(d));
+        let words = others.iter().map(|(w, _)| *w);
+        let valued = words.zip(values).filter_map(|(w, v)| Some((v?, w)));
+        valued.collect::<Vec<(f64, Word)>>()
+    });
+    let lowest = both[0].iter().min_by(|a, b| a.0.total_cmp(&b.0));
+    if let Some((value, word)) = lowest
+        && *value < own * (1.0 - RESOLUTION)
+    {
+        return Some(InTheWay::new(work, &design, *word, true));
+    }
+    let (_, word) = both[1].iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(InTheWay::new(work, &design, *word, true))
+}
+
+/// The least bytes or cycles of a design that is good for anything, and the word of which one bit less saves the most
+/// of them there.
+fn smallest(work: &Reporting, name: LimitName) -> (f64, Option<InTheWay>) {
+    let worst = search::worst_merit(work.bench, work.searched);
+    let of = |objective: usize, cost: &Cost| cost_of(cost, target(work, objective) == "fpga", name);
+    let value = |l: &Lengths| {
+        let good = work.bench.merit(work.searched, l) <= worst;
+        let costs = work.bench.costs(l).filter(|_| good)?.iter().enumerate();
+        costs.filter_map(|(o, c)| of(o, c)).reduce(f64::min)
+    };
+    let Some((value, lengths)) = least(work, &value) else {
+        return (f64::MAX, None);
+    };
+    let Ok(design) = work.space.design(work.design, &lengths) else {
+        return (value, None);
+    };
+    let costs = |d: &Design| {
+        let objectives = work.bench.objectives.iter().enumerate();
+        let costs = objectives.filter_map(|(o, b)| of(o, &cost::of_design(d, b.target)));
+        costs.reduce(f64::min).unwrap_or(f64::MAX)
+    };
+    let others = with_one(&design, -1).into_iter();
+    let saving = others
+        .map(|(w, d)| (costs(&d), w))
+        .filter(|(c, _)| *c < value);
+    let most = saving.min_by(|a, b| a.0.total_cmp(&b.0));
+    let word = most.map(|(_, w)| InTheWay::new(work, &design, w, false));
+    (value, word)
+}
+
+/// Why no design holds what is asked.
+fn why_not(work: &Reporting, required: &[Required], objective: usize) -> String {
+    if work.limits.is_empty() {
         return "no point of the front is as good as the given design".to_owned();
     }
-    if missed.peek().is_none() {
-        return "each requirement can be met by itself, and no design of the front meets all of them at once".to_owned();
+    let missed: Vec<&Required> = required.iter().filter(|r| !r.can_be_met).collect();
+    if missed.is_empty() {
+        return nearest(work, objective);
     }
     let said: Vec<String> = missed
+        .iter()
         .map(|r| {
-            let word = r
-                .limited_by
-                .map_or(String::new(), |w| format!(", limited by `{w}`"));
+            let word = match (r.limited_by, r.length) {
+                (Some(name), Some(length)) => InTheWay {
+                    name,
+                    length,
+                    at_end: r.at_end_of_range,
+                    varied: r.varied,
+                }
+                .text(),
+                (Some(name), None) => format!(", limited by `{name}`"),
+                (None, _) => String::new(),
+            };
             format!(
                 "{} cannot be met: {:.3e} is required, {:.3e} the best{word}",
                 r.name, r.limit, r.best
@@ -174,6 +362,36 @@ fn why_not(required: &[Required], limits: &Limits) -> String {
         })
         .collect();
     said.join("; ")
+}
+
+/// What keeps the nearest design from holding all limits, each of which some design holds.
+fn nearest(work: &Reporting, objective: usize) -> String {
+    let is_fabric = target(work, objective) == "fpga";
+    let value = |l: &Lengths| {
+        let cost = work.bench.costs(l)?.get(objective)?;
+        costs_hold(cost, is_fabric, work.limits).then(|| work.bench.merit(work.searched, l))
+    };
+    let each =
+        "each requirement can be met by itself, and no design that ran meets all of them at once";
+    let Some((merit, lengths)) = least(work, &value) else {
+        return each.to_owned();
+    };
+    let Some(f) = work.bench.figures(&lengths) else {
+        return each.to_owned();
+    };
+    let name = work.searched.worst(f);
+    let part = |f: &Figures| {
+        let parts = work.searched.parts(f).into_iter();
+        parts.filter(|(n, _)| *n == name).map(|(_, p)| p).next()
+    };
+    let word = coarsest(work, &lengths, &part).map_or(String::new(), |w| w.text());
+    if merit <= 1.0 {
+        return format!(
+            "a design has every figure in its limit ({name} {:.1} % of it{word}), and no run of the verification's length shows that for certain; see `bounds`",
+            100.0 * merit
+        );
+    }
+    format!("{each}: the nearest has {merit:.3} times the limit of {name}{word}")
 }
 
 /// One bit more and one bit less of each word.

@@ -4,6 +4,7 @@ use super::figures::{Figures, added, whole};
 use super::journal::Journal;
 use super::measure::{Output, run};
 use super::merit::Scale;
+use super::progress::{Progress, Step};
 use super::scenario::{Extent, Plan};
 use super::space::{Lengths, Space};
 use crate::circuit::engine::ArithmeticKind;
@@ -42,7 +43,11 @@ pub struct Bench<'a> {
     /// Lengths that somebody asked for, in this run or before it was killed.
     asked: BTreeSet<Lengths>,
     journal: Option<Journal>,
-    said: &'a (dyn Fn(usize) + Sync),
+    /// How many will be asked for, and whether they may be fewer.
+    expected: (usize, bool),
+    /// Of those that were, so many were not known.
+    new: usize,
+    said: &'a (dyn Fn(Progress) + Sync),
 }
 
 impl<'a> Bench<'a> {
@@ -54,7 +59,7 @@ impl<'a> Bench<'a> {
         given: &'a Design,
         space: &'a Space,
         threads: usize,
-        said: &'a (dyn Fn(usize) + Sync),
+        said: &'a (dyn Fn(Progress) + Sync),
     ) -> Result<Self> {
         let seed = given.thermal_run.seed ^ SEARCH_SEED;
         let plan = Plan::new(given, Extent::SEARCH, seed)?;
@@ -72,6 +77,8 @@ impl<'a> Bench<'a> {
             costs: BTreeMap::new(),
             asked: BTreeSet::new(),
             journal: None,
+            expected: (0, true),
+            new: 0,
             said,
         })
     }
@@ -88,6 +95,11 @@ impl<'a> Bench<'a> {
         self.trials.extend(known);
     }
 
+    /// How many designs will be asked for, `at_most` or just so many.
+    pub fn expect(&mut self, designs: usize, at_most: bool) {
+        self.expected = (designs, at_most);
+    }
+
     /// Runs those of a batch that have not run.
     ///
     /// # Errors
@@ -100,14 +112,25 @@ impl<'a> Bench<'a> {
             .filter(|l| !self.trials.contains_key(*l))
             .cloned()
             .collect();
+        let (known, before_batch) = (self.asked.len() - new.len(), self.new);
         // A batch is what a kill can lose.
         for part in new.chunks(64 * self.threads.max(1)) {
-            let trials = in_parallel(part, self.threads, &|_| {}, |l| self.trial(l));
+            let before = known + self.new - before_batch;
+            let said = |done: usize| {
+                (self.said)(Progress {
+                    step: Step::Searching,
+                    done: before + done,
+                    new: self.new + done,
+                    of: self.expected.0.max(self.asked.len()),
+                    at_most: self.expected.1,
+                });
+            };
+            let trials = in_parallel(part, self.threads, &said, |l| self.trial(l));
+            self.new += part.len();
             if let Some(journal) = &mut self.journal {
                 journal.append(part, &trials)?;
             }
             self.trials.extend(part.iter().cloned().zip(trials));
-            (self.said)(self.trials.len());
         }
         Ok(())
     }

@@ -3,6 +3,7 @@
 
 use super::measure::Output;
 use super::scenario::{Plan, Role};
+use crate::design::LimitName;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 use serde::Serialize;
@@ -30,6 +31,21 @@ pub struct Figures {
     pub spur_floor_dps: f64,
 }
 
+impl Figures {
+    /// A figure that can be limited, with its sign; `None` of what is none of these.
+    pub fn of(&self, name: LimitName) -> Option<f64> {
+        match name {
+            LimitName::Bias => Some(self.bias_dps),
+            LimitName::Drift => Some(self.drift_dps),
+            LimitName::Noise => Some(self.noise_dps_rthz),
+            LimitName::Arw => Some(self.arw_deg_rth),
+            LimitName::ScaleFactor => Some(self.scale_factor_ppm),
+            LimitName::Spur => Some(self.spur_dps),
+            LimitName::Bandwidth | LimitName::RomBytes | LimitName::CyclesPerRow => None,
+        }
+    }
+}
+
 /// The density is that up to here, Hz.
 pub const NOISE_BAND_HZ: f64 = 100.0;
 
@@ -43,13 +59,7 @@ pub fn arw_deg_rth(noise_dps_rthz: f64) -> f64 {
 
 /// What words add: a design's output less its twin's.
 pub fn added(plan: &Plan, fixed: &Output, twin: &Output) -> Figures {
-    let differ = |(a, b): (&Vec<f64>, &Vec<f64>)| a.iter().zip(b).map(|(a, b)| a - b).collect();
-    let errors: Vec<Vec<f64>> = fixed
-        .rates_dps
-        .iter()
-        .zip(&twin.rates_dps)
-        .map(differ)
-        .collect();
+    let errors = errors(fixed, twin);
     let mut figures = of_series(plan, &errors);
     let mut worst: f64 = 0.0;
     for (error, _) in scale_errors(plan, &errors, &twin.rates_dps) {
@@ -59,6 +69,13 @@ pub fn added(plan: &Plan, fixed: &Output, twin: &Output) -> Figures {
     }
     figures.scale_factor_ppm = 1e6 * worst;
     figures
+}
+
+/// What words add to every row, by stretch, deg/s.
+pub(super) fn errors(fixed: &Output, twin: &Output) -> Vec<Vec<f64>> {
+    let differ = |(a, b): (&Vec<f64>, &Vec<f64>)| a.iter().zip(b).map(|(a, b)| a - b).collect();
+    let pairs = fixed.rates_dps.iter().zip(&twin.rates_dps);
+    pairs.map(differ).collect()
 }
 
 /// Those of the instrument itself.
@@ -87,8 +104,8 @@ fn ends(values: &[f64]) -> (f64, f64) {
     (low, high)
 }
 
-/// By pair of turning stretches: the relative error of the slope, and the twin's slope per applied deg/s.
-fn scale_errors(plan: &Plan, errors: &[Vec<f64>], twin: &[Vec<f64>]) -> Vec<(f64, f64)> {
+/// By pair of turning stretches: where the first is, and the twin's difference between the two, deg/s.
+pub(super) fn scale_pairs(plan: &Plan, twin: &[Vec<f64>]) -> Vec<(usize, f64)> {
     let mut out = Vec::new();
     let mut k = 0;
     while k + 1 < plan.nominal.len() {
@@ -96,22 +113,63 @@ fn scale_errors(plan: &Plan, errors: &[Vec<f64>], twin: &[Vec<f64>]) -> Vec<(f64
             k += 1;
             continue;
         };
-        let across = |of: &[Vec<f64>]| mean(&of[k]) - mean(&of[k + 1]);
-        let truth = across(twin);
+        let truth = mean(&twin[k]) - mean(&twin[k + 1]);
         if rate_dps > 0.0 && truth != 0.0 {
-            out.push((across(errors) / truth, truth / (2.0 * rate_dps)));
+            out.push((k, truth));
         }
         k += 2;
     }
     out
 }
 
+/// By pair of turning stretches: the relative error of the slope, and the twin's slope per applied deg/s.
+fn scale_errors(plan: &Plan, errors: &[Vec<f64>], twin: &[Vec<f64>]) -> Vec<(f64, f64)> {
+    let of = |(k, truth): (usize, f64)| {
+        let across = mean(&errors[k]) - mean(&errors[k + 1]);
+        let rate_dps = match plan.nominal[k].role {
+            Role::Rate(rate_dps) => rate_dps,
+            _ => 0.0,
+        };
+        (across / truth, truth / (2.0 * rate_dps))
+    };
+    scale_pairs(plan, twin).into_iter().map(of).collect()
+}
+
+/// The series of the stretches at rest.
+fn at_rest<'s>(plan: &Plan, series: &'s [Vec<f64>]) -> Vec<&'s Vec<f64>> {
+    let pairs = plan.nominal.iter().zip(series);
+    let rest = pairs.filter(|(s, _)| s.role == Role::Rest);
+    rest.map(|(_, v)| v).collect()
+}
+
+/// By stretch at rest: the sum of its densities up to [`NOISE_BAND_HZ`], (deg/s)^2/Hz, and of how many bins.
+pub(super) fn rest_powers(plan: &Plan, series: &[Vec<f64>]) -> Vec<(f64, f64)> {
+    let of = |v: &Vec<f64>| {
+        let spectrum = Spectrum::new(v, plan.row_hz);
+        let bins = spectrum.in_band();
+        let sum: f64 = bins.iter().map(|square| square * spectrum.per_hz).sum();
+        (sum, bins.len().max(1) as f64)
+    };
+    at_rest(plan, series).into_iter().map(of).collect()
+}
+
+/// A bin stands out of noise of mean power P where it has more than this times P: noise does that with the
+/// probability [`FALSE_LINE`] in any of the plan's bins.
+pub(super) fn line_factor(series: &[Vec<f64>], plan: &Plan) -> f64 {
+    let detuned = plan.detuned.is_some().then(|| series.last()).flatten();
+    let looked_at = at_rest(plan, series).into_iter().chain(detuned);
+    let bins: usize = looked_at
+        .map(|v| v.len().div_ceil(2).saturating_sub(1))
+        .sum();
+    factor(bins)
+}
+
+fn factor(bins: usize) -> f64 {
+    (bins.max(1) as f64 / FALSE_LINE).ln()
+}
+
 fn of_series(plan: &Plan, series: &[Vec<f64>]) -> Figures {
-    let rest = plan.nominal.iter().zip(series);
-    let rest: Vec<&Vec<f64>> = rest
-        .filter(|(s, _)| s.role == Role::Rest)
-        .map(|(_, v)| v)
-        .collect();
+    let rest = at_rest(plan, series);
     let means: Vec<f64> = rest.iter().map(|v| mean(v)).collect();
     let (low, high) = ends(&means);
     let mut spectra: Vec<(Spectrum, bool)> = rest
@@ -172,6 +230,12 @@ impl Spectrum {
         }
     }
 
+    /// The bins up to [`NOISE_BAND_HZ`], four at least.
+    fn in_band(&self) -> &[f64] {
+        let bins = ((NOISE_BAND_HZ / self.bin_hz) as usize).max(4);
+        &self.squares[..bins.min(self.squares.len())]
+    }
+
     fn hz(&self, bin: usize) -> f64 {
         (bin + 1) as f64 * self.bin_hz
     }
@@ -181,8 +245,7 @@ impl Spectrum {
 fn density(spectra: &[(Spectrum, bool)]) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for (s, _) in spectra.iter().filter(|(_, detuned)| !detuned) {
-        let bins = ((NOISE_BAND_HZ / s.bin_hz) as usize).max(4);
-        for square in s.squares.iter().take(bins) {
+        for square in s.in_band() {
             sum += square * s.per_hz;
             count += 1.0;
         }
@@ -197,7 +260,7 @@ fn density(spectra: &[(Spectrum, bool)]) -> f64 {
 /// The largest line: a bin's power that noise of the mean power of its stretch would reach with little chance.
 fn spurs(spectra: &[(Spectrum, bool)], figures: &mut Figures) {
     let bins: usize = spectra.iter().map(|(s, _)| s.squares.len()).sum();
-    let factor = (bins.max(1) as f64 / FALSE_LINE).ln();
+    let factor = factor(bins);
     for (s, detuned) in spectra {
         let total: f64 = s.squares.iter().sum();
         for (k, square) in s.squares.iter().enumerate() {

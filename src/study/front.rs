@@ -33,13 +33,19 @@ pub fn front(mut points: Vec<Point>, given: &[u32], worst: f64) -> Vec<Point> {
     out
 }
 
-/// Groups of a front that a relative change of `resolution` in the merit does not tell apart: each is led by its
-/// cheapest; the rest are its alternatives.
-pub fn resolved(front: Vec<Point>, resolution: f64) -> Vec<(Point, Vec<Point>)> {
+/// Groups of a front that a relative change of `resolution` in the merit does not tell apart, nor `apart`: each is led
+/// by its cheapest; the rest are its alternatives.
+pub fn resolved(
+    front: Vec<Point>,
+    resolution: f64,
+    apart: &dyn Fn(&Point, &Point) -> bool,
+) -> Vec<(Point, Vec<Point>)> {
     let mut out: Vec<(Point, Vec<Point>)> = Vec::new();
     for point in front {
         match out.last_mut() {
-            Some((leader, others)) if point.merit > leader.merit * (1.0 - resolution) => {
+            Some((leader, others))
+                if point.merit > leader.merit * (1.0 - resolution) && !apart(leader, &point) =>
+            {
                 others.push(point);
             }
             _ => out.push((point, Vec::new())),
@@ -75,10 +81,15 @@ mod tests {
         let front = front(points, &[5, 5], 10.0);
         let lengths: Vec<&[u32]> = front.iter().map(|p| &p.lengths[..]).collect();
         assert_eq!(lengths, [&[5, 5][..], &[4, 5], &[9, 9], &[9, 8]]);
-        let groups = resolved(front, 0.05);
+        let sizes = |apart: &dyn Fn(&Point, &Point) -> bool| {
+            let groups = resolved(front.clone(), 0.05, apart);
+            groups.iter().map(|g| g.1.len()).collect::<Vec<_>>()
+        };
+        assert_eq!(sizes(&|_, _| false), [0, 1, 0]);
+        // One that holds what is asked does not hide behind one that does not.
         assert_eq!(
-            groups.iter().map(|g| g.1.len()).collect::<Vec<_>>(),
-            [0, 1, 0]
+            sizes(&|a, b| (a.merit <= 1.98) != (b.merit <= 1.98)),
+            [0, 0, 0, 0]
         );
     }
 }

@@ -1,10 +1,11 @@
 //! How good a design is, as one number: the largest figure in parts of its limit.
 //!
 //! Where the user requires nothing, a figure counts as 1 where it makes the data sheet's own figure one percent
-//! worse: bias and drift one percent of the instrument's drift over temperature, noise and lines so much that they
-//! add one percent to the instrument's noise (in squares), the scale factor one percent of its change. What the given
-//! design adds itself is no worsening.
+//! worse than with the given design: bias and drift one percent of the instrument's drift over temperature, noise and
+//! lines so much that they add one percent to the instrument's noise (in squares), the scale factor one percent of its
+//! change, each beside what the given design's words add themselves.
 
+use super::certainty::{Bounds, largest};
 use super::figures::Figures;
 use crate::circuit::scale::full_scale_dps;
 use crate::design::{Design, LimitName, Limits};
@@ -50,15 +51,19 @@ impl Scale {
         }
     }
 
-    /// No limit below what a design adds itself.
-    pub fn at_least(self, f: &Figures) -> Scale {
-        let more = |limit: Option<f64>, own: f64| limit.map(|l| l.max(own.abs()));
+    /// With what the given design adds itself: a figure of another design is as good where the whole, instrument and
+    /// words, is at most [`WORSE`] worse than the given design's whole. Bias, drift and scale factor add up, noise and
+    /// lines in squares.
+    pub fn beside(self, f: &Figures) -> Scale {
+        let own = |value: f64| (1.0 + WORSE) * value.abs();
+        let sum = |limit: Option<f64>, value: f64| limit.map(|l| l + own(value));
+        let square = |limit: Option<f64>, value: f64| limit.map(|l| l.hypot(own(value)));
         Scale {
-            bias_dps: more(self.bias_dps, f.bias_dps),
-            drift_dps: more(self.drift_dps, f.drift_dps),
-            noise_dps_rthz: more(self.noise_dps_rthz, f.noise_dps_rthz),
-            scale_factor_ppm: more(self.scale_factor_ppm, f.scale_factor_ppm),
-            spur_dps: more(self.spur_dps, f.spur_dps),
+            bias_dps: sum(self.bias_dps, f.bias_dps),
+            drift_dps: sum(self.drift_dps, f.drift_dps),
+            noise_dps_rthz: square(self.noise_dps_rthz, f.noise_dps_rthz),
+            scale_factor_ppm: sum(self.scale_factor_ppm, f.scale_factor_ppm),
+            spur_dps: square(self.spur_dps, f.spur_dps),
         }
     }
 
@@ -113,6 +118,38 @@ impl Scale {
             .into_iter()
             .map(|(_, p)| p)
             .fold(0.0, f64::max)
+    }
+
+    /// True if every figure is within its limit: the whole of its interval, or the figure itself where it is at most
+    /// [`WORSE`] above `given`'s, which has run on the same noise.
+    pub fn holds(&self, f: &Figures, bounds: &Bounds, given: &Figures) -> bool {
+        let names = [
+            LimitName::Bias,
+            LimitName::Drift,
+            LimitName::Noise,
+            LimitName::ScaleFactor,
+            LimitName::Spur,
+        ];
+        let limits = [
+            self.bias_dps,
+            self.drift_dps,
+            self.noise_dps_rthz,
+            self.scale_factor_ppm,
+            self.spur_dps,
+        ];
+        let parts = self.parts(f).into_iter().zip(self.parts(given));
+        names
+            .into_iter()
+            .zip(limits)
+            .zip(parts)
+            .all(|((name, limit), (own, given))| {
+                let most = bounds.of(name).map(largest);
+                let within = match (limit, most) {
+                    (Some(limit), Some(most)) => most <= limit,
+                    _ => true,
+                };
+                within || own.1 <= (1.0 + WORSE) * given.1
+            })
     }
 
     /// The figure with the largest part.

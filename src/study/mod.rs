@@ -2,14 +2,16 @@
 //!
 //! [`space`] says which words vary, [`retune`] makes a design with other lengths. [`scenario`] is what every design
 //! runs, [`measure`] runs it, [`figures`] are what comes out, [`merit`] is one number of them. [`mod@bench`] runs and
-//! prices designs, each once, [`journal`] keeps that. [`front`] and [`search`] look for the cheapest. [`verify`] runs
-//! again what is reported, [`budget`] says what each word adds, [`job`] does all of it, [`outcome`] is `study.json`, [`shard`] divides the work.
+//! prices designs, each once, [`journal`] keeps that. [`front`] and [`search`] look for the cheapest, [`quarter`] for one that
+//! costs a quarter less. [`verify`] runs
+//! again what is reported, [`certainty`] says how certain that is, [`budget`] says what each word adds, [`job`] does all of it, `reporting` what follows the search, [`progress`] says how far it is, [`outcome`] is `study.json`, [`shard`] divides the work.
 
 mod additive;
-mod answer;
+pub mod answer;
 pub mod bandwidth;
 pub mod bench;
 pub mod budget;
+pub mod certainty;
 pub mod design_text;
 pub mod figures;
 pub mod front;
@@ -19,6 +21,9 @@ pub mod measure;
 pub mod merit;
 pub mod outcome;
 pub mod overflow;
+pub mod progress;
+pub mod quarter;
+mod reporting;
 pub mod retune;
 pub mod scenario;
 pub mod search;

@@ -1,6 +1,7 @@
 //! `study.json`: what a study found.
 
 use super::budget::Budget;
+use super::certainty::{Bounds, Confidence};
 use super::figures::Figures;
 use super::merit::Scale;
 use crate::cost::Cost;
@@ -34,7 +35,8 @@ pub struct Point {
     pub number: usize,
     /// The file that makes it, beside `study.json`; the given design has its own.
     pub design: Option<String>,
-    /// The targets on whose front it is.
+    /// The targets on whose front it is; none for a design that was chosen for bytes or cycles that are required, which
+    /// a front of the one price does not weigh.
     pub targets: Vec<String>,
     /// Lengths of all words that were varied.
     pub word_lengths: WordLengths,
@@ -68,11 +70,14 @@ pub struct Point {
     pub limited_by: &'static str,
     /// Each figure in parts of its limit.
     pub parts: BTreeMap<&'static str, f64>,
-    /// Each figure of the data sheet is at most one percent worse than the given design's.
+    /// What each figure may be with the study's confidence (`confidence`).
+    pub bounds: Bounds,
+    /// Each figure of the data sheet is at most one percent worse than the given design's: the whole of its bounds is
+    /// within that, or what the words add is at most one percent above what those of the given design add on the same noise.
     pub as_good_as_given: bool,
     /// Run bit for bit with other noise than the search's, started from power-on, ranges proved.
     pub verified: bool,
-    /// Mean error after a start from power-on less that of the settled circuit, deg/s.
+    /// Mean error after a start from power-on less that of the settled circuit under the same conditions, deg/s.
     pub startup_error_dps: Option<f64>,
     /// Keys with another value than in the given design.
     pub changes: BTreeMap<String, String>,
@@ -149,6 +154,46 @@ pub struct Required {
     pub can_be_met: bool,
     /// If not: the word that limits it.
     pub limited_by: Option<&'static str>,
+    /// The length that this word has in that best design.
+    pub length: Option<u32>,
+    /// That is the end of the word's range in this study.
+    pub at_end_of_range: bool,
+    /// The study varies this word.
+    pub varied: bool,
+}
+
+/// A design that costs a quarter less than the given one on a target and is as good.
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
+pub struct Quarter {
+    /// The target.
+    pub target: String,
+    /// At most so much of the given design's cost.
+    pub share: f64,
+    /// Number in `front`; null = there is none.
+    pub point: Option<usize>,
+    /// There is none among all combinations of `words`: each was priced, and run where it is cheap enough.
+    pub proved_none: bool,
+    /// The words concerned, those that move the price, with every length that was tried.
+    pub words: Vec<QuarterWord>,
+    /// The other words, which were as here.
+    pub others: WordLengths,
+    /// Combinations.
+    pub designs: usize,
+    /// Those that are cheap enough; null where no combinations were tried.
+    pub cheap_enough: Option<usize>,
+    /// The least merit of these in the search's runs.
+    pub best_merit: Option<f64>,
+    /// The figure that makes it.
+    pub best_limited_by: Option<&'static str>,
+}
+
+/// A word and the lengths that were tried.
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
+pub struct QuarterWord {
+    /// The dotted key.
+    pub name: &'static str,
+    /// Its lengths.
+    pub lengths: Vec<u32>,
 }
 
 /// `study.json`.
@@ -184,6 +229,11 @@ pub struct Study {
     pub method: &'static str,
     /// Combinations of lengths.
     pub space: f64,
+    /// With which confidence the points' bounds hold.
+    pub confidence: Confidence,
+    /// By target: a design that costs a quarter less and is as good as the given one, or what shows that there is none;
+    /// empty where something is required.
+    pub quarter_less: Vec<Quarter>,
     /// Designs that were priced or run.
     pub designs_considered: usize,
     /// Designs that were run bit for bit.

@@ -69,7 +69,7 @@ impl Extent {
         temperatures: 26,
         rates: 8,
         rest_rows: 384,
-        rate_rows: 96,
+        rate_rows: 384,
         detuned_rows: 1536,
     };
 }

@@ -6,6 +6,8 @@
 //! 3. Bit removal and exchange: from every point of the front found so far one and two bits less or more of a word,
 //!    and pairs of such moves. A move runs unless the sums say that it is far from the front. Again and again, until no front
 //!    changes.
+//! 4. As long as there are runs left, wider: moves also from points that are so far behind the front, and moves that the
+//!    sums put so far behind it. Errors are no function that falls with the length, and the sums miss what cancels.
 //!
 //! Every step is a batch whose content follows from results alone, so that the number of threads does not matter.
 
@@ -40,6 +42,12 @@ impl Effort {
     };
 }
 
+/// So much farther behind the front the search looks in each step when nothing nearer is left (convention).
+const WIDER: f64 = 1.3;
+
+/// As far as it looks (convention; found to be enough on the spaces of `tests/study_spaces.rs`).
+const WIDEST: f64 = 8.0;
+
 /// Points with a larger merit than this, and than the given design's, are of no use to anybody.
 pub const WORST_MERIT: f64 = 10.0;
 
@@ -66,6 +74,7 @@ pub fn sweeps(bench: &Bench) -> Vec<Lengths> {
 /// A journal that cannot be written.
 pub fn search(bench: &mut Bench, scale: &Scale, effort: Effort) -> Result<Vec<Vec<Point>>> {
     let swept = sweeps(bench);
+    bench.expect(effort.runs, true);
     bench.run(&swept)?;
     bench.price(&swept);
     let given = bench.space.given();
@@ -78,18 +87,19 @@ pub fn search(bench: &mut Bench, scale: &Scale, effort: Effort) -> Result<Vec<Ve
         bench.price(&ladder);
     }
     let mut tried: BTreeSet<Lengths> = bench.all().into_iter().collect();
+    let mut wider = 1.0;
     loop {
         let fronts = fronts(bench, scale, worst);
         let mut wanted: BTreeMap<Lengths, f64> = BTreeMap::new();
         for (objective, points) in fronts.iter().enumerate() {
-            for point in points {
+            for point in &near(bench, scale, objective, points, wider) {
                 promising(
                     bench,
                     &sums,
                     objective,
                     points,
                     point,
-                    effort.slack,
+                    [effort.slack * wider, 0.999 * wider],
                     &mut |l, gain| {
                         if !tried.contains(&l) {
                             let best = wanted.entry(l).or_insert(gain);
@@ -100,6 +110,10 @@ pub fn search(bench: &mut Bench, scale: &Scale, effort: Effort) -> Result<Vec<Ve
             }
         }
         let left = effort.runs.saturating_sub(tried.len()).min(effort.round);
+        if wanted.is_empty() && left > 0 && wider < WIDEST {
+            wider *= WIDER;
+            continue;
+        }
         let mut batch: Vec<(f64, Lengths)> = wanted.into_iter().map(|(l, g)| (g, l)).collect();
         batch.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)));
         let batch: Vec<Lengths> = batch.into_iter().take(left).map(|(_, l)| l).collect();
@@ -126,6 +140,9 @@ pub fn exhaust(bench: &mut Bench, scale: &Scale) -> Result<Vec<Vec<Point>>> {
         .collect();
     // The one-word sweeps are shown, and the given design may be outside the ranges.
     all.extend(sweeps(bench));
+    all.sort();
+    all.dedup();
+    bench.expect(all.len(), false);
     bench.run(&all)?;
     let worst = worst_merit(bench, scale);
     let good: Vec<Lengths> = all
@@ -147,7 +164,8 @@ pub fn worst_merit(bench: &Bench, scale: &Scale) -> f64 {
     }
 }
 
-fn fronts(bench: &Bench, scale: &Scale, worst: f64) -> Vec<Vec<Point>> {
+/// The fronts of all that has run, by objective.
+pub fn fronts(bench: &Bench, scale: &Scale, worst: f64) -> Vec<Vec<Point>> {
     let all = bench.all();
     let given = bench.space.given();
     let inside = |l: &&Lengths| bench.space.contains(l) || **l == given;
@@ -162,14 +180,37 @@ fn fronts(bench: &Bench, scale: &Scale, worst: f64) -> Vec<Vec<Point>> {
     (0..bench.objectives.len()).map(of).collect()
 }
 
-/// Moves from a point that may be on the front, each with its predicted merit over the front's at its cost.
+/// The points of a front, and with `wider` above 1 those that are at most so many times its merit behind it.
+fn near(bench: &Bench, scale: &Scale, objective: usize, front: &[Point], wider: f64) -> Vec<Point> {
+    if wider <= 1.0 {
+        return front.to_vec();
+    }
+    let all = bench.all().into_iter().filter(|l| bench.space.contains(l));
+    let points = all.map(|lengths| Point {
+        cost: bench.cost(objective, &lengths),
+        merit: bench.merit(scale, &lengths).max(FINEST_MERIT),
+        lengths,
+    });
+    let is_near = |p: &Point| p.cost.is_finite() && p.merit <= wider * merit_at(front, p.cost);
+    points.filter(is_near).collect()
+}
+
+/// A front's merit at a cost.
+fn merit_at(front: &[Point], cost: f64) -> f64 {
+    let behind = front.partition_point(|p| p.cost <= cost);
+    let best = behind.checked_sub(1).and_then(|k| front.get(k));
+    best.map_or(WORST_MERIT, |p| p.merit)
+}
+
+/// Moves from a point that may be on the front, each with its predicted merit over the front's at its cost. `limits` of
+/// that for what costs less and for what costs more.
 fn promising(
     bench: &Bench,
     sums: &Additive,
     objective: usize,
     front: &[Point],
     point: &Point,
-    slack: f64,
+    limits: [f64; 2],
     found: &mut dyn FnMut(Lengths, f64),
 ) {
     let Some(figures) = bench.figures(&point.lengths) else {
@@ -185,12 +226,13 @@ fn promising(
         } else {
             cost
         };
-        let behind = front.partition_point(|p| p.cost <= cost);
-        let best = behind.checked_sub(1).and_then(|k| front.get(k));
-        let best = best.map_or(WORST_MERIT, |p| p.merit);
-        let gain = merit.max(FINEST_MERIT) / best;
+        let gain = merit.max(FINEST_MERIT) / merit_at(front, cost);
         // What costs more has to be better; what costs less may be a little worse than is known for that.
-        let limit = if cost < point.cost { slack } else { 0.999 };
+        let limit = if cost < point.cost {
+            limits[0]
+        } else {
+            limits[1]
+        };
         if gain <= limit {
             found(lengths, gain);
         }

@@ -73,6 +73,7 @@ pub fn run(bench: &mut Bench, part: Part, hash: &str, folder: &Path) -> Result<P
         .filter(|(k, _)| k % part.of as usize == part.number as usize - 1)
         .map(|(_, l)| l)
         .collect();
+    bench.expect(own.len(), false);
     bench.run(&own)?;
     let mut text = format!(
         "gyrogen.study.shard/1 {hash} {}/{} {}\n",

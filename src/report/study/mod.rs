@@ -52,13 +52,18 @@ pub fn html(s: &Study) -> Result<String> {
         headline: headline(s),
         finding: format!(
             "{} designs were considered and {} run bit for bit ({}); {} undominated points were run again with other noise \
-             over {} temperatures, and their ranges proved. A merit of 1: {}.",
+             over {} temperatures, and their ranges proved. A merit of 1: {}. Bounds in study.json hold at once for all {} \
+             figures with {} % confidence ({}). {}",
             s.designs_considered,
             s.designs_simulated,
             s.method,
             s.front.len(),
             s.conditions.temperatures[1],
-            s.limits_from
+            s.limits_from,
+            s.confidence.intervals,
+            significant(100.0 * s.confidence.joint, 3),
+            s.confidence.correction,
+            quarter_less(s).join(" ")
         ),
         chosen: s
             .chosen
@@ -102,6 +107,38 @@ pub fn html(s: &Study) -> Result<String> {
     };
     page.render()
         .map_err(|e| InputError::new(format!("the report cannot be rendered: {e}")).into())
+}
+
+/// A sentence for each target of which it is known whether a design costs a quarter less.
+pub fn quarter_less(s: &Study) -> Vec<String> {
+    let known = s
+        .quarter_less
+        .iter()
+        .filter(|q| q.point.is_some() || q.proved_none);
+    known
+        .map(|q| {
+            let target = &q.target;
+            let less = significant(100.0 * (1.0 - q.share), 3);
+            if let Some(point) = q.point {
+                return format!("{target}: point {point} costs at least {less} % less and is as good.");
+            }
+            let words: Vec<&str> = q.words.iter().map(|w| w.name).collect();
+            let best = match (q.best_merit, q.best_limited_by) {
+                (Some(merit), Some(by)) => {
+                    format!(", the best of which has a merit of {} by {by}", significant(merit, 3))
+                }
+                _ => String::new(),
+            };
+            let cheap = q
+                .cheap_enough
+                .map_or(String::new(), |n| format!(", {n} of them cheap enough{best}"));
+            format!(
+                "{target}: no design costs {less} % less and is as good, in all {} combinations of {}{cheap}.",
+                q.designs,
+                words.join(", ")
+            )
+        })
+        .collect()
 }
 
 fn answer(point: Option<usize>, reason: &str) -> String {
