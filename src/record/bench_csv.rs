@@ -5,7 +5,7 @@
 
 use super::bench_keys::{BenchKeys, Column, Scale};
 use super::capture_meta::CaptureMeta;
-use crate::error::InputError;
+use crate::error::{InputError, Result};
 use std::path::Path;
 
 /// Rows of numbers in a row that make the first of them the first row (convention: a preamble has single ones).
@@ -44,7 +44,7 @@ pub(super) fn table(
     text: &str,
     keys: &BenchKeys,
     meta: &mut CaptureMeta,
-) -> Result<Option<Table>, InputError> {
+) -> Result<Option<Table>> {
     let lines: Vec<&str> = text.lines().collect();
     let separator = separator(&lines);
     let cut = |line: &str| cells(line, separator);
@@ -61,7 +61,7 @@ pub(super) fn table(
                 .at(number + k, 1)
                 .help("repair this line or the next ones, or take them away");
         error.source_line = lines.get(k).map(|l| (*l).to_owned());
-        return Err(error);
+        return Err(error.into());
     }
     let rows: Vec<Vec<f64>> = lines[before..]
         .iter()
@@ -76,7 +76,7 @@ pub(super) fn table(
     let scale = match keys.scale() {
         Some(scale) => Some(in_unit(path, scale, &named, used)?),
         None if says_volts || !rows.iter().all(whole) => {
-            return Err(no_scale(path, &named, used, &rows));
+            return Err(no_scale(path, &named, used, &rows).into());
         }
         None => None,
     };
@@ -279,7 +279,7 @@ fn used(
     named: &Named,
     width: usize,
     keys: &BenchKeys,
-) -> Result<[usize; 2], InputError> {
+) -> Result<[usize; 2]> {
     let mut out = [0; 2];
     let words = [["drive", "drv"], ["sense", "sns"]];
     let parts = out
@@ -312,7 +312,8 @@ fn used(
                     named,
                     width,
                     format!("`{key}` is {n}, and the columns are 0 to {}", width - 1),
-                ));
+                )
+                .into());
             }
             (Some(Column::Name(name)), []) => {
                 return Err(which(
@@ -320,7 +321,8 @@ fn used(
                     named,
                     width,
                     format!("the capture has no column \"{name}\", which `{key}` names"),
-                ));
+                )
+                .into());
             }
             (Some(Column::Name(name)), _) => {
                 return Err(which(
@@ -328,7 +330,8 @@ fn used(
                     named,
                     width,
                     format!("several columns are \"{name}\", which `{key}` names"),
-                ));
+                )
+                .into());
             }
             (None, _) => {
                 let part = words[0];
@@ -337,7 +340,7 @@ fn used(
                     "the header has no column `{}`, and no name in it says which is the {part}'s",
                     column.unwrap_or(&part)
                 );
-                return Err(which(path, named, width, message).at(number, 1));
+                return Err(which(path, named, width, message).at(number, 1).into());
             }
         };
     }
@@ -347,7 +350,8 @@ fn used(
             named,
             width,
             "drive and sense are the same column".to_owned(),
-        ));
+        )
+        .into());
     }
     Ok(out)
 }
@@ -386,17 +390,13 @@ pub(super) fn sidecar_name(path: &Path) -> String {
 }
 
 /// The scale in the columns' own unit: both are in volts, or in millivolts.
-fn in_unit(
-    path: &Path,
-    scale: Scale,
-    named: &Named,
-    used: [usize; 2],
-) -> Result<Scale, InputError> {
+fn in_unit(path: &Path, scale: Scale, named: &Named, used: [usize; 2]) -> Result<Scale> {
     let [drive, sense] = used.map(|k| named.volts(k).unwrap_or(1.0));
     if drive != sense {
         return Err(InputError::new("drive and sense are in different units")
             .in_file(path)
-            .help("write both in volts: `volts_per_code` holds for both"));
+            .help("write both in volts: `volts_per_code` holds for both")
+            .into());
     }
     Ok(Scale {
         volts_per_code: scale.volts_per_code / drive,
