@@ -3,8 +3,8 @@
 use ruzstd::decoding::{FrameDecoder, StreamingDecoder};
 use std::io::{self, BufRead, BufReader, Read};
 
-/// Bytes that tell what a file is.
-pub(super) const HEAD: usize = 16;
+/// Bytes that tell what a file is: a tar archive says so behind the first entry's name.
+pub(super) const HEAD: usize = 262;
 
 const GZIP: [u8; 2] = [0x1F, 0x8B];
 const ZSTD: [u8; 4] = [0x28, 0xB5, 0x2F, 0xFD];
@@ -111,7 +111,7 @@ pub(super) fn foreign(head: &[u8]) -> Option<(&'static str, &'static str)> {
     const UNPACK: &str =
         "unpack it, and give the record that is in it (gzip and zstd files are read as they are)";
     const EXPORT: &str = "export the gyro's rate, its temperature and their time from it as CSV";
-    const KINDS: [(&[u8], &str, &str); 13] = [
+    const KINDS: [(&[u8], &str, &str); 16] = [
         (
             b"PK\x03\x04",
             "this is a ZIP archive or an Excel workbook",
@@ -144,6 +144,13 @@ pub(super) fn foreign(head: &[u8]) -> Option<(&'static str, &'static str)> {
             "this is a NumPy array",
             "a capture of ADC codes is given with `close --capture`; write a thermal record as CSV",
         ),
+        (b"%PDF", "this is a PDF", EXPORT),
+        (
+            b"<",
+            "this is a web page or XML, and no table",
+            "was it downloaded while not logged in? Give the file itself, as CSV",
+        ),
+        (b"{", "this is JSON", EXPORT),
         (
             b"\xD0\xCF\x11\xE0",
             "this is an old Excel workbook",
@@ -152,6 +159,9 @@ pub(super) fn foreign(head: &[u8]) -> Option<(&'static str, &'static str)> {
     ];
     if let Some((_, what, help)) = KINDS.iter().find(|(magic, ..)| head.starts_with(magic)) {
         return Some((what, help));
+    }
+    if head.get(257..262) == Some(b"ustar") {
+        return Some(("this is a tar archive", UNPACK));
     }
     // A time in front of each MAVLink packet (0xFE: version 1, 0xFD: version 2).
     let time = head.first_chunk::<8>().map(|t| u64::from_be_bytes(*t));
@@ -230,6 +240,9 @@ mod tests {
             (b"BZh91AY", "bzip2"),
             (&telemetry, "telemetry"),
             (b"\x89MCAP0\r\n", "MCAP"),
+            (b"<!DOCTYPE html>", "web page"),
+            (b"{\"time_s\": [1, 2]}", "JSON"),
+            (&[&[b'r'; 257][..], b"ustar\0"].concat(), "tar"),
         ] {
             assert!(foreign(head).unwrap().0.contains(part), "{part}");
         }
