@@ -241,7 +241,9 @@ class Bench:
             wrong.append(f"status {status}")
         if status == 2 and not self.stderr.strip():
             wrong.append("status 2 without a word")
-        if hostility in ("none", "same folder") and status == 2:
+        # A design of the user's own in the folder of the results is not written over.
+        guarded = hostility == "same folder" and "no result of an earlier run" in self.stderr
+        if hostility in ("none", "same folder") and status == 2 and not guarded:
             wrong.append("status 2 of a run that nothing disturbs")
         if hostility == "read-only" and status != 2:
             wrong.append(f"status {status} where nothing can be written")
@@ -254,6 +256,7 @@ class Bench:
         stale = hashlib.sha256(STALE).hexdigest()
         if results.exists():
             fresh = {n: d for n, d in digests(results).items() if n in reference}
+            fresh = {n: d for n, d in fresh.items() if before.get(str(pathlib.Path(where) / n)) != d or d == stale}
             for n, digest in fresh.items():
                 whole = digest == reference[n] or (n in existed and digest == stale)
                 # What a damaged input or another folder's name makes is another whole file.

@@ -56,12 +56,13 @@ fn a_record_of_each_kind_becomes_compiled_firmware() {
     let top = tempfile::tempdir().expect("a folder");
     let csv = table("time_s,rate_out_dps,die_degc");
     let (ulg, bin) = (logs::ulog(&rows()), logs::dataflash(&rows()));
-    let files: [(&str, Vec<u8>); 7] = [
+    let files: [(&str, Vec<u8>); 8] = [
         ("r.csv", csv.clone().into_bytes()),
         (
             "units.csv",
             table("time [s],rate_out [deg/s],die [degC]").into_bytes(),
         ),
+        ("names.csv", table("time,gyro_z,temp").into_bytes()),
         ("r.csv.gz", gzip(csv.as_bytes())),
         ("r.csv.zst", zstd(csv.as_bytes())),
         ("r.ulg", ulg.clone()),
@@ -72,13 +73,14 @@ fn a_record_of_each_kind_becomes_compiled_firmware() {
         fs::write(top.path().join(name), bytes).expect("written");
         let (status, said, complaints) =
             gyrogen(top.path(), &["run", "--record", name, "--out", "out"]);
-        if *name == "units.csv" {
-            // Names that are not the contract's are asked for, with all keys at once.
+        if *name == "names.csv" {
+            // Names that say nothing are asked for, with all keys at once.
             assert_eq!(status, Some(2), "{said}{complaints}");
             for key in [
                 "[record.columns]",
-                "time_s = \"time [s]\"",
-                "rate_out_dps = \"rate_out [deg/s]\"",
+                "time_s = \"time\"",
+                "rate_out_dps = \"gyro_z\"",
+                "die_degc = \"temp\"",
                 "--design FILE",
             ] {
                 assert!(complaints.contains(key), "{key}: {complaints}");
