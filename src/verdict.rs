@@ -79,6 +79,40 @@ pub struct FirmwareErrors {
     pub heldout_max_abs: Option<f64>,
 }
 
+/// Part of the model's gain (in mean square) of which firmware must reach more to be of use (convention: whole codes that are
+/// moved by less than half an LSB of what was found gain nothing, but for chance).
+const LEAST_SHARE: f64 = 0.1;
+
+impl FirmwareErrors {
+    /// These, unless firmware with the steps leaves about as much as there is without it, or more: then nothing is to be
+    /// emitted, and the text says so. `none` is the held-out rms without firmware, `model` that with the steps in the
+    /// model, in `unit`.
+    ///
+    /// # Errors
+    /// That text, with the three figures.
+    pub fn unless_useless(
+        self,
+        none: f64,
+        model: f64,
+        unit: &str,
+    ) -> std::result::Result<Self, String> {
+        let Some(rms) = self.heldout_rms else {
+            return Ok(self);
+        };
+        let gain = none.powi(2) - rms.powi(2);
+        let of_model = none.powi(2) - model.powi(2);
+        // A figure that is no number is no gain.
+        if gain > 0.0 && gain > LEAST_SHARE * of_model {
+            return Ok(self);
+        }
+        let what = if rms > none { "worse" } else { "no better" };
+        Err(format!(
+            "firmware would be {what} than none: held-out rms {none:.4} {unit} before, {model:.4} {unit} in the model, {rms:.4} {unit} \
+             in firmware, whose words are too coarse for what was found; nothing is emitted"
+        ))
+    }
+}
+
 /// What is left after the last step.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, schemars::JsonSchema)]
 pub struct Structure {
@@ -151,4 +185,41 @@ pub struct Closure {
     pub evidence: Vec<Evidence>,
     /// What the user should know of.
     pub warnings: Vec<Warning>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::FirmwareErrors;
+
+    #[test]
+    fn firmware_that_gains_nothing_is_told_with_its_figures() {
+        let told = |none, model, firmware| {
+            let errors = FirmwareErrors {
+                compensable: true,
+                heldout_rms: Some(firmware),
+                heldout_max_abs: Some(1.0),
+            };
+            errors.unless_useless(none, model, "lsb").err()
+        };
+        let worse = told(0.35, 0.035, 0.5).unwrap();
+        for part in [
+            "worse than none",
+            "0.3500 lsb before",
+            "0.0350 lsb in the model",
+            "0.5000 lsb in firmware",
+        ] {
+            assert!(worse.contains(part), "{worse}");
+        }
+        assert!(
+            told(0.35, 0.035, 0.35)
+                .unwrap()
+                .contains("no better than none")
+        );
+        assert!(told(0.5, 0.035, 0.4999).is_some());
+        assert!(told(f64::NAN, 0.1, 0.1).is_some());
+        // Little beside the noise is a gain all the same.
+        assert_eq!(told(1.01, 1.0, 1.002), None);
+        let nothing = FirmwareErrors::default();
+        assert_eq!(nothing.unless_useless(1.0, 0.1, "lsb"), Ok(nothing));
+    }
 }

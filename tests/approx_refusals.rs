@@ -55,6 +55,17 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
             &["undefined"],
         ),
         (with(base("sin(x", "--domain=0,1"), &cubic), &["error"]),
+        // Each level multiplies how often it turns: told at once, and not after minutes.
+        (
+            with(
+                base(
+                    "sin(9*sin(9*sin(9*sin(9*sin(9*sin(9*x))))))",
+                    "--domain=-1,1",
+                ),
+                &cubic,
+            ),
+            &["turns too often", "narrow the domain", "each level"],
+        ),
         (
             with(base("sinn(x)", "--domain=0,1"), &cubic),
             &["`sinn`", "1:1", "sin"],

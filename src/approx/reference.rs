@@ -7,6 +7,10 @@ use super::minimax;
 use super::real::{Domain, Dyadic, Enclosure, Expression, Target as _};
 use crate::error::{InputError, Result};
 
+/// How many times the radius aimed at is too much for any search or proof (convention: of the 2^-34 LSB of
+/// `gyrogen approx` an eighth of an LSB is left); what lies below is slower and still proved.
+const LOOSE: f64 = 2_147_483_648.0;
+
 /// A function on a domain, enclosed.
 #[derive(Debug, Clone)]
 pub struct Function {
@@ -20,7 +24,8 @@ impl Function {
     /// Encloses the expression, aiming at a radius of `tolerance` in its unit.
     ///
     /// # Errors
-    /// A place in the domain where the function has no value, or none that can be bounded.
+    /// A place in the domain where the function has no value, or none that can be bounded; a function that turns so often
+    /// that it cannot be enclosed in as many segments as there may be.
     pub fn new(
         text: &str,
         expression: Expression,
@@ -29,6 +34,19 @@ impl Function {
     ) -> Result<Function> {
         let enclosure = Enclosure::new(&expression, &domain, tolerance);
         let enclosure = enclosure.map_err(|undefined| undefined.in_text(text))?;
+        if enclosure.is_cut_short() && enclosure.radius() > tolerance * LOOSE {
+            let pieces = enclosure.segments().len();
+            return Err(InputError::new(format!(
+                "the function `{text}` turns too often on its domain: {pieces} pieces, which are the most, leave it unknown by \
+                 {:.1e}",
+                enclosure.radius()
+            ))
+            .help(
+                "narrow the domain, or split it over several calls; a call inside a call multiplies how often its function \
+                 turns, so that each level costs as many times more",
+            )
+            .into());
+        }
         Ok(Function {
             text: text.to_owned(),
             target: (expression, domain),

@@ -9,12 +9,13 @@ use super::input::{Capture, Part};
 use crate::verdict::FirmwareErrors;
 
 /// Held-out error of corrected codes. `effects` are the coefficients of the steps alone, `all` those with the
-/// base.
+/// base; `applied` are the effects that the firmware takes away: these, or none.
 pub fn corrected(
     capture: &Capture,
     model: &Model,
     all: &[Vec<f64>; 2],
     effects: &[Vec<f64>; 2],
+    applied: &[Vec<f64>; 2],
 ) -> FirmwareErrors {
     let mut rows = Rows::new();
     let (mut sum, mut count, mut largest) = (0.0, 0.0, 0.0f64);
@@ -23,7 +24,7 @@ pub fn corrected(
             let (start, n) = (chunk.start, chunk.len());
             rows.fill(capture, model, chunk);
             for channel in 0..2 {
-                let effects = &effects[channel];
+                let (effects, applied) = (&effects[channel], &applied[channel]);
                 // What the base puts beyond the declared tone is no error: rate and quadrature.
                 let base: Vec<f64> = all[channel]
                     .iter()
@@ -33,7 +34,7 @@ pub fn corrected(
                 for i in (0..n).filter(|i| !capture.is_left_out(start + i)) {
                     let code = rows.code(channel, i);
                     let correction =
-                        bend(model, effects, code) + phased(&rows, channel, i, effects);
+                        bend(model, applied, code) + phased(&rows, channel, i, applied);
                     let corrected = (code - correction + 0.5).floor();
                     let declared = code - rows.target[channel][i];
                     let error = corrected - declared - rows.value(channel, i, &base);
@@ -72,4 +73,38 @@ fn phased(rows: &Rows, channel: usize, i: usize, coefficients: &[f64]) -> f64 {
         .filter(|k| at(*k) != 0.0)
         .filter_map(|k| Some(at(k) * rows.dense[channel].get(k)?.get(i)?))
         .sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::analyse;
+    use super::super::synthetic::Made;
+
+    #[test]
+    fn an_offset_below_half_a_code_is_nothing_for_firmware() {
+        let of = |offset: f64| {
+            let made = Made {
+                offset,
+                noise: 0.2,
+                rows: 8000,
+                ..Made::CLEAN
+            };
+            let found = analyse(&made.capture()).unwrap();
+            assert!(
+                found.steps.iter().any(|s| s.effect == "adc_offset"),
+                "{offset}"
+            );
+            let told = found.warnings.iter().find(|w| w.code == "firmware_useless");
+            (found.firmware, told.map(|w| w.message.clone()))
+        };
+        let (firmware, told) = of(0.4);
+        assert!(!firmware.compensable && firmware.heldout_rms.is_none());
+        let told = told.unwrap();
+        assert!(
+            told.contains("no better than none") && told.contains("nothing is emitted"),
+            "{told}"
+        );
+        let (firmware, told) = of(3.0);
+        assert!(firmware.compensable && firmware.heldout_rms.is_some() && told.is_none());
+    }
 }

@@ -163,6 +163,9 @@ pub fn read(path: &Path, adc_bits: u32) -> Result<(Capture, Vec<Warning>)> {
     let mut codes = [Vec::new(), Vec::new()];
     let (mut drive, mut sense) = (Vec::new(), Vec::new());
     let mut warnings = Vec::new();
+    if !reader.notes().is_empty() {
+        warnings.push(Warning::general("capture_form", reader.notes().join("; ")));
+    }
     while reader.read_block(&mut drive, &mut sense, 1 << 16)? > 0 {
         let [d, s] = &mut codes;
         let room = MOST_ROWS - d.len();

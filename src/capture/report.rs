@@ -167,6 +167,7 @@ pub fn findings(capture: &Capture, known: &Known, plain: &Model, fitted: &Fitted
         fitted,
         &taken,
         (&combos, &solved),
+        &after,
         &mut warnings,
     );
     let evidence = rivals::evidence(capture, known, fitted, &mut search, &steps, &taken);
@@ -373,6 +374,7 @@ fn firmware_errors(
     fitted: &Fitted,
     taken: &[Effect],
     (combos, solved): (&[&Combo], &Solved),
+    after: &Errors,
     warnings: &mut Vec<Warning>,
 ) -> FirmwareErrors {
     let not: Vec<&str> = taken
@@ -401,5 +403,19 @@ fn firmware_errors(
     } else {
         spread(combos, &own)
     };
-    firmware::corrected(capture, last, &last.coefficients, &effects)
+    let all = &last.coefficients;
+    let none = [vec![0.0; ALL], vec![0.0; ALL]];
+    let firmware = firmware::corrected(capture, last, all, &effects, &effects);
+    if taken.is_empty() {
+        return firmware;
+    }
+    // By the same measure: the quantiser's own error is in the figures before the steps, and not in these.
+    let without = firmware::corrected(capture, last, all, &effects, &none);
+    let without = without.heldout_rms.unwrap_or(f64::NAN);
+    firmware
+        .unless_useless(without, after.heldout_rms, "lsb")
+        .unwrap_or_else(|told| {
+            warnings.push(Warning::general("firmware_useless", told));
+            FirmwareErrors::default()
+        })
 }

@@ -133,6 +133,9 @@ fn write(rows: &mut Rows, columns: usize, mut index: u64, writer: &mut RowWriter
 }
 
 pub(super) fn warn_of_mismatches(design: &Design, capture: &CaptureReader) {
+    for note in capture.notes() {
+        talk!("read: {note}");
+    }
     let nco = &design.circuit.nco;
     let circle = 1i128 << nco.phase_bits;
     let word = i128::from(nco.tuning_word).rem_euclid(circle) as u128;

@@ -38,6 +38,9 @@ impl Unit {
 }
 
 fn short(value: f64) -> String {
+    if value != 0.0 && value.abs() < 1e-3 {
+        return format!("{value:e}");
+    }
     format!("{:.6}", value)
         .trim_end_matches('0')
         .trim_end_matches('.')

@@ -51,13 +51,16 @@ pub fn calibrate(
     formats::choose_thermometer(design, record, &mut mapping)?;
     let options = FitOptions {
         order: match design.fit.order {
-            FitOrder::ByRecord if simulated => FitOrder::Fixed(2),
+            FitOrder::ByRecord if simulated => FitOrder::Fixed(SIMULATED_ORDER),
             FitOrder::ByRecord => FitOrder::Auto,
             order => order,
         },
         ..design.fit.clone()
     };
-    let fit = thermal::fit(record, &mapping, &options)?;
+    let mut fit = thermal::fit(record, &mapping, &options)?;
+    if design.fit.order == FitOrder::ByRecord {
+        fit.reason = by_record(&fit, simulated);
+    }
     warnings.extend(fit.warnings.iter().cloned());
     let mut chosen = formats::fill(design, &fit, record)?;
     let rounded = coefficients::round(design, &fit)?;
@@ -80,6 +83,26 @@ pub fn calibrate(
         kept,
         warnings,
     })
+}
+
+/// The order of a simulated run where the design leaves it to the record (convention: that of the paper).
+const SIMULATED_ORDER: u32 = 2;
+
+/// Why a fit has its order, with the rule that `by_record` is where a simulated run and its own record, measured, get
+/// different ones.
+fn by_record(fit: &BaselineFit, simulated: bool) -> String {
+    let given = format!("order {SIMULATED_ORDER} as given");
+    match (simulated, fit.reason.strip_prefix(&given)) {
+        (true, Some(rest)) if !rest.is_empty() => format!(
+            "order {SIMULATED_ORDER}, as the paper has it for a simulated run{rest}, which `run --record` of this run's record \
+             takes (fit.order = \"by_record\")"
+        ),
+        (false, _) if fit.order != SIMULATED_ORDER as usize => format!(
+            "{}; the simulated run of a design takes {SIMULATED_ORDER} whatever its record says (fit.order = \"by_record\")",
+            fit.reason
+        ),
+        _ => fit.reason.clone(),
+    }
 }
 
 /// A compensation by the phase is of no use where a phase loop holds it: its formats are chosen anew.

@@ -39,6 +39,7 @@ impl Results {
             same::refuse(&path, inputs)?;
             super::check_writable(&path)?;
         }
+        refuse_foreign(out, planned)?;
         let failed = |e: &io::Error| io_error(out, "make the folder", e);
         let (existing, missing) = existing(out).map_err(|e| failed(&e))?;
         if !existing.is_dir() {
@@ -130,11 +131,14 @@ impl Results {
         self.removed.push(name.as_ref().to_path_buf());
     }
 
-    /// Puts all files under their names.
+    /// Puts all files under their names, what tells of the others first: after an end in the middle the next run knows
+    /// them.
     ///
     /// # Errors
     /// A file that cannot be put there; then none is, but for a name that became unusable at this very moment.
-    pub fn finish(self) -> Result<()> {
+    pub fn finish(mut self) -> Result<()> {
+        let is_told_by = |name: &PathBuf| RESULTS.iter().any(|r| name.as_os_str() == *r);
+        self.names.sort_by_key(|name| !is_told_by(name));
         if let Some((from, to)) = &self.new
             && to.symlink_metadata().is_err()
         {
@@ -182,6 +186,34 @@ impl Results {
             }
         }
         Ok(())
+    }
+}
+
+/// Files that tell that others beside them are results.
+const RESULTS: [&str; 5] = [
+    "summary.json",
+    "closure.json",
+    "simulate.json",
+    "equiv.json",
+    "selftest.json",
+];
+
+/// Refuses to write over a design or a table that no earlier run has put there: a folder of the user's own files has such
+/// names as well.
+fn refuse_foreign(out: &Path, planned: &[&str]) -> Result<()> {
+    if !planned.iter().any(|name| RESULTS.contains(name))
+        || RESULTS.iter().any(|r| out.join(r).is_file())
+    {
+        return Ok(());
+    }
+    let is_likely = |name: &&&str| name.ends_with(".toml") || name.ends_with(".csv");
+    let foreign = planned.iter().filter(is_likely).map(|name| out.join(name));
+    match foreign.into_iter().find(|path| path.is_file()) {
+        None => Ok(()),
+        Some(path) => Err(InputError::new("this file would be written over, and it is no result of an earlier run: nothing beside it says so")
+            .in_file(path)
+            .help("move it away, or give another place with --out")
+            .into()),
     }
 }
 

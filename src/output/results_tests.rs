@@ -76,9 +76,14 @@ fn an_input_is_never_written_over_by_any_name() {
     std::os::unix::fs::symlink(top.path(), out.join("up")).unwrap();
     refused("up/input.toml");
     // The side-car of a capture is read as well.
-    let capture = top.path().join("input.npy");
-    fs::write(&capture, "").unwrap();
-    assert!(Results::claim(top.path(), &["input.toml"], &[capture]).is_err());
+    for name in ["input.npy", "input.raw", "input.csv", "input.csv.gz"] {
+        let capture = top.path().join(name);
+        fs::write(&capture, "").unwrap();
+        assert!(
+            Results::claim(top.path(), &["input.toml"], &[capture]).is_err(),
+            "{name}"
+        );
+    }
     assert!(Results::claim(top.path(), &["input.toml"], &[]).is_ok());
     assert_eq!(fs::read(&input).unwrap(), b"mine");
 }
@@ -124,4 +129,20 @@ fn what_cannot_be_a_folder_is_refused_before_the_work() {
     assert!(Results::claim(top.path(), &["a.json"], &[]).is_err());
     assert_eq!(listed(top.path()), ["a.json", "file"]);
     assert_eq!(fs::read(&file).unwrap(), b"kept");
+}
+
+#[test]
+fn a_users_own_design_is_not_taken_for_an_earlier_result() {
+    let top = tempfile::tempdir().unwrap();
+    let planned = ["record.csv", "design.toml", "summary.json"];
+    fs::write(top.path().join("design.toml"), "mine").unwrap();
+    let error = Results::claim(top.path(), &planned, &[]).unwrap_err();
+    assert_eq!(error.exit_status(), 2);
+    assert!(
+        error.to_string().contains("no result of an earlier run"),
+        "{error}"
+    );
+    // Beside a summary it is one, whichever command wrote it.
+    fs::write(top.path().join("closure.json"), "{}").unwrap();
+    assert!(Results::claim(top.path(), &planned, &[]).is_ok());
 }

@@ -14,11 +14,10 @@ pub fn refuse(output: &Path, inputs: &[PathBuf]) -> Result<()> {
     };
     let is_own = |path: &Path| identity(path).as_ref() == Some(&own);
     for input in inputs {
-        let sidecar = input.extension().is_some_and(|e| e == "npy");
-        let sidecar = sidecar.then(|| input.with_extension("toml"));
-        if let Some(read) = [Some(input.clone()), sidecar]
-            .into_iter()
-            .flatten()
+        // Of a capture: `c.toml` beside `c.npy`, `c.csv`, `c.csv.gz`, `c.raw`.
+        let sidecars = [input.clone(), input.with_extension("")].map(|p| p.with_extension("toml"));
+        if let Some(read) = std::iter::once(input.clone())
+            .chain(sidecars)
             .find(|p| is_own(p))
         {
             let what = format!("{} would be written over this input", output.display());

@@ -45,7 +45,7 @@ pub fn read_any(path: &Path, mapping: &RecordMapping) -> Result<(ThermalRecord, 
 }
 
 /// The first bytes of a stream, and the stream with them.
-fn headed(mut input: Box<dyn Read>) -> std::io::Result<(Vec<u8>, Box<dyn Read>)> {
+fn headed(mut input: Box<dyn Read + Send>) -> std::io::Result<(Vec<u8>, Box<dyn Read + Send>)> {
     let mut head = Vec::new();
     input
         .by_ref()

@@ -1,15 +1,17 @@
-//! A capture: one row of ADC codes (drive, sense) a sample, read as a stream from CSV or NPY
-//! (`docs/manual.md` section 2, `docs/manual.md`).
+//! A capture: one row of ADC codes (drive, sense) a sample, read as a stream from CSV, NPY or raw samples
+//! (`docs/manual.md`, "Replay and captures").
 //!
 //! The file is never held whole: a reader needs some hundred KiB and the caller's block.
 
+use super::bench_keys::BenchKeys;
 pub(crate) use super::capture_codes::COLUMNS;
 pub(super) use super::capture_codes::{Codes, HEADER_HELP};
 use super::capture_csv::CsvSource;
 pub use super::capture_meta::{CaptureMeta, mismatch_warnings};
 use super::capture_npy::NpySource;
 use super::capture_places::Places;
-use super::npy_header;
+use super::capture_raw::{self, RawSource, is_named_raw};
+use super::{npy_header, unpack};
 use crate::error::{Error, InputError, Result, io_error};
 use crate::input;
 use crate::numeric::format::Format;
@@ -20,6 +22,7 @@ use std::path::Path;
 pub struct CaptureReader {
     meta: CaptureMeta,
     places: Places,
+    notes: Vec<String>,
     source: Source,
     /// What stopped the reading; told again at every further call.
     failed: Option<Error>,
@@ -28,6 +31,7 @@ pub struct CaptureReader {
 enum Source {
     Csv(CsvSource),
     Npy(NpySource),
+    Raw(RawSource),
 }
 
 /// A file that calls itself NPY is read as nothing else.
@@ -36,10 +40,65 @@ fn is_named_npy(path: &Path) -> bool {
         .is_some_and(|e| e.eq_ignore_ascii_case("npy"))
 }
 
+/// Bytes that tell what a file is: text has none below 9 in as many, and 16-bit samples hardly none (convention).
+const START_BYTES: u64 = 512;
+
+/// The keys of a file of raw samples; `None` for one that is to be read as text.
+///
+/// # Errors
+/// A broken side-car; a file that is named as raw and has no side-car that says what its samples are.
+fn raw_keys(
+    path: &Path,
+    start: &[u8],
+    places: &mut Places,
+) -> Result<Option<(CaptureMeta, BenchKeys)>> {
+    let is_text = |b: &u8| !matches!(b, 0..=8 | 14..=31);
+    let named = is_named_raw(path);
+    if unpack::is_packed(start) || (!named && start.iter().all(is_text)) {
+        return Ok(None);
+    }
+    let (meta, keys) = CaptureMeta::of_sidecar(path, places)?;
+    match keys.item {
+        Some(_) => Ok(Some((meta, keys))),
+        None if named => Err(capture_raw::without_keys(path).into()),
+        None => Ok(None),
+    }
+}
+
+/// The text of a packed file; any other stream as it is.
+///
+/// # Errors
+/// A packed file that holds no text, or is none.
+fn unpacked_text(
+    path: &Path,
+    start: &[u8],
+    input: Box<dyn Read + Send>,
+) -> Result<Box<dyn Read + Send>> {
+    let failed = |e: std::io::Error| io_error(path, "read the capture", &e);
+    let (mut input, packed) = unpack::unpacked(start, input).map_err(failed)?;
+    if !packed {
+        return Ok(input);
+    }
+    let mut head = Vec::new();
+    input
+        .by_ref()
+        .take(START_BYTES)
+        .read_to_end(&mut head)
+        .map_err(failed)?;
+    if head.first() == npy_header::MAGIC.first() || head.contains(&0) {
+        return Err(InputError::new("this packed file holds no CSV")
+            .in_file(path)
+            .help("unpack it: of packed captures CSV alone is read as it is")
+            .into());
+    }
+    Ok(Box::new(std::io::Cursor::new(head).chain(input)))
+}
+
 impl CaptureReader {
     /// Opens a capture and reads its header. The content decides what it is: an NPY magic makes it
-    /// NPY (meta from the side-car of the same stem), anything else is read as CSV (meta from the
-    /// comment lines). `adc` is the format that every code must fit.
+    /// NPY (meta from the side-car of the same stem), what is no text and has a side-car that says `item` is raw
+    /// samples, anything else is read as CSV (meta from the comment lines), packed with gzip or zstd or as it is. `adc`
+    /// is the format that every code must fit.
     ///
     /// # Errors
     /// A file that cannot be read, is empty or has no usable header; a broken side-car or comment.
@@ -47,9 +106,10 @@ impl CaptureReader {
         let failed = |e: std::io::Error| io_error(path, "read the capture", &e);
         let mut file = input::open(path, "capture")?;
         let kind = file.metadata().map_err(failed)?;
+        let length = kind.is_file().then_some(kind.len());
         let mut start = Vec::new();
         file.by_ref()
-            .take(npy_header::MAGIC.len() as u64)
+            .take(START_BYTES)
             .read_to_end(&mut start)
             .map_err(failed)?;
         if start.is_empty() {
@@ -60,23 +120,38 @@ impl CaptureReader {
         }
         let codes = Codes::of(adc);
         let mut places = Places::default();
-        let (meta, source) = if start.first() == npy_header::MAGIC.first() || is_named_npy(path) {
-            let npy = NpySource::open(path, file, kind.is_file().then_some(kind.len()), codes)?;
-            (
-                CaptureMeta::of_sidecar(path, &mut places)?,
-                Source::Npy(npy),
-            )
+        let is_npy = start.first() == npy_header::MAGIC.first() || is_named_npy(path);
+        let (meta, source, notes) = if is_npy {
+            let (meta, keys) = CaptureMeta::of_sidecar(path, &mut places)?;
+            if keys.columns == [None, None] && keys.volts_per_code.is_none() {
+                let npy = NpySource::open(path, file, length, codes)?;
+                (meta, Source::Npy(npy), Vec::new())
+            } else {
+                let (raw, notes) = RawSource::open_npy(path, file, length, codes, &keys)?;
+                (meta, Source::Raw(raw), notes)
+            }
+        } else if let Some((meta, keys)) = raw_keys(path, &start, &mut places)? {
+            let (raw, notes) = RawSource::open(path, file, length, codes, &keys)?;
+            (meta, Source::Raw(raw), notes)
         } else {
-            let input = std::io::Cursor::new(start).chain(file);
-            let (csv, meta) = CsvSource::open(path, Box::new(input), codes, &mut places)?;
-            (meta, Source::Csv(csv))
+            let input: Box<dyn Read + Send> =
+                Box::new(std::io::Cursor::new(start.clone()).chain(file));
+            let input = unpacked_text(path, &start, input)?;
+            let (csv, meta, notes) = CsvSource::open(path, input, codes, &mut places)?;
+            (meta, Source::Csv(csv), notes)
         };
         Ok(CaptureReader {
             meta,
             places,
+            notes,
             source,
             failed: None,
         })
+    }
+
+    /// What was chosen to read it, where its form left a choice.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
     }
 
     /// What the capture says of itself.
@@ -94,6 +169,7 @@ impl CaptureReader {
         match &self.source {
             Source::Csv(_) => None,
             Source::Npy(npy) => Some(npy.rows()),
+            Source::Raw(raw) => Some(raw.rows()),
         }
     }
 
@@ -117,6 +193,7 @@ impl CaptureReader {
             let outcome = match &mut self.source {
                 Source::Csv(csv) => csv.read(drive, sense, max_rows),
                 Source::Npy(npy) => npy.read(drive, sense, max_rows),
+                Source::Raw(raw) => raw.read(drive, sense, max_rows),
             };
             self.failed = outcome.err();
             // A reading that fails between two columns leaves one of them longer.

@@ -1,8 +1,11 @@
 //! A capture in CSV: its own byte parser, a line at a time out of one bounded buffer.
 
+use super::bench_csv;
+use super::bench_keys::{BenchKeys, Scale};
 use super::capture::{COLUMNS, Codes, HEADER_HELP};
+use super::capture_header::{Layout, names_a_column, read_comment, read_header};
 use super::capture_lines::{Line, Lines};
-use super::capture_meta::{CaptureMeta, Value};
+use super::capture_meta::CaptureMeta;
 use super::capture_places::Places;
 use crate::error::{Error, InputError, Result};
 use std::io::Read;
@@ -16,30 +19,33 @@ pub(super) struct CsvSource {
     lines: Lines,
     layout: Layout,
     codes: Codes,
+    /// How the rows of a bench's file are read; `None`: as those of the contract.
+    bench: Option<Bench>,
     /// The first of the empty lines just passed: fine at the end, refused before a row.
     empty_line: Option<usize>,
 }
 
-/// Where the two columns stand.
+/// What differs in a bench's file.
 #[derive(Debug, Clone, Copy)]
-struct Layout {
-    /// Cells in every row.
-    cells: usize,
-    /// 0-based cell of `drive_code` and of `sense_code`.
-    used: [usize; 2],
+struct Bench {
+    separator: u8,
+    /// Of volts; `None`: the cells are codes.
+    scale: Option<Scale>,
 }
 
 impl CsvSource {
-    /// Reads comments and header from `input`, which stands at the start of the file.
+    /// Reads comments and header from `input`, which stands at the start of the file. A header without the contract's
+    /// columns is read as a bench's file: the third says what was chosen.
     pub(super) fn open(
         path: &Path,
         input: Box<dyn Read + Send>,
         codes: Codes,
         places: &mut Places,
-    ) -> Result<(Self, CaptureMeta)> {
+    ) -> Result<(Self, CaptureMeta, Vec<String>)> {
         let mut lines = Lines::new(path, input);
         let mut meta = CaptureMeta::default();
-        let layout = loop {
+        let mut keys = BenchKeys::default();
+        let (header, number) = loop {
             let number = lines.number;
             let Some(bytes) = lines.next()? else {
                 return Err(InputError::new("the capture has no header line")
@@ -57,8 +63,48 @@ impl CsvSource {
             };
             match line.bytes.trim_ascii_start().first() {
                 None => {}
-                Some(b'#') => read_comment(line, &mut meta, places)?,
-                Some(_) => break read_header(line, places)?,
+                Some(b'#') => read_comment(line, &mut meta, &mut keys, places)?,
+                Some(_) => break (line.bytes.to_vec(), number),
+            }
+        };
+        let line = Line {
+            path,
+            number,
+            bytes: &header,
+        };
+        let (layout, bench, notes) = match read_header(line, places) {
+            Ok(layout) => (layout, None, Vec::new()),
+            Err(e) if names_a_column(&header) || header.contains(&0) => return Err(e),
+            Err(e) => {
+                let (beside, beside_keys) = CaptureMeta::of_sidecar(path, places)?;
+                meta = meta.or(beside);
+                let mut bytes = header.clone();
+                bytes.push(b'\n');
+                bytes.extend_from_slice(lines.ahead()?);
+                // A unit may be in Latin-1, and names are for messages.
+                let text = String::from_utf8_lossy(&bytes);
+                let found =
+                    bench_csv::table((path, number), &text, &keys.or(beside_keys), &mut meta)?;
+                let Some(table) = found.filter(|table| table.before > 0) else {
+                    return Err(e);
+                };
+                // The header's own line is taken already.
+                let skipped: Vec<usize> = bytes
+                    .split_inclusive(|b| *b == b'\n')
+                    .take(table.before)
+                    .skip(1)
+                    .map(<[u8]>::len)
+                    .collect();
+                lines.take(skipped.iter().sum(), skipped.len());
+                let layout = Layout {
+                    cells: table.cells,
+                    used: table.used,
+                };
+                let bench = Bench {
+                    separator: table.separator,
+                    scale: table.scale,
+                };
+                (layout, Some(bench), table.notes)
             }
         };
         let source = CsvSource {
@@ -66,9 +112,10 @@ impl CsvSource {
             lines,
             layout,
             codes,
+            bench,
             empty_line: None,
         };
-        Ok((source, meta))
+        Ok((source, meta, notes))
     }
 
     /// Appends up to `max_rows` rows; fewer = the end, or the error that follows them.
@@ -84,7 +131,7 @@ impl CsvSource {
                 return Ok(());
             }
             let (mut used, mut rows) = (0, 0);
-            if self.empty_line.is_none() {
+            if self.empty_line.is_none() && self.bench.is_none() {
                 while drive.len() < max_rows {
                     let Some((d, s, next)) = fast_row(bytes, used, self.layout, self.codes) else {
                         break;
@@ -126,7 +173,10 @@ impl CsvSource {
                 number,
                 bytes,
             };
-            let [d, s] = slow_row(line, self.layout, self.codes)?;
+            let [d, s] = match self.bench {
+                None => slow_row(line, self.layout, self.codes)?,
+                Some(bench) => bench_row(line, self.layout, self.codes, bench)?,
+            };
             drive.push(d);
             sense.push(s);
         }
@@ -258,6 +308,58 @@ fn slow_row(line: Line<'_>, layout: Layout, codes: Codes) -> Result<[i32; 2]> {
     problem.map_or(Ok(found), Err)
 }
 
+/// Reads a row of a bench's file: blank cells at its end are none, and of the others there are no more than the header
+/// has.
+fn bench_row(line: Line<'_>, layout: Layout, codes: Codes, bench: Bench) -> Result<[i32; 2]> {
+    let text = String::from_utf8_lossy(line.bytes);
+    let cells = bench_csv::cells(&text, bench.separator);
+    let help = "repair the row or take it away";
+    let start = |cell: usize| -> usize {
+        let cells = line.bytes.split(|b| *b == bench.separator).take(cell);
+        cells.map(|c| c.len() + 1).sum()
+    };
+    if cells.len() > layout.cells {
+        let message = format!(
+            "this row has {} cells, the table {}",
+            cells.len(),
+            layout.cells
+        );
+        return Err(line.refuse(start(layout.cells), &message).help(help).into());
+    }
+    let mut found = [0; 2];
+    for ((out, column), name) in found.iter_mut().zip(layout.used).zip(COLUMNS) {
+        let cell = cells.get(column).map_or("", String::as_str);
+        let shown = shorten(cell.as_bytes());
+        let refuse = |message: &str| line.refuse(start(column).min(line.bytes.len()), message);
+        let Some(value) = bench_csv::number(cell, bench.separator) else {
+            let message = match cell.is_empty() {
+                true => format!("the cell of the {name} is empty"),
+                false => format!("`{shown}` of the {name} is no finite number"),
+            };
+            return Err(refuse(&message).help(help).into());
+        };
+        let code = match bench.scale {
+            Some(scale) => scale.code(value),
+            None if value.fract() != 0.0 => {
+                let message = format!("{name} `{shown}` is no integer");
+                let help = "a code is a whole number; for volts write `volts_per_code` into the side-car or a comment line";
+                return Err(refuse(&message).help(help).into());
+            }
+            None => Some(value)
+                .filter(|v| v.abs() <= f64::from(i32::MAX))
+                .map(|v| v as i32),
+        };
+        let told = match (bench.scale, code) {
+            (Some(_), Some(code)) => format!("{shown} (code {code})"),
+            _ => shown,
+        };
+        *out = code
+            .filter(|code| (codes.min..=codes.max).contains(code))
+            .ok_or_else(|| line.place(start(column), codes.refuse(&told, name)))?;
+    }
+    Ok(found)
+}
+
 /// Reads one cell that is used; `start` is its byte offset in the line.
 fn read_cell(line: Line<'_>, start: usize, cell: &[u8], name: &str, codes: Codes) -> Result<i32> {
     let lead = cell.iter().take_while(|&&b| is_blank(b)).count();
@@ -298,75 +400,6 @@ fn shorten(text: &[u8]) -> String {
         shown.push('…');
     }
     shown
-}
-
-/// Reads one comment line `# key = value`; any other comment, and an unknown key, is passed over.
-/// What follows a further `#` is a remark.
-fn read_comment(line: Line<'_>, meta: &mut CaptureMeta, places: &mut Places) -> Result<()> {
-    let text = String::from_utf8_lossy(line.bytes);
-    let help = "a comment line of a capture reads `# fs_hz = 224000.0`; correct the value, or take \
-                the line away";
-    let Some((left, right)) = text.split_once('=') else {
-        return Ok(());
-    };
-    let key = left.trim().trim_start_matches('#').trim();
-    let Some(key) = CaptureMeta::KEYS.into_iter().find(|&known| known == key) else {
-        return Ok(());
-    };
-    let refuse = |offset: usize, message: String| {
-        InputError::new(message)
-            .in_file(line.path)
-            .at_offset(&text, offset)
-            .at(line.number, text[..offset].chars().count() + 1)
-            .help(help)
-    };
-    if places.knows(key) {
-        let offset = left.find(key).unwrap_or(0);
-        return Err(refuse(offset, format!("`{key}` is given a second time")).into());
-    }
-    let value = right.split('#').next().unwrap_or("");
-    let offset = left.len() + 1 + (value.len() - value.trim_start().len());
-    places.keep(key, refuse(offset, String::new()));
-    meta.set(key, Value::of_text(value.trim()))
-        .map_err(|problem| refuse(offset, problem).into())
-}
-
-/// Finds the two columns in the header line.
-fn read_header(line: Line<'_>, places: &mut Places) -> Result<Layout> {
-    if line.bytes.contains(&0) || line.bytes.starts_with(b"\xff\xfe") {
-        let message = "this is neither a CSV file in UTF-8 nor an NPY file (it has binary bytes)";
-        let e = InputError::new(message).in_file(line.path);
-        return Err(e.help(HEADER_HELP).into());
-    }
-    let names: Vec<&[u8]> = line
-        .bytes
-        .split(|&b| b == b',')
-        .map(<[u8]>::trim_ascii)
-        .collect();
-    let mut used = [0; 2];
-    for (column, place) in COLUMNS.into_iter().zip(&mut used) {
-        let is_it = |name: &&[u8]| *name == column.as_bytes();
-        let Some(first) = names.iter().position(is_it) else {
-            let message = format!("the header has no column `{column}`");
-            return Err(line.refuse(0, &message).help(HEADER_HELP).into());
-        };
-        let before = |cell: usize| -> usize {
-            let cells = line.bytes.split(|&b| b == b',').take(cell);
-            cells.map(|cell| cell.len() + 1).sum()
-        };
-        places.keep(column, line.refuse(before(first), ""));
-        if let Some(again) = names.iter().rposition(is_it).filter(|&last| last > first) {
-            return Err(line
-                .refuse(before(again), &format!("the header has `{column}` twice"))
-                .help("rename one of the two columns")
-                .into());
-        }
-        *place = first;
-    }
-    Ok(Layout {
-        cells: names.len(),
-        used,
-    })
 }
 
 #[cfg(test)]

@@ -75,6 +75,37 @@ impl Lines {
         Ok(&self.buffer[self.start..self.whole])
     }
 
+    /// As [`Lines::whole_lines`], as many as the buffer holds: for what must be seen before it is taken.
+    pub(super) fn ahead(&mut self) -> Result<&[u8]> {
+        self.whole_lines()?;
+        self.buffer.copy_within(self.start..self.filled, 0);
+        self.whole -= self.start;
+        self.filled -= self.start;
+        self.start = 0;
+        while !self.ended && self.filled < self.buffer.len() {
+            let count = match self.input.read(&mut self.buffer[self.filled..]) {
+                Ok(count) => count,
+                Err(e) if e.kind() == std::io::ErrorKind::Interrupted => continue,
+                Err(e) => return Err(io_error(&self.path, "read the capture", &e)),
+            };
+            let fresh = self.filled..self.filled + count;
+            self.filled = fresh.end;
+            if count == 0 {
+                self.ended = true;
+                if self.filled > self.whole {
+                    self.buffer.truncate(self.filled);
+                    self.buffer.push(b'\n');
+                    self.filled += 1;
+                    self.whole = self.filled;
+                }
+            } else if let Some(last) = self.buffer[fresh.clone()].iter().rposition(|&b| b == b'\n')
+            {
+                self.whole = fresh.start + last + 1;
+            }
+        }
+        Ok(&self.buffer[..self.whole])
+    }
+
     /// Passes over lines of [`Lines::whole_lines`].
     pub(super) fn take(&mut self, bytes: usize, lines: usize) {
         self.start += bytes;

@@ -1,10 +1,11 @@
 //! What a capture says of itself: the comment lines `# key = value` of a CSV file, or the side-car
 //! TOML of an NPY file (`docs/manual.md`, "Replay and captures").
 
+use super::bench_keys::{BenchKeys, KeyValue};
 use super::capture_places::Places;
 use crate::error::{InputError, Result, io_error};
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use toml::de::{DeTable, DeValue};
 
 /// A side-car larger than this is none.
@@ -137,17 +138,21 @@ impl CaptureMeta {
         outcome.map_err(|problem| format!("`{key}` {problem}"))
     }
 
-    /// Reads the side-car of an NPY capture: the TOML file of the same stem, keys at top level.
-    /// No such file = nothing is known; other keys are ignored. A file that is no TOML, or a key
+    /// Reads the side-car of a capture: the TOML file of the same stem, keys at top level; with those that say
+    /// what a bench wrote. No such file = nothing is known; other keys are ignored. A file that is no TOML, or a key
     /// with the wrong type, is refused with its line.
-    pub(super) fn of_sidecar(capture: &Path, places: &mut Places) -> Result<CaptureMeta> {
-        let path = capture.with_extension("toml");
+    pub(super) fn of_sidecar(
+        capture: &Path,
+        places: &mut Places,
+    ) -> Result<(CaptureMeta, BenchKeys)> {
+        let path = sidecar_of(capture);
         let mut meta = CaptureMeta::default();
+        let mut keys = BenchKeys::default();
         if path == capture {
-            return Ok(meta);
+            return Ok((meta, keys));
         }
         let Some(text) = read_sidecar(&path)? else {
-            return Ok(meta);
+            return Ok((meta, keys));
         };
         let help = "the side-car holds `key = value` lines such as `fs_hz = 224000.0`; correct it \
                     or take it away (it is optional for `replay`)";
@@ -164,9 +169,34 @@ impl CaptureMeta {
         for (key, value) in table.get_ref() {
             places.keep(key.get_ref(), refuse(value.span().start, String::new()));
             meta.set(key.get_ref(), Value::of_toml(value.get_ref()))
+                .and_then(|()| keys.set(key.get_ref(), &KeyValue::of_toml(value.get_ref())))
                 .map_err(|problem| refuse(value.span().start, problem))?;
         }
-        Ok(meta)
+        Ok((meta, keys))
+    }
+
+    /// These, and what only `other` says.
+    pub(super) fn or(self, other: CaptureMeta) -> CaptureMeta {
+        CaptureMeta {
+            fs_hz: self.fs_hz.or(other.fs_hz),
+            ftw: self.ftw.or(other.ftw),
+            adc_bits: self.adc_bits.or(other.adc_bits),
+            drive_amplitude_codes: self.drive_amplitude_codes.or(other.drive_amplitude_codes),
+            sense_codes_per_dps: self.sense_codes_per_dps.or(other.sense_codes_per_dps),
+            sense_phase_rad: self.sense_phase_rad.or(other.sense_phase_rad),
+            rate_dps: self.rate_dps.or(other.rate_dps),
+        }
+    }
+}
+
+/// The side-car's path: the capture's with `.toml` in place of its extension (`scope.csv.gz` has `scope.toml`).
+pub(super) fn sidecar_of(capture: &Path) -> PathBuf {
+    let is_packed = capture
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("gz") || e.eq_ignore_ascii_case("zst"));
+    match is_packed {
+        true => capture.with_extension("").with_extension("toml"),
+        false => capture.with_extension("toml"),
     }
 }
 

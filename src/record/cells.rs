@@ -83,6 +83,10 @@ pub(super) enum BadNumber {
     Minus,
     /// A number with something after it.
     Unit,
+    /// A date or a time of day: `2024-05-01T10:00:00Z`, `10:00:00`.
+    Calendar,
+    /// Words for "not measured": `NA`, `null`, `-`.
+    NotMeasured,
     /// Anything else.
     Other,
 }
@@ -100,6 +104,12 @@ impl BadNumber {
             }
             BadNumber::Minus => "write the minus sign as '-' (ASCII)",
             BadNumber::Unit => "the unit belongs in the column's name: leave the number alone here",
+            BadNumber::Calendar => {
+                "write seconds since the record's start: a time of the calendar is no clock (spreadsheet: (A2-A$2)*86400)"
+            }
+            BadNumber::NotMeasured => {
+                "leave the cell empty, or write nan: empty or nan = not measured"
+            }
             BadNumber::Other => "write a number such as -1.5 or 2e-3; empty or nan = not measured",
         }
     }
@@ -136,9 +146,22 @@ pub(super) fn number(text: &str) -> Result<f64, BadNumber> {
         .any(|(i, c)| c.is_whitespace() && plain(&text[..i]))
     {
         BadNumber::Unit
+    } else if is_of_calendar(text) {
+        BadNumber::Calendar
+    } else if ["na", "n/a", "null", "none", "-", "--", "#n/a"].contains(&&*text.to_lowercase()) {
+        BadNumber::NotMeasured
     } else {
         BadNumber::Other
     })
+}
+
+/// Digits with at least two colons, dashes or slashes between them, as dates and times of day have.
+fn is_of_calendar(text: &str) -> bool {
+    let of_time = |c: char| c.is_ascii_digit() || ":-/.TZ+ ".contains(c);
+    let marks = |mark: char| text.matches(mark).count();
+    text.starts_with(|c: char| c.is_ascii_digit())
+        && text.chars().all(of_time)
+        && [':', '-', '/'].into_iter().any(|m| marks(m) >= 2)
 }
 
 #[cfg(test)]
@@ -167,13 +190,18 @@ mod tests {
             assert!(number(missing).unwrap().is_nan(), "{missing}");
         }
         for (text, why) in [
+            ("2024-05-01T10:00:00Z", BadNumber::Calendar),
+            ("10:00:00.5", BadNumber::Calendar),
+            ("01/05/2024", BadNumber::Calendar),
+            ("NA", BadNumber::NotMeasured),
+            ("-", BadNumber::NotMeasured),
             ("inf", BadNumber::Infinite),
             ("1e999", BadNumber::Infinite),
             ("-2e100", BadNumber::TooLarge),
             ("1,5", BadNumber::DecimalComma),
             ("\u{2212}2", BadNumber::Minus),
             ("25 degC", BadNumber::Unit),
-            ("N/A", BadNumber::Other),
+            ("N/A", BadNumber::NotMeasured),
             ("0x1F", BadNumber::Other),
         ] {
             assert_eq!(number(text), Err(why), "{text}");

@@ -296,9 +296,8 @@ pub(super) fn open_quote(line: Line<'_>, column: usize) -> InputError {
     )
 }
 
-/// Lists the file's columns and shows the part of a design file that would map `role`.
-fn suggestion(role: &str, names: &[&str]) -> String {
-    let named: Vec<&str> = names.iter().copied().filter(|n| !n.is_empty()).collect();
+/// The column among `names` that is likely meant for `role`, as names of columns go.
+fn guess<'a>(role: &str, names: &[&'a str]) -> Option<&'a str> {
     let hints: &[&str] = match role {
         "time_s" => &["time", "sec", "clock"],
         "rate_out_dps" => &["gyro", "rate", "omega", "dps", "gx", "gz"],
@@ -312,20 +311,51 @@ fn suggestion(role: &str, names: &[&str]) -> String {
         _ => &["temp", "degc"],
     };
     // "gyro" before "rate": the order of the hints is their strength.
-    let guess = hints
-        .iter()
-        .find_map(|h| named.iter().find(|n| n.to_lowercase().contains(h)))
-        .filter(|n| **n != "time_since_power_on_s");
+    let of = |hint: &&str| names.iter().find(|n| n.to_lowercase().contains(hint));
+    let found = hints.iter().find_map(of).copied();
+    found.filter(|n| *n != "time_since_power_on_s")
+}
+
+/// Lists the file's columns and shows the part of a design file that would map `role`, and what else it lacks.
+fn suggestion(role: &str, names: &[&str]) -> String {
+    let named: Vec<&str> = names.iter().copied().filter(|n| !n.is_empty()).collect();
     let listed: Vec<&str> = named.iter().copied().take(40).collect();
     let more = named.len() - listed.len();
     let mut text = format!("the file has: {}", listed.join(", "));
     if more > 0 {
         text.push_str(&format!(" and {more} more"));
     }
-    let value = guess.map_or("NAME_IN_THE_FILE", |n| n);
+    let has = |role: &str| {
+        named
+            .iter()
+            .any(|n| *n == role || units::meant(n) == Some(role))
+    };
+    let mut lines = vec![format!(
+        "{role} = \"{}\"",
+        guess(role, &named).unwrap_or("NAME_IN_THE_FILE")
+    )];
+    // What would be asked for next, where a column looks like it.
+    let others = ["time_s", "rate_out_dps", "die_degc"];
+    let others = others
+        .into_iter()
+        .filter(|other| *other != role && !has(other));
+    let others =
+        others.filter(|other| *other != "die_degc" || !THERMOMETERS.iter().any(|t| has(t)));
+    lines.extend(others.filter_map(|o| Some(format!("{o} = \"{}\"", guess(o, &named)?))));
     text.push_str(&format!(
-        "\n  say in the design which one it is:\n    [record.columns]\n    {role} = \"{value}\""
+        "\n  say in the design which one it is (a file for `run FILE` or `close --design FILE`):\n    [record.columns]\n    {}",
+        lines.join("\n    ")
     ));
+    if let Some(unitless) = guess(role, &named)
+        && is_known(role)
+        && units::stated(unitless, role).is_none()
+    {
+        text.push_str(&format!(
+            "\n  or, where it is not in {}, with its unit: {role} = {{ column = \"{unitless}\", unit = \"...\" }} ({})",
+            unit_of(role),
+            units::accepted(role)
+        ));
+    }
     if role == "time_s" {
         text.push_str(
             "\n  or, if the rows are evenly spaced and the file has no clock:\n    [record]\n    \
@@ -379,6 +409,27 @@ mod tests {
         assert!(text.contains("r.csv:3:1"), "{text}");
         assert!(text.contains("the file has: time_s, gyro_x_dps"), "{text}");
         assert!(text.contains("rate_out_dps = \"gyro_x_dps\""), "{text}");
+    }
+
+    #[test]
+    fn one_message_asks_for_all_that_is_missing() {
+        let e = resolve(at("time,temp,gyro_z,note"), &RecordMapping::default()).unwrap_err();
+        let text = e.to_string();
+        for line in [
+            "time_s = \"time\"",
+            "rate_out_dps = \"gyro_z\"",
+            "die_degc = \"temp\"",
+            "time_s = { column = \"time\", unit = ",
+        ] {
+            assert!(text.contains(line), "{line}: {text}");
+        }
+        // What is there is not asked for.
+        let e = resolve(at("time_s,gyro_z,die_degc"), &RecordMapping::default()).unwrap_err();
+        let text = e.to_string();
+        assert!(
+            !text.contains("time_s =") && !text.contains("die_degc ="),
+            "{text}"
+        );
     }
 
     #[test]

@@ -4,19 +4,23 @@
 //! says which column plays which part, `clock` puts the rows in time, `plausibility` (with `scale`
 //! and `timing`) and `frozen` look for what is readable but unlikely; `ulog` and `dataflash` read
 //! autopilots' logs, which `averager` makes rows of; `shorten` averages rows; [`read_any`] takes whatever a file is. [`capture`] streams captured ADC codes
-//! from CSV or NPY; [`capture_meta`] is what a capture says of itself, [`capture_places`] where; [`rows`] writes one row a
+//! from CSV, NPY or raw samples, `bench_csv` those whose form `bench_keys` tells; [`capture_meta`] is what a capture says of itself, [`capture_places`] where; [`rows`] writes one row a
 //! decimated sample.
 
 mod any;
 mod applied;
 mod averager;
+mod bench_csv;
+mod bench_keys;
 pub mod capture;
 mod capture_codes;
 mod capture_csv;
+mod capture_header;
 mod capture_lines;
 pub mod capture_meta;
 mod capture_npy;
 pub mod capture_places;
+mod capture_raw;
 mod cells;
 mod clock;
 pub mod columns;
@@ -36,16 +40,22 @@ pub mod rows;
 mod scale;
 mod shorten;
 mod stopped;
+mod temperature;
 pub mod thermal;
 mod thermal_record;
 mod timing;
 mod ulog;
+mod ulog_fields;
 mod ulog_layout;
 mod unpack;
 mod warning;
 
 #[cfg(test)]
+mod bench_tests;
+#[cfg(test)]
 mod broken_tests;
+#[cfg(test)]
+mod capture_mutation_tests;
 #[cfg(test)]
 mod capture_random_tests;
 #[cfg(test)]

@@ -9,24 +9,24 @@ use crate::error::Result;
 use std::path::Path;
 
 /// A generator of its own, so that a seed names a case.
-struct Random(u64);
+pub(super) struct Random(pub(super) u64);
 
 impl Random {
-    fn next(&mut self) -> u64 {
+    pub(super) fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let x = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
         let x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
         x ^ (x >> 31)
     }
 
-    fn below(&mut self, n: usize) -> usize {
+    pub(super) fn below(&mut self, n: usize) -> usize {
         (self.next() % n.max(1) as u64) as usize
     }
 }
 
 /// Bytes changed, cut out, doubled, or a number put in that is none. True if it ends earlier: a log that ends between two
 /// messages is whole.
-fn damage(bytes: &mut Vec<u8>, r: &mut Random) -> bool {
+pub(super) fn damage(bytes: &mut Vec<u8>, r: &mut Random) -> bool {
     let mut cut = false;
     for _ in 0..=r.below(4) {
         let at = r.below(bytes.len());
@@ -59,7 +59,7 @@ fn damage(bytes: &mut Vec<u8>, r: &mut Random) -> bool {
     cut
 }
 
-fn csv() -> Vec<u8> {
+pub(super) fn csv() -> Vec<u8> {
     let rows = (0..60).map(|k| {
         let wobble = ((k * 7919) % 101) as f64 * 1e-3;
         format!("{k},{wobble},{},{},1.0{k}\n", 20 + k, 0)
@@ -109,11 +109,16 @@ fn holds(kind: &str, seed: u64, read: Result<(ThermalRecord, Vec<Warning>)>, who
     true
 }
 
+/// The first seed, and how many from there: `usual`, unless the environment says otherwise.
+pub(super) fn asked(usual: u64) -> (u64, u64) {
+    let asked = |name: &str| std::env::var(name).ok().and_then(|n| n.parse().ok());
+    let first = asked("GYROGEN_SEED").unwrap_or(1);
+    (first, asked("GYROGEN_MUTATIONS").unwrap_or(usual))
+}
+
 #[test]
 fn damage_makes_no_panic_and_costs_no_row_in_silence() {
-    let asked = |name: &str| std::env::var(name).ok().and_then(|n| n.parse().ok());
-    let count: u64 = asked("GYROGEN_MUTATIONS").unwrap_or(600);
-    let first: u64 = asked("GYROGEN_SEED").unwrap_or(1);
+    let (first, count) = asked(600);
     let (log, flash, text) = (ulog_tests::sound().0, dataflash_tests::sound(), csv());
     let mapping = RecordMapping::default();
     let mut read = 0;

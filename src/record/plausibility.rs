@@ -5,6 +5,7 @@
 //! `scale`, the clock in `timing`.
 
 use super::columns;
+use super::temperature::temperature;
 use super::thermal::ThermalRecord;
 use super::warning::Warning;
 use super::{scale, timing};
@@ -38,32 +39,32 @@ pub(super) fn check(record: &ThermalRecord, warnings: &mut Vec<Warning>) {
 }
 
 /// A column under test; `sorted` has at least one value, since empty columns were left out.
-struct Column<'a> {
-    name: &'a str,
+pub(super) struct Column<'a> {
+    pub(super) name: &'a str,
     values: &'a [f64],
     sorted: Vec<f64>,
     record: &'a ThermalRecord,
 }
 
 impl Column<'_> {
-    fn quantile(&self, p: f64) -> f64 {
+    pub(super) fn quantile(&self, p: f64) -> f64 {
         stats::quantile_sorted(&self.sorted, p)
     }
 
-    fn median(&self) -> f64 {
+    pub(super) fn median(&self) -> f64 {
         self.quantile(0.5)
     }
 
-    fn min(&self) -> f64 {
+    pub(super) fn min(&self) -> f64 {
         self.quantile(0.0)
     }
 
-    fn max(&self) -> f64 {
+    pub(super) fn max(&self) -> f64 {
         self.quantile(1.0)
     }
 
     /// Count of the values for which `bad` holds, and the line of the first.
-    fn count(&self, bad: impl Fn(f64) -> bool) -> (usize, usize) {
+    pub(super) fn count(&self, bad: impl Fn(f64) -> bool) -> (usize, usize) {
         let rows = self.values.iter().zip(&self.record.lines);
         let mut hits = rows.filter(|(v, _)| bad(**v));
         let first = hits.next();
@@ -73,7 +74,7 @@ impl Column<'_> {
         )
     }
 
-    fn warn(&self, code: &'static str, message: String) -> Option<Warning> {
+    pub(super) fn warn(&self, code: &'static str, message: String) -> Option<Warning> {
         Some(Warning::on(code, self.name, message))
     }
 }
@@ -123,44 +124,6 @@ fn phase(c: &Column<'_>) -> Option<Warning> {
     None
 }
 
-/// Temperatures in Celsius: a median of 200 to 450 is a Kelvin reading of -73 to 177 degC; no
-/// silicon thermometer reads outside -100 to 250 degC.
-fn temperature(c: &Column<'_>) -> Option<Warning> {
-    let name = c.name;
-    let range = format!("{:.2} to {:.2}", c.min(), c.max());
-    if (200.0..=450.0).contains(&c.median()) && c.quantile(0.05) > 150.0 {
-        return c.warn(
-            "temperature_in_kelvin",
-            format!("{name} runs from {range}: it looks like kelvin; subtract 273.15 if it is"),
-        );
-    }
-    let celsius = |v: f64| (v - 32.0) / 1.8;
-    let (low, high) = (c.quantile(0.05), c.quantile(0.95));
-    if high > HOTTEST_DEGC && celsius(high) < 100.0 && celsius(low) > -60.0 {
-        return c.warn(
-            "temperature_in_fahrenheit",
-            format!(
-                "{name} runs from {range}: no gyro is rated beyond 125 degC, and few are heated beyond {HOTTEST_DEGC}. It \
-                 looks like Fahrenheit ({:.1} to {:.1} degC); say so in the design if it is: [record.columns] {name} = {{ \
-                 column = \"{name}\", unit = \"degF\" }}",
-                celsius(c.min()),
-                celsius(c.max())
-            ),
-        );
-    }
-    let (beyond, line) = c.count(|v| !v.is_nan() && !(-100.0..=250.0).contains(&v));
-    if beyond > 0 {
-        return c.warn(
-            "temperature_out_of_range",
-            format!(
-                "{beyond} values of {name} lie outside -100..250 degC (range {range}), the first \
-                 on line {line}: raw counts, another unit, or glitches?"
-            ),
-        );
-    }
-    None
-}
-
 /// No gyro turns faster than 20 000 deg/s; 16-bit codes and millidegrees do.
 fn rate(c: &Column<'_>) -> Option<Warning> {
     let name = c.name;
@@ -178,9 +141,6 @@ fn rate(c: &Column<'_>) -> Option<Warning> {
         )
     })
 }
-
-/// Hotter than a gyro is, as a rule, degC: industrial parts end at 85, and heat themselves by some kelvin.
-const HOTTEST_DEGC: f64 = 105.0;
 
 /// Beyond this no gyro's bias is, deg/s: parts that are sold are specified to 60, bare ones in a laboratory reach 200.
 const LARGEST_BIAS_DPS: f64 = 500.0;

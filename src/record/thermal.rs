@@ -63,6 +63,16 @@ pub fn parse(
         .iter()
         .take_while(|l| l.number < header.number)
         .last();
+    if header.text.contains("drive_code") && header.text.contains("sense_code") {
+        return Err(header
+            .error(
+                1,
+                "this is a capture of ADC codes, and no thermal record".to_owned(),
+                "give it with `close --capture`, `replay --capture` or `equiv --capture`"
+                    .to_owned(),
+            )
+            .into());
+    }
     let roles = columns::resolve(header, mapping).map_err(|e| commented(e, header, before))?;
     let (values, rows) = cells(lines, &roles, source.count())?;
     if rows.is_empty() {
@@ -220,6 +230,7 @@ fn plain_numbers(text: &str, columns: &mut [ReadColumn], rows: usize) -> bool {
 
 /// Reads any row, and refuses it with the place of what is wrong.
 fn any_cells(line: Line<'_>, roles: &Roles, columns: &mut [ReadColumn]) -> Result<()> {
+    let is_first = columns.iter().all(|c| c.values.is_empty());
     if line.text.trim_start().starts_with('#') {
         return Err(line
             .error(
@@ -257,6 +268,11 @@ fn any_cells(line: Line<'_>, roles: &Roles, columns: &mut [ReadColumn]) -> Resul
         if names.iter().any(|n| columns::is_known(n))
             && let Some(e) = column.bad.take()
         {
+            let is_text =
+                |c: &cells::Cell<'_>| !c.text.is_empty() && cells::number(&c.text).is_err();
+            if is_first && cells.len() > 1 && cells.iter().all(is_text) {
+                return Err(e.help("a line of units or of further names: take it away, units belong into the names (`temp [degC]`)").into());
+            }
             return Err(e.into());
         }
     }

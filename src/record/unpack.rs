@@ -3,8 +3,8 @@
 use ruzstd::decoding::{FrameDecoder, StreamingDecoder};
 use std::io::{self, BufRead, BufReader, Read};
 
-/// Bytes that tell what a file is.
-pub(super) const HEAD: usize = 16;
+/// Bytes that tell what a file is: a tar archive says so behind the first entry's name.
+pub(super) const HEAD: usize = 262;
 
 const GZIP: [u8; 2] = [0x1F, 0x8B];
 const ZSTD: [u8; 4] = [0x28, 0xB5, 0x2F, 0xFD];
@@ -14,40 +14,72 @@ const TELEMETRY_US: std::ops::Range<u64> = 946_684_800_000_000..4_102_444_800_00
 
 /// Whether these are the first bytes of a packed file.
 pub(super) fn is_packed(head: &[u8]) -> bool {
-    head.starts_with(&GZIP) || head.starts_with(&ZSTD)
+    head.starts_with(&GZIP) || is_zstd(head)
+}
+
+fn is_zstd(head: &[u8]) -> bool {
+    let first = head.first_chunk::<4>().map(|h| u32::from_le_bytes(*h));
+    head.starts_with(&ZSTD) || first.is_some_and(|magic| magic & !0xF == METADATA)
 }
 
 /// The stream unpacked, if its head is that of a packed one; the second: whether it was.
 ///
 /// # Errors
 /// A head that is followed by no such stream.
-pub(super) fn unpacked(head: &[u8], input: Box<dyn Read>) -> io::Result<(Box<dyn Read>, bool)> {
+pub(super) fn unpacked(
+    head: &[u8],
+    input: Box<dyn Read + Send>,
+) -> io::Result<(Box<dyn Read + Send>, bool)> {
     if head.starts_with(&GZIP) {
         return Ok((Box::new(flate2::read::MultiGzDecoder::new(input)), true));
     }
-    if head.starts_with(&ZSTD) {
+    if is_zstd(head) {
         return Ok((Box::new(Zstd::new(input)?), true));
     }
     Ok((input, false))
 }
 
-/// A zstd stream of one frame after the other.
+/// A zstd stream of one frame after the other; frames of metadata are passed over, and checksums hold.
 struct Zstd {
-    frame: Option<StreamingDecoder<BufReader<Box<dyn Read>>, FrameDecoder>>,
+    frame: Option<Frame>,
 }
 
+type Input = BufReader<Box<dyn Read + Send>>;
+type Frame = StreamingDecoder<Input, FrameDecoder>;
+
 impl Zstd {
-    fn new(input: Box<dyn Read>) -> io::Result<Self> {
+    fn new(input: Box<dyn Read + Send>) -> io::Result<Self> {
         let frame = frame(BufReader::new(input))?;
-        Ok(Zstd { frame: Some(frame) })
+        Ok(Zstd { frame })
     }
 }
 
-fn frame(
-    input: BufReader<Box<dyn Read>>,
-) -> io::Result<StreamingDecoder<BufReader<Box<dyn Read>>, FrameDecoder>> {
-    StreamingDecoder::new(input)
-        .map_err(|e| io::Error::new(io::ErrorKind::InvalidData, e.to_string()))
+/// The first magic number of a frame that holds metadata, with a number from 0 to 15 in its low bits.
+const METADATA: u32 = 0x184D_2A50;
+
+fn damaged(what: impl ToString) -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidData, what.to_string())
+}
+
+/// The next frame with contents; `None` at the stream's end.
+fn frame(mut input: Input) -> io::Result<Option<Frame>> {
+    loop {
+        let start = input.fill_buf()?;
+        if start.is_empty() {
+            return Ok(None);
+        }
+        let head = start.first_chunk::<4>().map(|h| u32::from_le_bytes(*h));
+        if head.is_none_or(|magic| magic & !0xF != METADATA) {
+            return StreamingDecoder::new(input).map(Some).map_err(damaged);
+        }
+        let mut header = [0u8; 8];
+        input.read_exact(&mut header)?;
+        let [.., a, b, c, d] = header;
+        let length = u64::from(u32::from_le_bytes([a, b, c, d]));
+        if io::copy(&mut input.by_ref().take(length), &mut io::sink())? < length {
+            return Err(damaged("the stream ends within a frame"));
+        }
+    }
 }
 
 impl Read for Zstd {
@@ -63,10 +95,13 @@ impl Read for Zstd {
             let Some(done) = self.frame.take() else {
                 return Ok(0);
             };
-            let mut rest = done.into_inner();
-            if !rest.fill_buf()?.is_empty() {
-                self.frame = Some(frame(rest)?);
+            let (rest, decoder) = done.into_parts();
+            if let Some(told) = decoder.get_checksum_from_data()
+                && decoder.get_calculated_checksum() != Some(told)
+            {
+                return Err(damaged("the packed data do not have their checksum"));
             }
+            self.frame = frame(rest)?;
         }
     }
 }
@@ -76,7 +111,7 @@ pub(super) fn foreign(head: &[u8]) -> Option<(&'static str, &'static str)> {
     const UNPACK: &str =
         "unpack it, and give the record that is in it (gzip and zstd files are read as they are)";
     const EXPORT: &str = "export the gyro's rate, its temperature and their time from it as CSV";
-    const KINDS: [(&[u8], &str, &str); 13] = [
+    const KINDS: [(&[u8], &str, &str); 16] = [
         (
             b"PK\x03\x04",
             "this is a ZIP archive or an Excel workbook",
@@ -109,6 +144,13 @@ pub(super) fn foreign(head: &[u8]) -> Option<(&'static str, &'static str)> {
             "this is a NumPy array",
             "a capture of ADC codes is given with `close --capture`; write a thermal record as CSV",
         ),
+        (b"%PDF", "this is a PDF", EXPORT),
+        (
+            b"<",
+            "this is a web page or XML, and no table",
+            "was it downloaded while not logged in? Give the file itself, as CSV",
+        ),
+        (b"{", "this is JSON", EXPORT),
         (
             b"\xD0\xCF\x11\xE0",
             "this is an old Excel workbook",
@@ -117,6 +159,9 @@ pub(super) fn foreign(head: &[u8]) -> Option<(&'static str, &'static str)> {
     ];
     if let Some((_, what, help)) = KINDS.iter().find(|(magic, ..)| head.starts_with(magic)) {
         return Some((what, help));
+    }
+    if head.get(257..262) == Some(b"ustar") {
+        return Some(("this is a tar archive", UNPACK));
     }
     // A time in front of each MAVLink packet (0xFE: version 1, 0xFD: version 2).
     let time = head.first_chunk::<8>().map(|t| u64::from_be_bytes(*t));
@@ -195,6 +240,9 @@ mod tests {
             (b"BZh91AY", "bzip2"),
             (&telemetry, "telemetry"),
             (b"\x89MCAP0\r\n", "MCAP"),
+            (b"<!DOCTYPE html>", "web page"),
+            (b"{\"time_s\": [1, 2]}", "JSON"),
+            (&[&[b'r'; 257][..], b"ustar\0"].concat(), "tar"),
         ] {
             assert!(foreign(head).unwrap().0.contains(part), "{part}");
         }

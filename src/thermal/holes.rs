@@ -167,4 +167,37 @@ mod tests {
         let seldom: Vec<usize> = (0..200).filter(|k| k % 3 > 0).collect();
         assert_eq!(kept("chamber_degc", fast, &seldom), nothing);
     }
+
+    #[test]
+    fn a_gap_longer_than_three_of_the_usual_is_no_reading() {
+        let slow = |k: usize| (k as f64 / 40.0).sin();
+        // A thermometer that is read in every fifth row, and for a while is not.
+        let without = |gap: std::ops::Range<usize>| -> Vec<usize> {
+            (0..200).filter(|k| k % 5 > 0 || gap.contains(k)).collect()
+        };
+        assert_eq!(kept("die_degc", slow, &without(0..0)), (Vec::new(), false));
+        // Two readings are missing: fifteen rows from one to the next, three times the usual.
+        assert_eq!(
+            kept("die_degc", slow, &without(91..100)),
+            (Vec::new(), false)
+        );
+        // Three are: the rows between the readings 90 and 110 have no temperature.
+        assert_eq!(
+            kept("die_degc", slow, &without(91..110)),
+            ((91..110).collect(), true)
+        );
+        // At the ends as well, where no reading stands on the other side.
+        assert_eq!(
+            kept("die_degc", slow, &without(0..20)),
+            ((0..20).collect(), true)
+        );
+        assert_eq!(
+            kept("die_degc", slow, &without(180..200)),
+            ((176..200).collect(), true)
+        );
+        // Another channel than the thermometer is filled all the same.
+        assert_eq!(kept("agc", slow, &without(91..110)), (Vec::new(), false));
+        // One without any reading loses nothing here: it is refused elsewhere.
+        assert_eq!(kept("die_degc", |_| f64::NAN, &[]), (Vec::new(), false));
+    }
 }

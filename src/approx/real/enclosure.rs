@@ -121,6 +121,11 @@ impl Enclosure {
         self.segments.iter().map(|s| s.radius).fold(0.0, f64::max)
     }
 
+    /// Whether there are as many segments as there may be: then [`Enclosure::radius`] may be far from the one aimed at.
+    pub fn is_cut_short(&self) -> bool {
+        self.segments.len() > SEGMENTS
+    }
+
     /// At least the function's largest magnitude, usually within a factor of two.
     pub fn size(&self) -> f64 {
         self.size

@@ -82,6 +82,13 @@ impl Told<'_> {
             warnings.push(Warning::general("no_firmware", said));
             return None;
         }
+        if !self.after.terms.is_empty() {
+            let [none, model] = [self.before, self.after].map(|m| self.errors(m).heldout_rms);
+            if let Err(told) = carried.errors.unless_useless(none, model, "deg/s") {
+                warnings.push(Warning::general("firmware_useless", told));
+                return None;
+            }
+        }
         let behind = self.behind(&carried, warnings);
         warnings.extend(behind);
         Some(carried)

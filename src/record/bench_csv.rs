@@ -1,0 +1,472 @@
+//! A CSV capture whose columns have other names than the contract's: an oscilloscope's preamble, columns by name, volts.
+//!
+//! Nothing is guessed that decides a result: a column is the drive's or the sense's by its key or because its name says
+//! so, volts become codes by a scale that is given. What the file does not say is asked for, with the keys to write.
+
+use super::bench_keys::{BenchKeys, Column, Scale};
+use super::capture_meta::CaptureMeta;
+use crate::error::{InputError, Result};
+use std::path::Path;
+
+/// Rows of numbers in a row that make the first of them the first row (convention: a preamble has single ones).
+const ROWS_OF_A_TABLE: usize = 3;
+/// Most columns that are listed in a message (convention).
+const MOST_LISTED: usize = 20;
+/// Mean distance from whole codes, codes, above which a scale is doubted: uniform ones have 0.25 (convention).
+const BETWEEN_CODES: f64 = 0.1;
+/// Cells without which no distance is told (convention).
+const LEAST_CELLS: usize = 64;
+
+/// How the rows of such a file are read.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Table {
+    /// Lines of the text that stand before the first row.
+    pub before: usize,
+    /// Most cells of a row.
+    pub cells: usize,
+    /// 0-based cells of drive and sense.
+    pub used: [usize; 2],
+    /// Between cells.
+    pub separator: u8,
+    /// Volts to codes; `None` = the cells are codes.
+    pub scale: Option<Scale>,
+    /// What was chosen, and from what.
+    pub notes: Vec<String>,
+}
+
+/// Finds the table in `text`, the file's first lines from the one on that is no comment (`number`, from 1). Sets `fs_hz` of `meta` from a
+/// column of times where it is missing.
+///
+/// # Errors
+/// Columns or a scale that are not given, with the keys to write. `None`: no table of two columns or more.
+pub(super) fn table(
+    (path, number): (&Path, usize),
+    text: &str,
+    keys: &BenchKeys,
+    meta: &mut CaptureMeta,
+) -> Result<Option<Table>> {
+    let lines: Vec<&str> = text.lines().collect();
+    let separator = separator(&lines);
+    let cut = |line: &str| cells(line, separator);
+    let found = first_row(&lines, separator);
+    let Some((before, width)) = found else {
+        return Ok(None);
+    };
+    let named = names(&lines[..before], separator, width);
+    let used = used((path, number), &named, width, keys)?;
+    if let Some(k) = row_before(&lines[..before], separator, width, used) {
+        let mut error =
+            InputError::new("this line is like a row, and what follows it is no table yet")
+                .in_file(path)
+                .at(number + k, 1)
+                .help("repair this line or the next ones, or take them away");
+        error.source_line = lines.get(k).map(|l| (*l).to_owned());
+        return Err(error.into());
+    }
+    let rows: Vec<Vec<f64>> = lines[before..]
+        .iter()
+        .map_while(|l| numbers(&cut(l), separator))
+        .collect();
+    let mut notes = Vec::new();
+    let says_volts = used.iter().any(|k| named.volts(*k).is_some());
+    let whole = |row: &Vec<f64>| {
+        used.iter()
+            .all(|k| row.get(*k).is_none_or(|v| v.fract() == 0.0))
+    };
+    let scale = match keys.scale() {
+        Some(scale) => Some(in_unit(path, scale, &named, used)?),
+        None if says_volts || !rows.iter().all(whole) => {
+            return Err(no_scale(path, &named, used, &rows).into());
+        }
+        None => None,
+    };
+    let name = |k: usize| named.shown(used[k]);
+    notes.push(format!("the drive is {}, the sense {}", name(0), name(1)));
+    if before > 1 {
+        notes.push(format!("{before} lines stand before the first row"));
+    }
+    if let Some(scale) = scale {
+        let per = scale.volts_per_code;
+        let zero = scale.volts_at_code_0;
+        notes.push(format!(
+            "a code is {per:e} of the column's unit, code 0 at {zero}; the nearest code is taken"
+        ));
+        notes.extend(between(scale, used, &rows));
+    }
+    if meta.fs_hz.is_none()
+        && let Some((hz, from)) = sample_rate(&named, &rows)
+    {
+        meta.fs_hz = Some(hz);
+        notes.push(format!("`fs_hz` is {hz}, from {from}"));
+    }
+    Ok(Some(Table {
+        before,
+        cells: width.max(named.names.len()),
+        used,
+        separator,
+        scale,
+        notes,
+    }))
+}
+
+/// Names and units of the columns.
+struct Named {
+    names: Vec<String>,
+    units: Vec<String>,
+}
+
+impl Named {
+    fn shown(&self, column: usize) -> String {
+        match self.names.get(column).filter(|n| !n.is_empty()) {
+            Some(name) => format!("column {column}, \"{name}\""),
+            None => format!("column {column}"),
+        }
+    }
+
+    /// The unit of a column, from the line of units or from its name: `CH1 (mV)`, `drive_mv`.
+    fn unit(&self, column: usize) -> Option<String> {
+        let own = self.units.get(column).map(|u| bare(u));
+        let name = self.names.get(column).map_or("", String::as_str);
+        let inside = name
+            .trim_end_matches([')', ']'])
+            .rsplit_once(['(', '['])
+            .map(|n| bare(n.1));
+        let behind = name.rsplit_once('_').map(|n| bare(n.1));
+        own.filter(|u| !u.is_empty()).or(inside).or(behind)
+    }
+
+    /// Volts that a column's unit is; `None` where it says no voltage.
+    fn volts(&self, column: usize) -> Option<f64> {
+        Some(match self.unit(column)?.as_str() {
+            "v" | "volt" | "volts" => 1.0,
+            "mv" | "millivolt" | "millivolts" => 1e-3,
+            "uv" | "µv" | "μv" => 1e-6,
+            _ => return None,
+        })
+    }
+
+    /// Seconds that a column of times counts in; `None` where it is no such column.
+    fn seconds(&self, column: usize) -> Option<f64> {
+        let name = self.names.get(column)?.to_lowercase();
+        let first = name
+            .split(|c: char| !c.is_alphabetic())
+            .next()
+            .unwrap_or("");
+        if !["time", "t", "second", "seconds", "x"].contains(&first) {
+            return None;
+        }
+        Some(match self.unit(column).as_deref() {
+            Some("ms") => 1e-3,
+            Some("us" | "µs" | "μs") => 1e-6,
+            Some("ns") => 1e-9,
+            Some("s" | "sec" | "second" | "seconds") => 1.0,
+            _ if ["time", "t", "second", "seconds"].contains(&name.as_str()) => 1.0,
+            _ => return None,
+        })
+    }
+}
+
+/// A unit without brackets, in small letters.
+fn bare(unit: &str) -> String {
+    unit.trim()
+        .trim_matches(['(', ')', '[', ']'])
+        .trim()
+        .to_lowercase()
+}
+
+/// Whether a line says units and no names.
+fn is_units(cells: &[String]) -> bool {
+    const WORDS: [&str; 20] = [
+        "", "s", "ms", "us", "µs", "ns", "sec", "second", "seconds", "sequence", "v", "mv", "uv",
+        "volt", "volts", "value", "ampl", "a", "code", "codes",
+    ];
+    cells.iter().all(|c| WORDS.contains(&bare(c).as_str()))
+}
+
+/// The separator that cuts the middle line into most cells.
+fn separator(lines: &[&str]) -> u8 {
+    let filled: Vec<&&str> = lines.iter().filter(|l| !l.trim().is_empty()).collect();
+    let probe = filled.get(filled.len() / 2).map_or("", |l| **l);
+    let count = |s: u8| probe.bytes().filter(|b| *b == s).count();
+    // A comma beside semicolons or tabs is a decimal one.
+    match (count(b';'), count(b'\t')) {
+        (0, 0) => b',',
+        (_, 0) => b';',
+        (0, _) => b'\t',
+        (a, b) => {
+            if a >= b {
+                b';'
+            } else {
+                b'\t'
+            }
+        }
+    }
+}
+
+/// The cells of a line, trimmed and without quotes; empty ones at the end are none.
+pub(super) fn cells(line: &str, separator: u8) -> Vec<String> {
+    let own = |c: &str| c.trim().trim_matches('"').trim().to_owned();
+    let mut out: Vec<String> = line.split(char::from(separator)).map(own).collect();
+    while out.last().is_some_and(String::is_empty) {
+        out.pop();
+    }
+    out
+}
+
+/// A number, with a decimal comma where commas do not separate.
+pub(super) fn number(cell: &str, separator: u8) -> Option<f64> {
+    let value: f64 = match separator {
+        b',' => cell.parse().ok()?,
+        _ => cell.replace(',', ".").parse().ok()?,
+    };
+    value.is_finite().then_some(value)
+}
+
+fn numbers(cells: &[String], separator: u8) -> Option<Vec<f64>> {
+    let all: Option<Vec<f64>> = cells.iter().map(|c| number(c, separator)).collect();
+    all.filter(|n| n.len() >= 2)
+}
+
+/// The first row of the table, and the cells that its rows have.
+fn first_row(lines: &[&str], separator: u8) -> Option<(usize, usize)> {
+    let widths: Vec<Option<usize>> = lines
+        .iter()
+        .map(|l| numbers(&cells(l, separator), separator).map(|n| n.len()))
+        .collect();
+    (0..widths.len()).find_map(|i| {
+        let width = widths[i]?;
+        let after = widths[i..].iter().take(ROWS_OF_A_TABLE);
+        after
+            .clone()
+            .all(|w| *w == Some(width))
+            .then_some((i, width))
+    })
+}
+
+/// A line before the first row that is a row itself, or that lacks names where both columns have them: a damaged one
+/// must not end as part of a preamble.
+fn row_before(before: &[&str], separator: u8, width: usize, used: [usize; 2]) -> Option<usize> {
+    let wide = |k: &usize| cells(before[*k], separator).len() >= width;
+    let last = (0..before.len()).rev().find(wide);
+    (0..before.len()).find(|k| {
+        let cells = cells(before[*k], separator);
+        let values = used.map(|u| cells.get(u).and_then(|c| number(c, separator)));
+        let is_row = numbers(&cells, separator).is_some_and(|n| n.len() == width);
+        is_row || (Some(*k) == last && values.iter().all(Option::is_some))
+    })
+}
+
+/// The names and the units that stand before the first row.
+fn names(before: &[&str], separator: u8, width: usize) -> Named {
+    let wide: Vec<Vec<String>> = before
+        .iter()
+        .map(|l| cells(l, separator))
+        .filter(|c| c.len() >= width)
+        .collect();
+    let (units, names) = match wide.as_slice() {
+        [.., names, last] if is_units(&last[..width]) && !is_units(&names[..width]) => {
+            (last.clone(), names.clone())
+        }
+        [.., last] => (Vec::new(), last.clone()),
+        [] => (Vec::new(), Vec::new()),
+    };
+    Named { names, units }
+}
+
+/// Which columns are the drive's and the sense's.
+fn used(
+    (path, number): (&Path, usize),
+    named: &Named,
+    width: usize,
+    keys: &BenchKeys,
+) -> Result<[usize; 2]> {
+    let mut out = [0; 2];
+    let words = [["drive", "drv"], ["sense", "sns"]];
+    let parts = out
+        .iter_mut()
+        .zip(&keys.columns)
+        .zip(BenchKeys::KEYS)
+        .zip(words);
+    for (((place, asked), key), words) in parts {
+        let is_meant = |name: &String| {
+            let name = name.to_lowercase();
+            words.iter().any(|w| name.contains(w))
+        };
+        let hits: Vec<usize> = named
+            .names
+            .iter()
+            .enumerate()
+            .filter(|(_, name)| match asked {
+                Some(Column::Name(wanted)) => *name == wanted,
+                Some(Column::Number(_)) => false,
+                None => is_meant(name),
+            })
+            .map(|(k, _)| k)
+            .collect();
+        *place = match (asked, hits.as_slice()) {
+            (Some(Column::Number(n)), _) if *n < width => *n,
+            (_, [only]) if *only < width => *only,
+            (Some(Column::Number(n)), _) => {
+                return Err(which(
+                    path,
+                    named,
+                    width,
+                    format!("`{key}` is {n}, and the columns are 0 to {}", width - 1),
+                )
+                .into());
+            }
+            (Some(Column::Name(name)), []) => {
+                return Err(which(
+                    path,
+                    named,
+                    width,
+                    format!("the capture has no column \"{name}\", which `{key}` names"),
+                )
+                .into());
+            }
+            (Some(Column::Name(name)), _) => {
+                return Err(which(
+                    path,
+                    named,
+                    width,
+                    format!("several columns are \"{name}\", which `{key}` names"),
+                )
+                .into());
+            }
+            (None, _) => {
+                let part = words[0];
+                let column = super::capture::COLUMNS.iter().find(|c| c.starts_with(part));
+                let message = format!(
+                    "the header has no column `{}`, and no name in it says which is the {part}'s",
+                    column.unwrap_or(&part)
+                );
+                return Err(which(path, named, width, message).at(number, 1).into());
+            }
+        };
+    }
+    if out[0] == out[1] {
+        return Err(which(
+            path,
+            named,
+            width,
+            "drive and sense are the same column".to_owned(),
+        )
+        .into());
+    }
+    Ok(out)
+}
+
+/// An error that asks for the columns, with the keys to write.
+fn which(path: &Path, named: &Named, width: usize, message: String) -> InputError {
+    let listed: Vec<String> = (0..width.min(MOST_LISTED))
+        .map(|k| named.shown(k))
+        .collect();
+    let not_time: Vec<usize> = (0..width).filter(|k| named.seconds(*k).is_none()).collect();
+    let guess = |k: usize| {
+        let column = not_time.get(k).copied().unwrap_or(k);
+        let name = named.names.get(column).filter(|n| !n.is_empty());
+        let alone = name.filter(|n| named.names.iter().filter(|m| m == n).count() == 1);
+        alone.map_or(column.to_string(), |n| format!("{n:?}"))
+    };
+    let scale = match not_time.iter().any(|k| named.volts(*k).is_some()) {
+        true => "\n    volts_per_code = 0.0001",
+        false => "",
+    };
+    InputError::new(message).in_file(path).help(format!(
+        "the file has: {}\n  write the columns that they are into {} beside it (or `# key = value` lines before the header):\n    \
+         drive_column = {}\n    sense_column = {}{scale}",
+        listed.join("; "),
+        sidecar_name(path),
+        guess(0),
+        guess(1),
+    ))
+}
+
+/// The name of a capture's side-car.
+pub(super) fn sidecar_name(path: &Path) -> String {
+    let name = super::capture_meta::sidecar_of(path);
+    name.file_name()
+        .map_or(String::new(), |n| n.to_string_lossy().into_owned())
+}
+
+/// The scale in the columns' own unit: both are in volts, or in millivolts.
+fn in_unit(path: &Path, scale: Scale, named: &Named, used: [usize; 2]) -> Result<Scale> {
+    let [drive, sense] = used.map(|k| named.volts(k).unwrap_or(1.0));
+    if drive != sense {
+        return Err(InputError::new("drive and sense are in different units")
+            .in_file(path)
+            .help("write both in volts: `volts_per_code` holds for both")
+            .into());
+    }
+    Ok(Scale {
+        volts_per_code: scale.volts_per_code / drive,
+        volts_at_code_0: scale.volts_at_code_0 / drive,
+    })
+}
+
+/// An error that asks for the scale; with the step that the values stand on, where they do.
+fn no_scale(path: &Path, named: &Named, used: [usize; 2], rows: &[Vec<f64>]) -> InputError {
+    let unit = named.volts(used[0]).unwrap_or(1.0);
+    let seen = step(used, rows).map_or(String::new(), |step| {
+        format!("; the values stand on steps of about {:.5e} V", step * unit)
+    });
+    InputError::new("the columns are no codes, and the capture does not say what a code is")
+        .in_file(path)
+        .help(format!(
+            "write `volts_per_code = 0.0001` (the ADC's volts for one code; and `volts_at_code_0 = 0.0` where that is not 0) into {} \
+             beside it, or as `# key = value` lines before the header{seen}",
+            sidecar_name(path)
+        ))
+}
+
+/// The smallest distance between the values, where all distances are whole multiples of it.
+fn step(used: [usize; 2], rows: &[Vec<f64>]) -> Option<f64> {
+    let mut values: Vec<f64> = rows
+        .iter()
+        .flat_map(|row| used.map(|k| row.get(k).copied().unwrap_or(0.0)))
+        .collect();
+    values.sort_by(f64::total_cmp);
+    let largest = values.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+    let gaps: Vec<f64> = values
+        .windows(2)
+        .map(|w| w[1] - w[0])
+        .filter(|d| *d > 1e-9 * largest)
+        .collect();
+    let least = gaps.iter().copied().fold(f64::INFINITY, f64::min);
+    let on_it = |d: &f64| (d / least - (d / least).round()).abs() < 0.1;
+    (gaps.len() >= LEAST_CELLS && gaps.iter().all(on_it)).then_some(least)
+}
+
+/// What is said where the values lie between the codes of a scale.
+fn between(scale: Scale, used: [usize; 2], rows: &[Vec<f64>]) -> Option<String> {
+    let off: Vec<f64> = rows
+        .iter()
+        .flat_map(|row| used.map(|k| row.get(k).copied()))
+        .flatten()
+        .map(|v| scale.unrounded(v))
+        .map(|c| (c - c.round()).abs())
+        .collect();
+    let mean = off.iter().sum::<f64>() / off.len().max(1) as f64;
+    (off.len() >= LEAST_CELLS && mean > BETWEEN_CODES).then(|| {
+        format!(
+            "the values lie between the codes that `volts_per_code` makes ({mean:.2} codes from the nearest on average): if an ADC \
+             of this scale wrote them, the scale or `volts_at_code_0` is wrong; otherwise they are quantised here"
+        )
+    })
+}
+
+/// The sample rate, Hz, from a column of times, to the digits that its steps agree on; and the column.
+fn sample_rate(named: &Named, rows: &[Vec<f64>]) -> Option<(f64, String)> {
+    let column = (0..named.names.len()).find(|k| named.seconds(*k).is_some())?;
+    let unit = named.seconds(column)?;
+    let times: Vec<f64> = rows.iter().filter_map(|r| r.get(column).copied()).collect();
+    let span = (times.last()? - times.first()?) * unit;
+    let hz = (times.len() - 1) as f64 / span;
+    (times.len() >= ROWS_OF_A_TABLE && hz.is_finite() && hz > 0.0)
+        .then(|| (rounded(hz), named.shown(column)))
+}
+
+/// To six digits: printed times carry no more.
+fn rounded(hz: f64) -> f64 {
+    format!("{hz:.5e}").parse().unwrap_or(hz)
+}

@@ -1,0 +1,455 @@
+//! Captures as benches write them: oscilloscopes' preambles, volts, columns by name, raw samples, arrays of real numbers.
+
+use super::capture::CaptureReader;
+use super::capture_tests::{Capture, Q15, Rows, csv};
+use std::io::Write;
+
+const ROWS: [(i32, i32); 6] = [
+    (1, -2),
+    (-300, 400),
+    (5, 32767),
+    (7, 8),
+    (0, -32768),
+    (-9, 10),
+];
+
+fn rows() -> Rows {
+    ROWS.to_vec()
+}
+
+/// A table of time, drive and sense in volts of 1 mV a code, with cells between `separator`.
+fn table(separator: &str, unit: f64) -> String {
+    let row = |(k, (d, s)): (usize, &(i32, i32))| {
+        let [d, s] = [*d, *s].map(|c| f64::from(c) * 1e-3 / unit);
+        format!("{:.6}{separator}{d:.6}{separator}{s:.6}\n", k as f64 * 4e-6)
+    };
+    ROWS.iter().enumerate().map(row).collect()
+}
+
+const CHANNELS: &str = "drive_column = \"CH1\"\nsense_column = \"CH2\"\nvolts_per_code = 1e-3\n";
+
+#[test]
+fn preambles_of_oscilloscopes_are_passed_over() {
+    let comma = table(",", 1.0);
+    let rigol: String = comma.lines().map(|l| l.to_owned() + ",\n").collect();
+    for (text, keys) in [
+        // Names of their own.
+        (format!("TIME,CH1,CH2\n{comma}"), CHANNELS),
+        (
+            format!(
+                "Model,MSO4054\r\nFirmware Version,2.48\r\n\r\nSample Interval,4e-06,s\r\n\r\nTIME,CH1,CH2\r\n{comma}"
+            ),
+            CHANNELS,
+        ),
+        (
+            format!("X,CH1,CH2,Start,Increment,\nSequence,Volt,Volt,-6.0e-3,4.0e-06\n{rigol}"),
+            CHANNELS,
+        ),
+        (
+            format!(
+                "Record Length,Analog:6\nVertical Units,CH1:V,CH2:V\nSecond,Value,Value\n{comma}"
+            ),
+            "drive_column = 1\nsense_column = 2\nvolts_per_code = 1e-3\n",
+        ),
+        (
+            format!("x-axis,1,2\nsecond,Volt,Volt\n{comma}"),
+            "drive_column = \"1\"\nsense_column = \"2\"\nvolts_per_code = 1e-3\n",
+        ),
+        (
+            format!(
+                "LECROYWS64Xs-B,12345,Waveform\nSegments,1,SegmentSize,6\nTime,Drive,Sense\n{comma}"
+            ),
+            "volts_per_code = 1e-3\n",
+        ),
+        (
+            format!("Time,Channel A,Channel B\n(ms),(V),(V)\n\n{comma}"),
+            "drive_column = \"Channel A\"\nsense_column = \"Channel B\"\nvolts_per_code = 1e-3\n",
+        ),
+        // Units in names, other separators, decimal commas.
+        (
+            format!(
+                "t [s];drive [mV];sense [mV]\n{}",
+                table(";", 1e-3).replace('.', ",")
+            ),
+            "volts_per_code = 1e-3\n",
+        ),
+        (
+            format!("t\tdrive_v\tsense_v\n{}", table("\t", 1.0)),
+            "volts_per_code = 0.001\nvolts_at_code_0 = 0\n",
+        ),
+        (
+            format!("\"Time (s)\",\"drive (V)\",\"sense (V)\"\n{comma}"),
+            "volts_per_code = 1e-3\n",
+        ),
+    ] {
+        let file = csv(&text).beside("capture.toml", keys);
+        assert_eq!(file.rows(Q15, 4), (rows(), None), "{text}");
+        // The same keys as comment lines.
+        let comments: String = keys.lines().map(|l| format!("# {l}\n")).collect();
+        assert_eq!(
+            csv(format!("{comments}{text}")).rows(Q15, 4),
+            (rows(), None),
+            "{text}"
+        );
+        let notes = CaptureReader::open(&file.path, Q15)
+            .unwrap()
+            .notes()
+            .join("; ");
+        assert!(
+            notes.contains("a code is") && notes.contains("the drive is column 1"),
+            "{notes}"
+        );
+    }
+}
+
+#[test]
+fn the_sample_rate_comes_from_the_column_of_times() {
+    let keys = |fs: &str| format!("{CHANNELS}{fs}");
+    let fs = |names: &str, keys: String| {
+        csv(format!("{names}\n{}", table(",", 1.0)))
+            .beside("capture.toml", keys)
+            .meta()
+            .unwrap()
+            .fs_hz
+    };
+    assert_eq!(fs("TIME,CH1,CH2", keys("")), Some(250_000.0));
+    assert_eq!(fs("Time (ms),CH1,CH2", keys("")), Some(2.5e8));
+    assert_eq!(fs("Time (ms),CH1,CH2", keys("fs_hz = 5\n")), Some(5.0));
+    assert_eq!(fs("index,CH1,CH2", keys("")), None);
+}
+
+#[test]
+fn integers_are_codes_whatever_their_columns_are_called() {
+    let text: String = ROWS.iter().map(|(d, s)| format!("{d},{s}\n")).collect();
+    for (names, keys) in [
+        ("drv,sns", ""),
+        ("a,b", "drive_column = \"a\"\nsense_column = 1\n"),
+    ] {
+        let file = csv(format!("{names}\n{text}")).beside("capture.toml", keys);
+        assert_eq!(file.rows(Q15, 4), (rows(), None), "{names}");
+    }
+}
+
+#[test]
+fn what_is_not_said_is_asked_for_with_the_keys() {
+    let scope = format!("TIME,CH1,CH2\n{}", table(",", 1.0));
+    for (text, keys, message, help) in [
+        (
+            scope.as_str(),
+            "",
+            "no name in it says which is the drive's",
+            "drive_column = \"CH1\"\n    sense_column = \"CH2\"",
+        ),
+        (
+            &scope,
+            "drive_column = \"CH3\"\n",
+            "no column \"CH3\", which `drive_column` names",
+            "TIME",
+        ),
+        (
+            &scope,
+            "drive_column = 3\n",
+            "`drive_column` is 3, and the columns are 0 to 2",
+            "TIME",
+        ),
+        (
+            &scope,
+            "drive_column = 1\nsense_column = 1\n",
+            "the same column",
+            "TIME",
+        ),
+        (
+            &scope,
+            "drive_column = 1\nsense_column = 2\n",
+            "does not say what a code is",
+            "volts_per_code = 0.0001",
+        ),
+        (
+            &scope,
+            "drive_column = 1\nsense_column = 2\nvolts_per_code = 1e-9\n",
+            "outside the ADC's format",
+            "word length",
+        ),
+        (
+            "drive (V),sense (mV)\n1,2\n3,4\n5,6\n",
+            "volts_per_code = 1\n",
+            "different units",
+            "volts",
+        ),
+        (
+            "1,2\n3,4\n5,6\n",
+            "drive_column = 0\nsense_column = 1\n",
+            "no column",
+            "drive_code",
+        ),
+        (
+            "a,b\n1,2\n3,x\n5,6\n7,8\n9,9\n",
+            "drive_column = 0\nsense_column = 1\n",
+            "like a row",
+            "repair",
+        ),
+        (
+            "drive_code,CH2\n1,2\n3,4\n5,6\n",
+            "sense_column = \"CH2\"\n",
+            "no column `sense_code`",
+            "drive_code",
+        ),
+    ] {
+        let (_, error) = csv(text).beside("capture.toml", keys).rows(Q15, 9);
+        let told = error.unwrap().to_string();
+        assert!(
+            told.contains(message) && told.contains(help),
+            "{text}{keys}: {told}"
+        );
+    }
+}
+
+#[test]
+fn values_between_the_codes_are_told() {
+    let rows: String = (0..60)
+        .map(|k| format!("{},{}\n", f64::from(k) * 0.37e-3, f64::from(k) * 0.73e-3))
+        .collect();
+    let notes = |scale: &str| {
+        let file = csv(format!("drive,sense\n{rows}")).beside("capture.toml", scale);
+        CaptureReader::open(&file.path, Q15)
+            .unwrap()
+            .notes()
+            .join("; ")
+    };
+    assert!(notes("volts_per_code = 1e-3").contains("lie between the codes"));
+    assert!(!notes("volts_per_code = 1e-5").contains("lie between the codes"));
+}
+
+#[test]
+fn a_row_that_is_none_is_refused_with_its_place() {
+    let keys = "volts_per_code = 1e-3\n";
+    let good = "drive,sense\n0.001,0.002\n0.003,0.004\n0.005,0.006\n";
+    for (row, line, column, message) in [
+        ("0.001,", 5, 7, "the cell of the sense_code is empty"),
+        ("0.001,inf", 5, 7, "no finite number"),
+        ("x,0.001", 5, 1, "no finite number"),
+        ("1,2,3", 5, 5, "3 cells, the table 2"),
+        ("40,0.001", 5, 1, "40 (code 40000) is outside"),
+    ] {
+        let (rows, error) = csv(format!("{good}{row}\n0.1,0.1\n"))
+            .beside("capture.toml", keys)
+            .rows(Q15, 9);
+        let error = error.unwrap();
+        assert_eq!(
+            (rows.len(), error.line, error.column),
+            (3, Some(line), Some(column)),
+            "{row}: {error}"
+        );
+        assert!(error.to_string().contains(message), "{error}");
+    }
+}
+
+fn interleaved(item: fn(i32) -> Vec<u8>, channels: usize) -> Vec<u8> {
+    let row = |(d, s): &(i32, i32)| {
+        let other = (2..channels).map(|k| item(k as i32 * 11));
+        [item(*d), item(*s)]
+            .into_iter()
+            .chain(other)
+            .flatten()
+            .collect::<Vec<u8>>()
+    };
+    ROWS.iter().flat_map(row).collect()
+}
+
+#[test]
+fn raw_samples_are_what_their_side_car_says() {
+    let low = |c: i32| (c as i16).to_le_bytes().to_vec();
+    let high = |c: i32| (c as i16).to_be_bytes().to_vec();
+    let wide = |c: i32| c.to_le_bytes().to_vec();
+    let volts = |c: i32| (c as f32 * 1e-3).to_le_bytes().to_vec();
+    for (name, bytes, keys) in [
+        ("c.raw", interleaved(low, 2), "item = \"int16\"\n"),
+        (
+            "c.dat",
+            interleaved(low, 2),
+            "item = \"<i2\"\nchannels = 2\n",
+        ),
+        ("c.raw", interleaved(high, 2), "item = \"int16_be\"\n"),
+        (
+            "c.bin",
+            interleaved(wide, 3),
+            "item = \"int32\"\nchannels = 3\n",
+        ),
+        (
+            "c.i16",
+            [vec![1; 512], interleaved(low, 4)].concat(),
+            "item = \"int16\"\nchannels = 4\nskip_bytes = 512\n",
+        ),
+        (
+            "c.raw",
+            interleaved(volts, 2),
+            "item = \"float32\"\nvolts_per_code = 1e-3\n",
+        ),
+    ] {
+        let file = Capture::new(name, &bytes).beside("c.toml", keys);
+        for block in [1, 4, 100] {
+            assert_eq!(file.rows(Q15, block), (rows(), None), "{name} {keys}");
+        }
+        assert_eq!(
+            CaptureReader::open(&file.path, Q15).unwrap().rows_hint(),
+            Some(6)
+        );
+    }
+    let swapped = Capture::new("c.raw", interleaved(low, 2)).beside(
+        "c.toml",
+        "item = \"int16\"\ndrive_column = 1\nsense_column = 0\n",
+    );
+    assert_eq!(swapped.rows(Q15, 9).0[0], (-2, 1));
+}
+
+#[test]
+fn raw_samples_without_what_they_need_are_refused() {
+    let low = |c: i32| (c as i16).to_le_bytes().to_vec();
+    let bytes = interleaved(low, 2);
+    for (name, bytes, keys, message) in [
+        ("c.raw", bytes.clone(), None, "nothing says what they are"),
+        ("c.dat", bytes.clone(), None, "has binary bytes"),
+        (
+            "c.raw",
+            bytes[..22].to_vec(),
+            Some("item = \"int16\""),
+            "no whole rows",
+        ),
+        (
+            "c.raw",
+            bytes.clone(),
+            Some("item = \"int16\"\nskip_bytes = 99"),
+            "no whole rows",
+        ),
+        (
+            "c.raw",
+            bytes.clone(),
+            Some("item = \"int16\"\ndrive_column = 2"),
+            "its 2 channels are 0 to 1",
+        ),
+        (
+            "c.raw",
+            bytes.clone(),
+            Some("item = \"int16\"\ndrive_column = 1"),
+            "both its channel 1",
+        ),
+        (
+            "c.raw",
+            bytes.clone(),
+            Some("item = \"int16\"\ndrive_column = \"CH1\""),
+            "have numbers",
+        ),
+        (
+            "c.raw",
+            bytes.clone(),
+            Some("item = \"float32\""),
+            "nothing says what a code is",
+        ),
+        (
+            "c.raw",
+            bytes.clone(),
+            Some("item = \"int24\""),
+            "`item` must be",
+        ),
+    ] {
+        let file = Capture::new(name, &bytes);
+        let file = match keys {
+            Some(keys) => file.beside("c.toml", keys),
+            None => file,
+        };
+        let told = file.rows(Q15, 9).1.unwrap().to_string();
+        assert!(told.contains(message), "{name} {keys:?}: {told}");
+    }
+    // A code outside the ADC's range has its place.
+    let wide = Capture::new("c.raw", interleaved(|c| (c * 2).to_le_bytes().to_vec(), 2))
+        .beside("c.toml", "item = \"int32\"");
+    let (rows, error) = wide.rows(Q15, 9);
+    assert_eq!(rows.len(), 2);
+    assert!(
+        error
+            .unwrap()
+            .to_string()
+            .contains("row 2, column 1 (from 0): sense_code 65534 is outside")
+    );
+}
+
+fn npy(descr: &str, shape: &str, fortran: bool, data: &[u8]) -> Vec<u8> {
+    let order = if fortran { "True" } else { "False" };
+    let header = format!("{{'descr': '{descr}', 'fortran_order': {order}, 'shape': {shape}, }}\n");
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((header.len() as u16).to_le_bytes());
+    bytes.extend(header.bytes());
+    bytes.extend(data);
+    bytes
+}
+
+#[test]
+fn arrays_of_volts_and_of_more_columns_are_read_with_their_keys() {
+    let volts = |c: i32| (f64::from(c) * 1e-3).to_le_bytes().to_vec();
+    let low = |c: i32| (c as i16).to_le_bytes().to_vec();
+    let by_column = |item: fn(i32) -> Vec<u8>| {
+        let (drive, sense): (Vec<i32>, Vec<i32>) = ROWS.iter().copied().unzip();
+        [vec![0; 6], sense, drive]
+            .concat()
+            .into_iter()
+            .flat_map(item)
+            .collect::<Vec<u8>>()
+    };
+    for (bytes, keys) in [
+        (
+            npy("<f8", "(6, 2)", false, &interleaved(volts, 2)),
+            "volts_per_code = 1e-3\n",
+        ),
+        (
+            npy("<i2", "(6, 4)", false, &interleaved(low, 4)),
+            "drive_column = 0\nsense_column = 1\n",
+        ),
+        (
+            npy("<i2", "(6, 3)", true, &by_column(low)),
+            "drive_column = 2\nsense_column = 1\n",
+        ),
+        (
+            npy("<f8", "(6, 3)", true, &by_column(volts)),
+            "drive_column = 2\nsense_column = 1\nvolts_per_code = 1e-3\n",
+        ),
+    ] {
+        let file = Capture::new("c.npy", &bytes).beside("c.toml", keys);
+        for block in [1, 4, 100] {
+            assert_eq!(file.rows(Q15, block), (rows(), None), "{keys}");
+        }
+        // Without its keys it stays refused, as the contract says.
+        assert!(
+            Capture::new("c.npy", &bytes).rows(Q15, 9).1.is_some(),
+            "{keys}"
+        );
+        let cut = Capture::new("c.npy", &bytes[..bytes.len() - 1]).beside("c.toml", keys);
+        assert!(
+            cut.rows(Q15, 9)
+                .1
+                .unwrap()
+                .to_string()
+                .contains("bytes, and the file holds")
+        );
+    }
+}
+
+#[test]
+fn a_packed_csv_is_read_as_it_is() {
+    let text = format!("TIME,CH1,CH2\n{}", table(",", 1.0));
+    let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+    packed.write_all(text.as_bytes()).unwrap();
+    let packed = packed.finish().unwrap();
+    let file = Capture::new("scope.csv.gz", &packed).beside("scope.toml", CHANNELS);
+    assert_eq!(file.rows(Q15, 4), (rows(), None));
+    let zst = ruzstd::encoding::compress_to_vec(
+        &b"drive_code,sense_code\n1,2\n"[..],
+        ruzstd::encoding::CompressionLevel::Fastest,
+    );
+    assert_eq!(
+        Capture::new("c.zst", zst).rows(Q15, 4),
+        (vec![(1, 2)], None)
+    );
+    let cut =
+        Capture::new("scope.csv.gz", &packed[..packed.len() - 9]).beside("scope.toml", CHANNELS);
+    assert!(cut.rows(Q15, 400).1.is_some());
+}

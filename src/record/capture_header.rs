@@ -1,0 +1,116 @@
+//! The head of a CSV capture: comment lines with keys, and the header line that names the columns.
+
+use super::bench_csv;
+use super::bench_keys::{BenchKeys, KeyValue};
+use super::capture::{COLUMNS, HEADER_HELP};
+use super::capture_lines::Line;
+use super::capture_meta::{CaptureMeta, Value};
+use super::capture_places::Places;
+use crate::error::{InputError, Result};
+
+/// Where the two columns stand.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Layout {
+    /// Cells in every row.
+    pub(super) cells: usize,
+    /// 0-based cell of `drive_code` and of `sense_code`.
+    pub(super) used: [usize; 2],
+}
+
+/// Whether a header has the name of one of the contract's columns, in whatever form: then it is meant as one of the
+/// contract's.
+pub(super) fn names_a_column(header: &[u8]) -> bool {
+    let has = |name: &str| header.windows(name.len()).any(|w| w == name.as_bytes());
+    COLUMNS.iter().any(|c| has(c))
+}
+
+/// Reads one comment line `# key = value`; any other comment, and an unknown key, is passed over.
+/// What follows a further `#` is a remark.
+pub(super) fn read_comment(
+    line: Line<'_>,
+    meta: &mut CaptureMeta,
+    keys: &mut BenchKeys,
+    places: &mut Places,
+) -> Result<()> {
+    let text = String::from_utf8_lossy(line.bytes);
+    let help = "a comment line of a capture reads `# fs_hz = 224000.0`; correct the value, or take \
+                the line away";
+    let Some((left, right)) = text.split_once('=') else {
+        return Ok(());
+    };
+    let key = left.trim().trim_start_matches('#').trim();
+    let mut known = CaptureMeta::KEYS.into_iter().chain(BenchKeys::KEYS);
+    let Some(key) = known.find(|&known| known == key) else {
+        return Ok(());
+    };
+    let refuse = |offset: usize, message: String| {
+        InputError::new(message)
+            .in_file(line.path)
+            .at_offset(&text, offset)
+            .at(line.number, text[..offset].chars().count() + 1)
+            .help(help)
+    };
+    if places.knows(key) {
+        let offset = left.find(key).unwrap_or(0);
+        return Err(refuse(offset, format!("`{key}` is given a second time")).into());
+    }
+    let value = right.split('#').next().unwrap_or("");
+    let offset = left.len() + 1 + (value.len() - value.trim_start().len());
+    places.keep(key, refuse(offset, String::new()));
+    let value = value.trim();
+    meta.set(key, Value::of_text(value))
+        .and_then(|()| keys.set(key, &KeyValue::of_text(value)))
+        .map_err(|problem| refuse(offset, problem).into())
+}
+
+/// Finds the two columns in the header line.
+pub(super) fn read_header(line: Line<'_>, places: &mut Places) -> Result<Layout> {
+    if line.bytes.contains(&0) || line.bytes.starts_with(b"\xff\xfe") {
+        let message = "this is neither a CSV file in UTF-8 nor an NPY file (it has binary bytes)";
+        let e = InputError::new(message).in_file(line.path);
+        let help = format!(
+            "{HEADER_HELP}; samples without a header need a side-car: write `item = \"int16\"` into {} beside it",
+            bench_csv::sidecar_name(line.path)
+        );
+        return Err(e.help(help).into());
+    }
+    let is_there = |name: &str| line.bytes.windows(name.len()).any(|w| w == name.as_bytes());
+    if is_there("time_s") && is_there("rate_out_dps") {
+        return Err(line
+            .refuse(
+                0,
+                "this is a thermal record, and no capture: it has no column `drive_code`",
+            )
+            .help("give it with --record")
+            .into());
+    }
+    let names: Vec<&[u8]> = line
+        .bytes
+        .split(|&b| b == b',')
+        .map(<[u8]>::trim_ascii)
+        .collect();
+    let mut used = [0; 2];
+    for (column, place) in COLUMNS.into_iter().zip(&mut used) {
+        let is_it = |name: &&[u8]| *name == column.as_bytes();
+        let Some(first) = names.iter().position(is_it) else {
+            let message = format!("the header has no column `{column}`");
+            return Err(line.refuse(0, &message).help(HEADER_HELP).into());
+        };
+        let before = |cell: usize| -> usize {
+            let cells = line.bytes.split(|&b| b == b',').take(cell);
+            cells.map(|cell| cell.len() + 1).sum()
+        };
+        places.keep(column, line.refuse(before(first), ""));
+        if let Some(again) = names.iter().rposition(is_it).filter(|&last| last > first) {
+            return Err(line
+                .refuse(before(again), &format!("the header has `{column}` twice"))
+                .help("rename one of the two columns")
+                .into());
+        }
+        *place = first;
+    }
+    Ok(Layout {
+        cells: names.len(),
+        used,
+    })
+}

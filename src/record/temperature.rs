@@ -1,0 +1,72 @@
+//! Temperatures that are unlikely to be in degC: other units, raw codes.
+
+use super::plausibility::Column;
+use super::warning::Warning;
+
+/// Hotter than a gyro is, as a rule, degC: industrial parts end at 85, and heat themselves by some kelvin.
+const HOTTEST_DEGC: f64 = 105.0;
+
+/// Temperatures in Celsius: a median of 200 to 450 is a Kelvin reading of -73 to 177 degC; no
+/// silicon thermometer reads outside -100 to 250 degC.
+pub(super) fn temperature(c: &Column<'_>) -> Option<Warning> {
+    let name = c.name;
+    let range = format!("{:.2} to {:.2}", c.min(), c.max());
+    let said = |unit: &str| {
+        format!(
+            "say so in the design if it is: [record.columns] {name} = {{ column = \"{name}\", unit = \"{unit}\" }}"
+        )
+    };
+    if (200.0..=450.0).contains(&c.median()) && c.quantile(0.05) > 150.0 {
+        return c.warn(
+            "temperature_in_kelvin",
+            format!(
+                "{name} runs from {range}: it looks like kelvin; {}",
+                said("K")
+            ),
+        );
+    }
+    let celsius = |v: f64| (v - 32.0) / 1.8;
+    let (low, high) = (c.quantile(0.05), c.quantile(0.95));
+    if high > HOTTEST_DEGC && celsius(high) < 100.0 && celsius(low) > -60.0 {
+        return c.warn(
+            "temperature_in_fahrenheit",
+            format!(
+                "{name} runs from {range}: no gyro is rated beyond 125 degC, and few are heated beyond {HOTTEST_DEGC}. It \
+                 looks like Fahrenheit ({:.1} to {:.1} degC); {}",
+                celsius(c.min()),
+                celsius(c.max()),
+                said("degF")
+            ),
+        );
+    }
+    let (beyond, line) = c.count(|v| !v.is_nan() && !(-100.0..=250.0).contains(&v));
+    // Most of them: whole hundredths or thousandths of a degree, that a gyro may have.
+    let scaled = [(100.0, "cdegC"), (1000.0, "mdegC")]
+        .into_iter()
+        .find(|(times, _)| {
+            let (low, high) = (low / times, high / times);
+            -60.0 < low && high < HOTTEST_DEGC && high - low < 150.0 && high > 15.0
+        });
+    if let Some((times, unit)) = scaled.filter(|_| c.median().abs() > 250.0) {
+        return c.warn(
+            "temperature_out_of_range",
+            format!(
+                "{name} runs from {range}: degrees times {times} ({:.1} to {:.1} degC)? Then {}; raw codes are to be \
+                 converted by the thermometer's law first",
+                c.min() / times,
+                c.max() / times,
+                said(unit)
+            ),
+        );
+    }
+    if beyond > 0 {
+        return c.warn(
+            "temperature_out_of_range",
+            format!(
+                "{beyond} values of {name} lie outside -100..250 degC (range {range}), the first \
+                 on line {line}: raw counts, another unit, or glitches?"
+            ),
+        );
+    }
+    None
+}

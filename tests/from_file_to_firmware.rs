@@ -1,0 +1,228 @@
+//! A file of each kind that is read goes to compiled firmware without a design, and the choices are printed.
+
+#[path = "common/command.rs"]
+mod command;
+#[path = "common/logs.rs"]
+mod logs;
+
+use command::gyrogen_in;
+use std::fmt::Write as _;
+use std::fs;
+use std::io::Write as _;
+use std::path::Path;
+
+/// Rows of a warm-up and a way back: time, s, output, deg/s, temperature, degC.
+fn rows() -> Vec<(f64, f64, f64)> {
+    (0..240)
+        .map(|k| {
+            let degc = 20.0 + 0.25 * f64::from(if k < 120 { k } else { 240 - k });
+            let wobble = 0.01 * (7.7 * f64::from(k * k)).sin();
+            (
+                2.0 * f64::from(k),
+                0.5 - 0.02 * degc + 2e-4 * degc * degc + wobble,
+                degc,
+            )
+        })
+        .collect()
+}
+
+fn table(header: &str) -> String {
+    let mut csv = format!("{header}\n");
+    for (time_s, dps, degc) in rows() {
+        writeln!(csv, "{time_s},{dps:.5},{degc:.3}").expect("a string");
+    }
+    csv
+}
+
+fn gzip(bytes: &[u8]) -> Vec<u8> {
+    let mut out = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+    out.write_all(bytes).expect("memory");
+    out.finish().expect("memory")
+}
+
+fn zstd(bytes: &[u8]) -> Vec<u8> {
+    ruzstd::encoding::compress_to_vec(bytes, ruzstd::encoding::CompressionLevel::Fastest)
+}
+
+/// Status, stdout and stderr.
+fn gyrogen(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, String) {
+    let out = gyrogen_in(folder, arguments, &[]);
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (out.status.code(), text(&out.stdout), text(&out.stderr))
+}
+
+#[test]
+fn a_record_of_each_kind_becomes_compiled_firmware() {
+    let top = tempfile::tempdir().expect("a folder");
+    let csv = table("time_s,rate_out_dps,die_degc");
+    let (ulg, bin) = (logs::ulog(&rows()), logs::dataflash(&rows()));
+    let files: [(&str, Vec<u8>); 8] = [
+        ("r.csv", csv.clone().into_bytes()),
+        (
+            "units.csv",
+            table("time [s],rate_out [deg/s],die [degC]").into_bytes(),
+        ),
+        ("names.csv", table("time,gyro_z,temp").into_bytes()),
+        ("r.csv.gz", gzip(csv.as_bytes())),
+        ("r.csv.zst", zstd(csv.as_bytes())),
+        ("r.ulg", ulg.clone()),
+        ("r.bin", bin),
+        ("r.ulg.gz", gzip(&ulg)),
+    ];
+    for (name, bytes) in &files {
+        fs::write(top.path().join(name), bytes).expect("written");
+        let (status, said, complaints) =
+            gyrogen(top.path(), &["run", "--record", name, "--out", "out"]);
+        if *name == "names.csv" {
+            // Names that say nothing are asked for, with all keys at once.
+            assert_eq!(status, Some(2), "{said}{complaints}");
+            for key in [
+                "[record.columns]",
+                "time_s = \"time\"",
+                "rate_out_dps = \"gyro_z\"",
+                "die_degc = \"temp\"",
+                "--design FILE",
+            ] {
+                assert!(complaints.contains(key), "{key}: {complaints}");
+            }
+            continue;
+        }
+        assert_eq!(status, Some(0), "{name}: {said}{complaints}");
+        assert!(said.contains("read: "), "{name}: {said}");
+        for quantity in ["time_s", "rate_out_dps", "die_degc"] {
+            assert!(said.contains(quantity), "{name}: {said}");
+        }
+        assert!(said.contains(", 0 mismatches"), "{name}: {said}");
+        for file in [
+            "firmware/c/manifest.json",
+            "firmware/rust/manifest.json",
+            "summary.json",
+        ] {
+            assert!(
+                top.path().join("out").join(file).is_file(),
+                "{name}: {file}"
+            );
+        }
+        fs::remove_dir_all(top.path().join("out")).expect("removed");
+    }
+}
+
+fn codes() -> Vec<(i32, i32)> {
+    (0..4096)
+        .map(|k| {
+            let turns = std::f64::consts::TAU * f64::from(k) / 128.0;
+            let drive = -9000.0 * turns.cos();
+            let sense = 4000.0 * turns.sin() + 40.0 * (0.7 * f64::from(k)).sin();
+            (drive.round() as i32, sense.round() as i32)
+        })
+        .collect()
+}
+
+#[test]
+fn a_capture_of_each_form_runs_through_the_compiled_firmware() {
+    let top = tempfile::tempdir().expect("a folder");
+    let lines = |separator: &str, of: &dyn Fn(usize, i32, i32) -> [String; 3]| -> String {
+        let rows = codes().into_iter().enumerate();
+        rows.map(|(k, (d, s))| of(k, d, s).join(separator) + "\n")
+            .collect()
+    };
+    let volts = lines(",", &|k, d, s| {
+        [
+            format!("{:.9}", k as f64 / 224_000.0),
+            format!("{:.5}", f64::from(d) * 1e-4),
+            format!("{:.5}", f64::from(s) * 1e-4),
+        ]
+    });
+    let plain = lines(",", &|k, d, s| {
+        [k.to_string(), d.to_string(), s.to_string()]
+    });
+    let raw: Vec<u8> = codes()
+        .into_iter()
+        .flat_map(|(d, s)| [d as i16, s as i16])
+        .flat_map(i16::to_le_bytes)
+        .collect();
+    let mut npy = b"\x93NUMPY\x01\x00".to_vec();
+    let header = "{'descr': '<i2', 'fortran_order': False, 'shape': (4096, 2), }\n";
+    npy.extend((header.len() as u16).to_le_bytes());
+    npy.extend(header.bytes());
+    npy.extend(&raw);
+    let contract = format!("t,drive_code,sense_code\n{plain}");
+    let scope = format!("Model,X\nSample Interval,4.46e-6,s\n\nTIME,CH1,CH2\n{volts}");
+    let files: [(&str, Vec<u8>, &str); 6] = [
+        ("c.csv", contract.clone().into_bytes(), ""),
+        ("c.csv.gz", gzip(contract.as_bytes()), ""),
+        ("c.npy", npy, ""),
+        (
+            "names.csv",
+            format!("k,drive,sense\n{plain}").into_bytes(),
+            "read: the drive is column 1, \"drive\"",
+        ),
+        ("scope.csv", scope.into_bytes(), "read: a code is 1e-4"),
+        (
+            "samples.raw",
+            raw,
+            "read: 4096 rows of 2 interleaved channels",
+        ),
+    ];
+    let write =
+        |name: &str, bytes: &[u8]| fs::write(top.path().join(name), bytes).expect("written");
+    write("samples.toml", b"item = \"int16\"\n");
+    write(
+        "scope.toml",
+        b"drive_column = \"CH1\"\nsense_column = \"CH2\"\nvolts_per_code = 1e-4\n",
+    );
+    let mut first: Option<Vec<u8>> = None;
+    for (name, bytes, choice) in &files {
+        write(name, bytes);
+        let (status, said, complaints) = gyrogen(
+            top.path(),
+            &["replay", "--capture", name, "--out", "rows.csv"],
+        );
+        assert_eq!(status, Some(0), "{name}: {said}{complaints}");
+        assert!(complaints.contains(choice), "{name}: {complaints}");
+        let rows = fs::read(top.path().join("rows.csv")).expect("rows");
+        assert_eq!(first.get_or_insert(rows.clone()), &rows, "{name}");
+    }
+    // Compiled C and Rust beside the model, on what an oscilloscope wrote.
+    let (status, said, complaints) = gyrogen(
+        top.path(),
+        &["equiv", "--capture", "scope.csv", "--out", "out"],
+    );
+    assert_eq!(status, Some(0), "{said}{complaints}");
+    let (status, said, complaints) = gyrogen(
+        top.path(),
+        &["close", "--capture", "scope.csv", "--out", "closed"],
+    );
+    assert_eq!(status, Some(0), "{said}{complaints}");
+    assert!(complaints.contains("[capture_form]"), "{complaints}");
+}
+
+#[test]
+fn a_simulated_run_and_its_own_record_say_why_their_orders_differ() {
+    let top = tempfile::tempdir().expect("a folder");
+    let of = |arguments: &[&str]| {
+        let (status, said, complaints) = gyrogen(top.path(), arguments);
+        assert_eq!(status, Some(0), "{said}{complaints}");
+        let line = said
+            .lines()
+            .find(|l| l.starts_with("fit: "))
+            .expect("a fit");
+        line.to_owned()
+    };
+    let own = of(&["run", "--out", "own"]);
+    let again = of(&["run", "--record", "own/record.csv", "--out", "again"]);
+    assert!(
+        own.contains("fit: order 2 ") && own.contains("by held-out error it would be order 3"),
+        "{own}"
+    );
+    assert!(
+        own.contains("which `run --record` of this run's record takes"),
+        "{own}"
+    );
+    assert!(
+        again.contains("fit: order 3 ") && again.contains("the simulated run of a design takes 2"),
+        "{again}"
+    );
+    let floor = |line: &str| line.rsplit_once("noise floor ").map(|l| l.1.to_owned());
+    assert_eq!(floor(&own), floor(&again));
+}
