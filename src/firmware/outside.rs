@@ -3,9 +3,15 @@
 use crate::emit::machine::{Lowered, Type};
 use crate::vectors::model::Model;
 
+/// Vectors by which a limit that is off by one is told, for each end of each input.
+const EACH: usize = 2;
+/// Vectors among which these are looked for.
+const LOOKED_AT: usize = 2048;
+
 /// Inputs just outside their ranges and at the ends of their types, each with the inputs whose outputs are due:
-/// the same, limited. The state is inside its ranges. None for a function that limits nothing.
-pub(super) fn rows(lowered: &Lowered, model: &Model) -> Vec<[Vec<i128>; 2]> {
+/// the same, limited. The state is inside its ranges. None for a function that limits nothing. From `pool`, vectors
+/// inside the ranges, come the other words: those with which a limit that is off by one changes the result.
+pub(super) fn rows(lowered: &Lowered, model: &Model, pool: &[Vec<i128>]) -> Vec<[Vec<i128>; 2]> {
     let ranges = &model.inputs;
     if !lowered.guarded {
         return Vec::new();
@@ -34,6 +40,23 @@ pub(super) fn rows(lowered: &Lowered, model: &Model) -> Vec<[Vec<i128>; 2]> {
                 given[k] = word;
                 let due = limited(&given);
                 rows.push([given, due]);
+            }
+        }
+        for (end, step) in [(range.low, -1), (range.high, 1)] {
+            if !is_outside(&(end + step)) {
+                continue;
+            }
+            let with = |words: &[i128], word: i128| {
+                let mut words = words.to_vec();
+                words[k] = word;
+                words
+            };
+            for wrong in [end + step, end - step] {
+                let tells = |words: &&Vec<i128>| {
+                    model.traced(&with(words, end)) != model.traced(&with(words, wrong))
+                };
+                let found = pool.iter().take(LOOKED_AT).filter(tells).take(EACH);
+                rows.extend(found.map(|words| [with(words, end + step), with(words, end)]));
             }
         }
     }

@@ -50,8 +50,8 @@ pub fn function(model: &Model, lowered: Option<&Lowered>, more: Vec<Vec<i128>>) 
     inputs.extend(more);
     let (columns, _) = model.columns();
     let mut text = columns.join(",") + "\n";
+    let beside = lowered.map_or(Vec::new(), |lowered| outside::rows(lowered, model, &inputs));
     let inside = inputs.into_iter().map(|input| [input.clone(), input]);
-    let beside = lowered.map_or(Vec::new(), |lowered| outside::rows(lowered, model));
     for [given, due] in inside.chain(beside) {
         let mut line = model.input_words(&given);
         line.extend(model.record(&due));
@@ -79,7 +79,7 @@ pub fn of_design(design: &Design, bundle: &Bundle, models: &[Model]) -> Vec<Emit
     };
     let mut files: Vec<EmittedFile> = models.iter().map(one).collect();
     if bundle.has_chain {
-        files.extend(of_chain(design));
+        files.extend(of_chain(design, bundle));
     }
     files
 }
@@ -91,14 +91,25 @@ pub fn periods(design: &Design) -> usize {
     (VECTOR_SAMPLES / ratio).clamp(PERIODS, MOST_PERIODS)
 }
 
-fn of_chain(design: &Design) -> [EmittedFile; 2] {
+/// One of the six segments has codes beyond the converter's, where the emitted code limits these.
+fn of_chain(design: &Design, bundle: &Bundle) -> [EmittedFile; 2] {
     let ratio = design.circuit.decimator.ratio as usize;
     let samples = periods(design) * ratio;
     let segment = periods(design).div_ceil(6) * ratio;
     let (drive, sense) = stimulus::segments(design, samples, segment, SEED);
     let mut input = String::from("drive_code,sense_code\n");
-    for (d, s) in drive.iter().zip(&sense) {
-        input += &format!("{d},{s}\n");
+    let range = codes(design);
+    let sample = |f: &Function| f.name == "sample";
+    let sample = bundle.program.functions.iter().position(sample);
+    let is_limited = sample.is_some_and(|k| bundle.lowered[k].guarded);
+    let given = |n: usize, code: i32| match i128::from(code) {
+        word if !is_limited || (n / segment) % 6 != stimulus::SQUARES => word,
+        word if word == range.high => word + 1,
+        word if word == range.low => word - 1,
+        word => word,
+    };
+    for (n, (d, s)) in drive.iter().zip(&sense).enumerate() {
+        input += &format!("{},{}\n", given(n, *d), given(n, *s));
     }
     let mut output = chain::columns(design).join(",") + ",fault\n";
     for row in chain::rows(design, &drive, &sense) {

@@ -170,6 +170,21 @@ impl Model {
         self
     }
 
+    /// Outputs, state and fault as the recorded function gives them, also of words outside their ranges, where the
+    /// emitted function would limit them; nothing where none was recorded.
+    pub fn traced(&self, words: &[i128]) -> Vec<i128> {
+        let Some((program, number)) = &self.recorded else {
+            return Vec::new();
+        };
+        let inputs = program.program().functions[*number].inputs.len();
+        let (inputs, state) = words.split_at(inputs);
+        let (mut state, mut outputs) = (state.to_vec(), Vec::new());
+        let fault = program.call(*number, inputs, &mut state, &mut outputs);
+        outputs.extend(state);
+        outputs.push(i128::from(fault));
+        outputs
+    }
+
     /// Moves a word of a drawn state where the state would be one that no run of the chain reaches and that
     /// the emitted code's types do not hold.
     pub fn repair(&self, inputs: &mut [i128]) {

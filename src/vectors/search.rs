@@ -21,6 +21,10 @@ const CANDIDATES: usize = 1 << 14;
 const OPERATIONS: usize = 1 << 20;
 /// Vectors from which both sides of a branch are sought.
 const STARTS: usize = 6;
+/// Newton's steps towards a value.
+const ROUNDS: usize = 32;
+/// So near is near enough for the last words to be tried one by one.
+const NEAR: i128 = 24;
 /// Entries of a sine table that are swept one by one.
 const SWEPT: u32 = 16;
 
@@ -85,6 +89,8 @@ impl Search<'_> {
         };
         let values: Vec<Vec<i128>> = starts.iter().map(|words| self.values(words)).collect();
         let of = |id: Id| values.iter().map(move |v| v[id]);
+        // Ties so far, with what is rounded there.
+        let mut ties: Vec<(Id, Vec<Vec<i128>>)> = Vec::new();
         for node in &self.function.nodes {
             match node.op {
                 Op::IsNegative(a) => {
@@ -117,9 +123,22 @@ impl Search<'_> {
                     if (1..=62).contains(&cast.shift) {
                         let half = 1i128 << (cast.shift - 1);
                         let about = |v: i128| [v - 1, v, v + 1];
+                        let shift = cast.shift as u32;
+                        let before = chosen.len();
                         for target in about(0).into_iter().chain(about(half)) {
-                            self.tie(&starts, a, cast.shift as u32, target, chosen);
+                            self.tie(&starts, a, shift, target, None, chosen);
+                            if matches!(self.function.nodes[a].op, Op::Mul(..)) {
+                                self.tie_of_product(&starts, a, shift, target, chosen);
+                            }
                         }
+                        let first = chosen[before..].to_vec();
+                        // What a first rounding drops shows where a later one is at a tie as well.
+                        for (earlier, vectors) in &ties {
+                            for target in about(0).into_iter().chain(about(half)) {
+                                self.tie(vectors, a, shift, target, Some(*earlier), chosen);
+                            }
+                        }
+                        ties.push((a, first));
                     }
                 }
                 Op::Sine(phase, number) => {
@@ -132,7 +151,7 @@ impl Search<'_> {
                             0
                         };
                         for target in [-half - 1, -half] {
-                            self.tie(&starts, phase, dropped, target, chosen);
+                            self.tie(&starts, phase, dropped, target, None, chosen);
                         }
                     }
                 }
@@ -182,13 +201,15 @@ impl Search<'_> {
         }
     }
 
-    /// Vectors at which the node is `target` modulo 2^bits: one word is moved, along which the node is linear.
+    /// Vectors at which the node is `target` modulo 2^bits: one word is moved, along which the node is linear. The
+    /// node `kept`, if any, keeps its value.
     fn tie(
         &self,
         starts: &[Vec<i128>],
         node: Id,
         bits: u32,
         target: i128,
+        kept: Option<Id>,
         chosen: &mut Vec<Vec<i128>>,
     ) {
         let modulus = 1i128 << bits;
@@ -196,7 +217,8 @@ impl Search<'_> {
         let step = (starts.len() / STARTS).max(1);
         for start in starts.iter().step_by(step) {
             let mut words = start.clone();
-            let value = self.values(&words)[node];
+            let values = self.values(&words);
+            let value = values[node];
             for k in 0..words.len() {
                 let range = self.model.inputs[k];
                 let unit = if words[k] < range.high { 1 } else { -1 };
@@ -221,9 +243,10 @@ impl Search<'_> {
                 };
                 for step in [centred, centred + period, centred - period] {
                     words[k] = start[k] + step;
-                    let hits = self.is_allowed(&words)
-                        && (self.values(&words)[node] - target).rem_euclid(modulus) == 0;
-                    if hits {
+                    let moved = self.values(&words);
+                    let hits = (moved[node].wrapping_sub(target)).rem_euclid(modulus) == 0
+                        && kept.is_none_or(|id| moved[id] == values[id]);
+                    if hits && self.is_allowed(&words) {
                         chosen.push(words.clone());
                         found += 1;
                     }
@@ -234,6 +257,100 @@ impl Search<'_> {
                 return;
             }
         }
+    }
+
+    /// Vectors at which a product with a constant is `target` modulo 2^bits: the other factor is solved for and
+    /// sought, whatever it is made by.
+    fn tie_of_product(
+        &self,
+        starts: &[Vec<i128>],
+        node: Id,
+        bits: u32,
+        target: i128,
+        chosen: &mut Vec<Vec<i128>>,
+    ) {
+        let Op::Mul(a, b) = self.function.nodes[node].op else {
+            return;
+        };
+        let constant = |id: Id| match self.function.nodes[id].op {
+            Op::Constant(word) => Some(word),
+            _ => None,
+        };
+        let (word, factor) = match (constant(a), constant(b)) {
+            (Some(c), None) => (b, c),
+            (None, Some(c)) => (a, c),
+            _ => return,
+        };
+        let free = factor.trailing_zeros();
+        // An input is moved by `tie`.
+        let is_input = matches!(
+            self.function.nodes[word].op,
+            Op::Input(_) | Op::LoadWord(..)
+        );
+        if factor == 0 || is_input || free >= bits || target.trailing_zeros() < free {
+            return;
+        }
+        let period = 1i128 << (bits - free);
+        let due = (target >> free)
+            .wrapping_mul(inverse(factor >> free))
+            .rem_euclid(period);
+        let step = (starts.len() / STARTS).max(1);
+        for start in starts.iter().step_by(step) {
+            let is = self.values(start)[word];
+            let nearest = is + (due - is).rem_euclid(period);
+            for goal in [nearest, nearest - period] {
+                if let Some(words) = self.reached(start, word, goal) {
+                    chosen.push(words);
+                    return;
+                }
+            }
+        }
+    }
+
+    /// A vector near `start` at which the node has this value: one word is moved by the slope, then two by little.
+    fn reached(&self, start: &[i128], node: Id, goal: i128) -> Option<Vec<i128>> {
+        let mut words = start.to_vec();
+        let moved = |words: &[i128], k: usize, by: i128| {
+            let range = self.model.inputs[k];
+            let mut words = words.to_vec();
+            words[k] = (words[k] + by).clamp(range.low, range.high);
+            words
+        };
+        let mut steepest = 0;
+        for _ in 0..ROUNDS {
+            let off = goal - self.values(&words)[node];
+            if off.abs() <= NEAR {
+                break;
+            }
+            let slope = |k: usize| {
+                let range = self.model.inputs[k];
+                let step = ((range.high - range.low) >> 12).max(1);
+                let step = if words[k] + step > range.high {
+                    -step
+                } else {
+                    step
+                };
+                let change = self.values(&moved(&words, k, step))[node] - self.values(&words)[node];
+                change as f64 / step as f64
+            };
+            let slopes = (0..words.len()).map(|k| (k, slope(k)));
+            let (k, most) = slopes.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
+            if most == 0.0 {
+                return None;
+            }
+            steepest = k;
+            words = moved(&words, k, (off as f64 / most).round() as i128);
+        }
+        let other = (steepest + 1) % words.len();
+        for d in -NEAR..=NEAR {
+            for e in -NEAR..=NEAR {
+                let near = moved(&moved(&words, steepest, d), other, e);
+                if self.values(&near)[node] == goal && self.is_allowed(&near) {
+                    return Some(near);
+                }
+            }
+        }
+        None
     }
 
     /// Every entry of a sine table, once through each node that reads it.

@@ -118,6 +118,9 @@ pub fn capture(design: &Design, samples: usize, seed: u64) -> (Vec<i32>, Vec<i32
     segments(design, samples, 1 << 12, seed)
 }
 
+/// The segment, of six, in which both codes are squares between the ends of their range.
+pub const SQUARES: usize = 2;
+
 /// The same with segments of another length: at `samples / 6`, one of each kind.
 pub fn segments(design: &Design, samples: usize, length: usize, seed: u64) -> (Vec<i32>, Vec<i32>) {
     let format = design.circuit.adc.format;
@@ -141,7 +144,7 @@ pub fn segments(design: &Design, samples: usize, length: usize, seed: u64) -> (V
                 let sense = 0.3 * full * (angle + 0.1).sin() + 0.2 * full * angle.cos();
                 (clip(drive), clip(sense + 4.0 * noise(&mut lcg)))
             }
-            2 => {
+            SQUARES => {
                 let square = |a: f64| if a.sin() >= 0.0 { high } else { low };
                 (square(angle), square(angle + 1.0))
             }

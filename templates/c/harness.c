@@ -372,7 +372,73 @@ static void header(void)
     return differing;
 }
 
-{% endfor %}static bool arith(void)
+{% endfor %}{% if v.wide %}static bool same_128({{ v.p }}_w128_t a, {{ v.p }}_w128_t b)
+{
+    return (a.hi == b.hi) && (a.lo == b.lo);
+}
+
+/* The helpers for 128 bits against themselves in single steps: halves, doubles, sums of shifted words. */
+static uint64_t arith_128({{ v.p }}_w128_t a, {{ v.p }}_w128_t b)
+{
+    const {{ v.p }}_w128_t zero = {{ v.p }}_w128_make(0U, 0U);
+    uint64_t differing = 0U;
+    const bool minus = (a.hi >> 63U) != 0U;
+    {{ v.p }}_w128_t halved = a;
+    {{ v.p }}_w128_t floored = a;
+    {{ v.p }}_w128_t doubled = a;
+    {{ v.p }}_w128_t product = zero;
+    {{ v.p }}_w128_t due;
+    /* Digits of 32 bits with their carries. */
+    uint64_t carry = (a.lo & UINT32_MAX) + (b.lo & UINT32_MAX);
+    due.lo = carry & UINT32_MAX;
+    carry = (carry >> 32U) + (a.lo >> 32U) + (b.lo >> 32U);
+    due.lo |= carry << 32U;
+    due.hi = a.hi + b.hi + (carry >> 32U);
+    differing += same_128({{ v.p }}_w128_add(a, b), due) ? 0U : 1U;
+    differing += same_128({{ v.p }}_w128_sub(due, b), a) ? 0U : 1U;
+    differing += same_128({{ v.p }}_w128_add({{ v.p }}_w128_neg(a), a), zero) ? 0U : 1U;
+    differing += ({{ v.p }}_w128_is_negative(a) != minus) ? 1U : 0U;
+    for (uint32_t n = 0U; n < 128U; ++n) {
+        const {{ v.p }}_w128_t low = {{ v.p }}_w128_shr({{ v.p }}_w128_shl(a, 128U - ((n == 0U) ? 128U : n)), 128U - ((n == 0U) ? 128U : n));
+        const uint64_t bit = (n < 64U) ? ((b.lo >> n) & 1U) : ((b.hi >> (n - 64U)) & 1U);
+        differing += same_128({{ v.p }}_w128_shr(a, n), halved) ? 0U : 1U;
+        differing += same_128({{ v.p }}_w128_asr(a, n), floored) ? 0U : 1U;
+        differing += same_128({{ v.p }}_w128_shl(a, n), doubled) ? 0U : 1U;
+        differing += ((n > 0U) && !same_128({{ v.p }}_w128_mask(a, n), low)) ? 1U : 0U;
+        if (n > 0U) {
+            const {{ v.p }}_w128_t extended = {{ v.p }}_w128_sign_extend(a, n);
+            const {{ v.p }}_w128_t top = {{ v.p }}_w128_shr(low, n - 1U);
+            const {{ v.p }}_w128_t fill = (top.lo != 0U) ? {{ v.p }}_w128_shl({{ v.p }}_w128_make(UINT64_MAX, UINT64_MAX), n) : zero;
+            differing += same_128(extended, {{ v.p }}_w128_add(low, fill)) ? 0U : 1U;
+        }
+        if (bit != 0U) {
+            product = {{ v.p }}_w128_add(product, doubled);
+        }
+        halved.lo = (halved.lo >> 1U) | (halved.hi << 63U);
+        halved.hi >>= 1U;
+        floored.lo = (floored.lo >> 1U) | (floored.hi << 63U);
+        floored.hi = (floored.hi >> 1U) | (minus ? (UINT64_C(1) << 63U) : 0U);
+        doubled.hi = (doubled.hi << 1U) | (doubled.lo >> 63U);
+        doubled.lo <<= 1U;
+    }
+    differing += same_128({{ v.p }}_w128_mul(a, b), product) ? 0U : 1U;
+    differing += same_128({{ v.p }}_w128_from_s64({{ v.p }}_word_64(a.lo)), {{ v.p }}_w128_sign_extend({{ v.p }}_w128_make(0U, a.lo), 64U)) ? 0U : 1U;
+    differing += ({{ v.p }}_w128_to_s64(a) != {{ v.p }}_word_64(a.lo)) ? 1U : 0U;
+    const bool minus_b = (b.hi >> 63U) != 0U;
+    const bool less = (minus != minus_b) ? minus : ((a.hi < b.hi) || ((a.hi == b.hi) && (a.lo < b.lo)));
+    differing += ({{ v.p }}_w128_less(a, b) != less) ? 1U : 0U;
+    differing += {{ v.p }}_w128_less(a, a) ? 1U : 0U;
+    const {{ v.p }}_w128_t least = less ? a : b;
+    const {{ v.p }}_w128_t most = less ? b : a;
+    uint32_t fault = 0U;
+    differing += same_128({{ v.p }}_clamp_128(a, least, most), a) ? 0U : 1U;
+    differing += same_128({{ v.p }}_clamp_128(a, b, b), b) ? 0U : 1U;
+    differing += same_128({{ v.p }}_check_128(a, b, b, 7U, &fault), b) ? 0U : 1U;
+    differing += (fault != (same_128(a, b) ? 0U : 7U)) ? 1U : 0U;
+    return differing;
+}
+
+{% endif %}static bool arith(void)
 {
     uint64_t differing = 0U;
     for (uint32_t n = 0U; n < 64U; ++n) {
@@ -380,7 +446,10 @@ static void header(void)
             const uint64_t word = (UINT64_C(1) << n) + k - 2U;
             const uint64_t other = (k * UINT64_C(0x9E3779B97F4A7C15)) ^ ~word;
             differing += arith_64({{ v.p }}_word_64(word), {{ v.p }}_word_64(other));
-            differing += arith_64({{ v.p }}_word_64(~word), {{ v.p }}_word_64(word));
+{% if v.wide %}            differing += arith_128({{ v.p }}_w128_make(word, other), {{ v.p }}_w128_make(other, ~word));
+            differing += arith_128({{ v.p }}_w128_make(other, word), {{ v.p }}_w128_make(word, word));
+            differing += arith_128({{ v.p }}_w128_make((k == 0U) ? 0U : UINT64_MAX, word), {{ v.p }}_w128_make(0U, other));
+{% endif %}            differing += arith_64({{ v.p }}_word_64(~word), {{ v.p }}_word_64(word));
             differing += arith_32({{ v.p }}_word_32((uint32_t)word), {{ v.p }}_word_32((uint32_t)other));
             differing += arith_32({{ v.p }}_word_32(~(uint32_t)word), {{ v.p }}_word_32((uint32_t)word));
         }

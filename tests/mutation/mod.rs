@@ -138,6 +138,45 @@ fn numbers(code: &str) -> Vec<(usize, usize)> {
     all
 }
 
+/// A limit is moved that, by the range that is proved and printed beside it, never acts: both lines limit alike.
+fn is_beyond_the_proved_range(mutant: &Mutant) -> bool {
+    let number = |text: &str| -> Option<i128> {
+        let digits: String = text
+            .chars()
+            .filter(|c| c.is_ascii_digit() || *c == '-')
+            .collect();
+        digits.parse().ok()
+    };
+    let parts = |line: &str| -> Option<(String, i128, i128, i128, i128)> {
+        let (before, arguments) = line.split_once("_clamp_")?;
+        let (width, arguments) = arguments.split_once('(')?;
+        let (arguments, comment) = arguments.split_once(");")?;
+        let mut limits = arguments.rsplitn(3, ", ");
+        let constant = |text: &str| {
+            let (sign, inner) = (text.starts_with("(-"), text.split("_C(").nth(1)?);
+            number(inner).map(|v| if sign { -v } else { v })
+        };
+        let (high, low) = (constant(limits.next()?)?, constant(limits.next()?)?);
+        let range = comment
+            .trim()
+            .trim_end_matches("*/")
+            .rsplit(['*', ';'])
+            .next()?;
+        let (from, to) = range.split_once("..")?;
+        let head = format!("{before}{width}{}", limits.next()?);
+        Some((head, low, high, number(from.trim())?, number(to.trim())?))
+    };
+    let (Some(was), Some(is)) = (parts(&mutant.before), parts(&mutant.after)) else {
+        return false;
+    };
+    let (from, to) = (was.3, was.4);
+    // A limit within the range's end acts; one beyond it does not.
+    let same = |a: i128, b: i128, acts: bool| a == b || !acts;
+    was.0 == is.0
+        && same(was.1, is.1, was.1.max(is.1) >= from)
+        && same(was.2, is.2, was.2.min(is.2) <= to)
+}
+
 /// `(a < low) ? low : a` and `(a <= low) ? low : a` are the same, and so above.
 fn is_limit(mutant: &Mutant) -> bool {
     let [before, after] = [&mutant.before, &mutant.after].map(|line| line.trim().to_owned());
@@ -336,7 +375,10 @@ impl Bundle {
         {
             return Fate::Killed;
         }
-        if self.is_exhausted(mutant, &text) || is_limit(mutant) {
+        if self.is_exhausted(mutant, &text)
+            || is_limit(mutant)
+            || is_beyond_the_proved_range(mutant)
+        {
             return Fate::Same;
         }
         let original = self.source(name);
