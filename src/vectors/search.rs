@@ -24,7 +24,7 @@ const STARTS: usize = 6;
 /// Newton's steps towards a value.
 const ROUNDS: usize = 32;
 /// So near is near enough for the last words to be tried one by one.
-const NEAR: i128 = 24;
+const NEAR: i128 = 40;
 /// Entries of a sine table that are swept one by one.
 const SWEPT: u32 = 16;
 

@@ -177,6 +177,36 @@ fn is_beyond_the_proved_range(mutant: &Mutant) -> bool {
         && same(was.2, is.2, was.2.min(is.2) <= to)
 }
 
+/// An even rounding constant, one more, on a product with an even constant: the sum's last bit decides nothing.
+fn is_even(mutant: &Mutant, text: &str) -> bool {
+    let constants = |line: &str| -> Vec<u64> {
+        let parts = line.split("INT64_C(").chain(line.split("INT32_C("));
+        let number = |part: &str| part.split(')').next().and_then(|n| n.parse().ok());
+        parts.filter_map(number).collect()
+    };
+    let is_biased = mutant.before.trim().contains(" biased");
+    let (before, after) = (constants(&mutant.before), constants(&mutant.after));
+    let one_more = before
+        .iter()
+        .zip(&after)
+        .any(|(a, b)| a % 2 == 0 && *b == a + 1);
+    // The summand: `x + C` or `add(x, C)`.
+    let sum = mutant.before.split('=').nth(1).unwrap_or("").trim();
+    let summand = match sum.split_once("_add(") {
+        Some((_, arguments)) => arguments.split(',').next(),
+        None => sum.split(" + ").next(),
+    };
+    let made = format!(" {} = ", summand.unwrap_or(""));
+    let before_it: Vec<&str> = text.lines().take(mutant.line).collect();
+    let line = before_it.iter().rev().find(|line| line.contains(&made));
+    is_biased
+        && one_more
+        && line.is_some_and(|line| {
+            let is_product = line.contains(" * ") || line.contains("_mul(");
+            is_product && constants(line).iter().any(|c| *c > 0 && c % 2 == 0)
+        })
+}
+
 /// `(a < low) ? low : a` and `(a <= low) ? low : a` are the same, and so above.
 fn is_limit(mutant: &Mutant) -> bool {
     let [before, after] = [&mutant.before, &mutant.after].map(|line| line.trim().to_owned());
@@ -378,6 +408,8 @@ impl Bundle {
         if self.is_exhausted(mutant, &text)
             || is_limit(mutant)
             || is_beyond_the_proved_range(mutant)
+            || is_even(mutant, &text)
+            || self.is_guard_of_the_only_input(mutant)
         {
             return Fate::Same;
         }
@@ -386,6 +418,24 @@ impl Bundle {
             return Fate::Same;
         }
         Fate::Alive
+    }
+
+    /// The limit of the only input of a function without a state is off by one. The functions differ at most at the
+    /// ends of the range and beside them, and there they have just been compared.
+    fn is_guard_of_the_only_input(&self, mutant: &Mutant) -> bool {
+        let name = mutant.before.trim().split(' ').nth(2).unwrap_or("");
+        let Some(input) = name.strip_suffix("_in_range") else {
+            return false;
+        };
+        let vectors = std::fs::read_dir(self.folder.join("vectors")).expect("vectors");
+        let heads = vectors.filter_map(|entry| {
+            let text = std::fs::read_to_string(entry.expect("a file").path()).expect("vectors");
+            text.lines().next().map(str::to_owned)
+        });
+        // Input, output, fault.
+        let is_its = |head: &String| head.split(',').next() == Some(input);
+        let mut heads = heads.filter(is_its).peekable();
+        heads.peek().is_some() && heads.all(|head| head.split(',').count() == 3)
     }
 
     /// The mutant is in a function of which every input has just been run.
