@@ -60,7 +60,7 @@ fn cortex_m4() -> Processor {
         multiply_mixed: Sequence::mul(2.0, 1.0, 1.0),
         // Often the second operand's shift of an addition.
         extend: Sequence::alu(0.5),
-        sign_extend: alus(6.0, 5.0, 22.0),
+        sign_extend: alus(2.0, 5.0, 22.0),
         mask: alus(1.0, 2.0, 4.0),
         test: Sequence::alu(1.0),
         decide: Sequence::of(0.0, 0.0, 0.0, 1.0),
@@ -85,7 +85,7 @@ fn cortex_m4() -> Processor {
         spill: Sequence::of(0.0, 1.0, 1.0, 0.0),
         immediate: Immediate::Rotated,
         constant: Sequence::load(1.0),
-        push: Sequence::of(4.0, 2.0, 2.0, 4.0),
+        push: Sequence::of(2.0, 1.5, 1.5, 2.5),
         row: [
             Sequence::of(6.0, 1.0, 1.0, 2.0),
             Sequence::of(0.0, 0.5, 0.5, 0.0),
@@ -153,7 +153,7 @@ fn cortex_m0(multiplication: f64) -> Processor {
         spill: Sequence::alu(2.0),
         immediate: Immediate::Below(256),
         constant: Sequence::of(0.5, 1.0, 0.0, 0.0),
-        push: Sequence::of(6.5, 2.0, 2.0, 4.0),
+        push: Sequence::of(4.0, 2.0, 2.0, 3.0),
         row: [
             Sequence::of(8.0, 2.0, 2.0, 2.0),
             Sequence::of(0.0, 0.6, 0.6, 0.0),
@@ -215,7 +215,7 @@ fn rv32imc() -> Processor {
         spill: Sequence::of(0.0, 1.0, 1.0, 0.0),
         immediate: Immediate::Below(2048),
         constant: Sequence::alu(1.3),
-        push: Sequence::of(6.5, 4.0, 4.0, 4.0),
+        push: Sequence::of(4.0, 2.5, 2.5, 2.0),
         row: [
             Sequence::of(8.0, 2.0, 2.0, 2.0),
             Sequence::of(0.0, 1.0, 1.0, 0.0),
