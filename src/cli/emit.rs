@@ -8,11 +8,9 @@ use crate::design::{Compensation, Design};
 use crate::emit::bundle::Part;
 use crate::emit::views::Language;
 use crate::error::{InputError, Result};
-use crate::firmware::correction;
 use crate::firmware::correction::Origin;
-use crate::firmware::files;
 use crate::firmware::files::EmittedFile;
-use crate::firmware::{manifest, replace};
+use crate::firmware::{conversion, correction, files, manifest, product, replace};
 use crate::output::Results;
 use std::path::PathBuf;
 
@@ -76,6 +74,8 @@ pub(super) fn emitted(
 ) -> Result<Vec<EmittedFile>> {
     match part {
         Part::Correction => correction(design, language, command),
+        Part::Conversion => conversion(design, language, command),
+        Part::All => product::emit(design, language, command),
         part => files::emit(design, part, language, command),
     }
 }
@@ -117,6 +117,17 @@ pub(super) fn lacks_correction(what: &str) -> String {
         "warning: the design has a [correction], which the firmware written here ({what}) does not contain: \
          `gyrogen emit --part correction` emits it"
     )
+}
+
+/// The bundle of what makes the words of the design's `[correction]` of its chain's rows.
+fn conversion(design: &Design, language: Language, command: &str) -> Result<Vec<EmittedFile>> {
+    let (converted, _) = product::of_design(design)?;
+    let origin = Origin {
+        prefix: &conversion::prefix(&design.name),
+        sha256: &design.source.sha256,
+        command,
+    };
+    conversion::emit(&converted, &origin, language)
 }
 
 /// The bundle of the design's `[correction]`.

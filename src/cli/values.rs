@@ -29,6 +29,8 @@ values!(crate::emit::bundle::Part {
     Compensation = "compensation", "The bias polynomial of `[compensation]` and its subtraction from the rate";
     Tables = "tables", "The constant tables alone: sine, arctangents";
     Correction = "correction", "The correction of averaged readings that `gyrogen close` wrote as `[correction]`";
+    Conversion = "conversion", "What averages the chain's rows and scales them to the words of the `[correction]`";
+    All = "all", "Chain, conversion and correction in one folder, with an example that joins them";
     Chain = "chain", "The whole detection circuit with its compensation; the compensation alone where its thermometer is not the circuit's";
 });
 

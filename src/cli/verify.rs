@@ -105,6 +105,8 @@ fn of_design(path: &Path, manifest: &Manifest) -> Result<Vec<EmittedFile>> {
         "compensation" => Part::Compensation,
         "tables" => Part::Tables,
         "correction" => Part::Correction,
+        "conversion" => Part::Conversion,
+        "all" => Part::All,
         other => {
             return Err(
                 InputError::new(format!("no design emits a bundle of the part `{other}`"))

@@ -42,7 +42,8 @@ const DECAYS: Names = [
 const RELAYS: Names = [
     "relay_1", "relay_2", "relay_3", "relay_4", "relay_5", "relay_6", "relay_7", "relay_8",
 ];
-const INPUTS: [&str; MOST_INPUTS] = [
+/// Names of the inputs.
+pub const INPUTS: [&str; MOST_INPUTS] = [
     "input_1", "input_2", "input_3", "input_4", "input_5", "input_6", "input_7", "input_8",
 ];
 

@@ -203,7 +203,7 @@ impl Correction {
     /// The model's output word for each call, from the state before the first reading.
     pub fn run_words(&self, calls: &[Vec<i128>]) -> Vec<i128> {
         let mut stepper = self.stepper();
-        calls.iter().map(|words| stepper.call(words)).collect()
+        calls.iter().map(|words| stepper.corrected(words)).collect()
     }
 
     /// The bit-accurate model, call by call from the state before the first reading.
@@ -272,8 +272,8 @@ impl Correction {
 
 /// The model of a function with a state, called once a reading.
 pub trait Calls {
-    /// The output of the next call.
-    fn call(&mut self, words: &[i128]) -> i128;
+    /// Appends the outputs of the next call.
+    fn call(&mut self, words: &[i128], outputs: &mut Vec<i128>);
     /// The state, word by word in the order of its type.
     fn state(&mut self) -> Vec<i128>;
 }
@@ -286,8 +286,9 @@ pub struct Stepper<'a> {
     state: State<Fixed<i128, i128>>,
 }
 
-impl Calls for Stepper<'_> {
-    fn call(&mut self, words: &[i128]) -> i128 {
+impl Stepper<'_> {
+    /// The corrected rate of the next call.
+    pub fn corrected(&mut self, words: &[i128]) -> i128 {
         match words {
             [restart, inputs @ .., rate] => {
                 self.step
@@ -295,6 +296,12 @@ impl Calls for Stepper<'_> {
             }
             _ => 0,
         }
+    }
+}
+
+impl Calls for Stepper<'_> {
+    fn call(&mut self, words: &[i128], outputs: &mut Vec<i128>) {
+        outputs.push(self.corrected(words));
     }
 
     fn state(&mut self) -> Vec<i128> {

@@ -18,6 +18,10 @@ pub enum Part {
     Tables,
     /// The correction of averaged readings that `gyrogen close` wrote as `[correction]`.
     Correction,
+    /// What makes the words of the correction of the chain's rows.
+    Conversion,
+    /// Chain, conversion and correction, each in a folder of its own.
+    All,
     /// The whole detection circuit with its compensation; the compensation alone where its thermometer is not the circuit's.
     Chain,
 }

@@ -19,7 +19,7 @@ pub struct Origin<'a> {
 
 /// The prefix of the correction in a product of this name, whose chain has the name itself: both link together.
 pub fn prefix(name: &str) -> String {
-    format!("{name}_correction")
+    super::paths::prefix_of(name, "correction")
 }
 
 /// Emits a correction in one language, as files in memory: sources, self-test, driver, vectors, manifest.
@@ -35,6 +35,7 @@ pub fn emit(
         prefix: origin.prefix,
         program: &correction.trace(),
         model: &|| Box::new(correction.stepper()),
+        long_restart: crate::vectors::stimulus::SEGMENT,
         part: "correction",
         facts: sentences::facts(correction),
         request_sha256: origin.sha256,

@@ -28,7 +28,7 @@ pub struct Manifest {
     pub command: String,
     /// `c` or `rust`.
     pub language: String,
-    /// `compensation`, `tables`, `chain`, `function` or `correction`.
+    /// `compensation`, `tables`, `chain`, `function`, `conversion`, `correction`, or `all`: a product of three parts.
     pub part: String,
     /// Prefix (C) or crate (Rust).
     pub prefix: String,
@@ -49,11 +49,23 @@ pub struct Manifest {
     /// The compensation's calibrated range, where one is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibrated: Option<super::calibrated::Calibrated>,
+    /// A product's parts, each a bundle with a manifest in the folder of its name.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub parts: Vec<PartEntry>,
     /// Every other file.
     pub files: Vec<FileEntry>,
     /// SHA-256 of this manifest with an empty seal: whether anything of it was changed by hand. Who means to change
     /// it seals it again; against that there is the digest of the whole file.
     pub seal: String,
+}
+
+/// A part of a product.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct PartEntry {
+    /// What it is, and the folder that it is in.
+    pub part: String,
+    /// SHA-256 of its manifest.
+    pub digest: String,
 }
 
 /// A table.
@@ -257,12 +269,27 @@ pub struct Header<'a> {
     pub command: &'a str,
     /// The language.
     pub language: Language,
-    /// `compensation`, `tables`, `chain` or `function`.
+    /// As in the manifest.
     pub part: &'a str,
     /// There are functions, not tables alone.
     pub has_code: bool,
     /// Columns of a chain's row.
     pub columns: &'a [&'static str],
+}
+
+fn language_key(language: Language) -> &'static str {
+    match language {
+        Language::C => "c",
+        Language::Rust => "rust",
+    }
+}
+
+fn entries(files: &[EmittedFile]) -> Vec<FileEntry> {
+    let entry = |f: &EmittedFile| FileEntry {
+        path: f.path.clone(),
+        sha256: sha256(f.text.as_bytes()),
+    };
+    files.iter().map(entry).collect()
 }
 
 impl Manifest {
@@ -275,10 +302,7 @@ impl Manifest {
             version: env!("CARGO_PKG_VERSION").into(),
             design_sha256: header.design_sha256.into(),
             command: header.command.into(),
-            language: match header.language {
-                Language::C => "c".into(),
-                Language::Rust => "rust".into(),
-            },
+            language: language_key(header.language).into(),
             part: header.part.into(),
             prefix: bundle.prefix.clone(),
             tables: tables
@@ -321,13 +345,36 @@ impl Manifest {
                 })
                 .collect(),
             calibrated: None,
-            files: files
-                .iter()
-                .map(|f| FileEntry {
-                    path: f.path.clone(),
-                    sha256: sha256(f.text.as_bytes()),
-                })
-                .collect(),
+            parts: Vec::new(),
+            files: entries(files),
+            seal: String::new(),
+        }
+    }
+
+    /// The manifest of a product whose other files, those of its parts among them, are complete.
+    pub fn of_product(
+        header: &Header,
+        prefix: &str,
+        parts: Vec<PartEntry>,
+        files: &[EmittedFile],
+    ) -> Self {
+        Manifest {
+            schema: SCHEMA.into(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            design_sha256: header.design_sha256.into(),
+            command: header.command.into(),
+            language: language_key(header.language).into(),
+            part: header.part.into(),
+            prefix: prefix.into(),
+            tables: Vec::new(),
+            functions: Vec::new(),
+            chain: None,
+            sequence: None,
+            long_run: None,
+            faults: Vec::new(),
+            calibrated: None,
+            parts,
+            files: entries(files),
             seal: String::new(),
         }
     }

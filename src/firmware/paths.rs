@@ -43,6 +43,31 @@ pub fn sources(prefix: &str, only_tables: bool, language: Language) -> Vec<Strin
     }
 }
 
+/// The folders of a product's parts, which are those parts of a bundle as well.
+pub const PARTS: [&str; 3] = ["chain", "conversion", "correction"];
+
+/// The prefix of a part in a product of this name.
+pub fn prefix_of(name: &str, part: &str) -> String {
+    match part {
+        "chain" => name.to_owned(),
+        other => format!("{name}_{other}"),
+    }
+}
+
+/// The sources that a product has beside those of its parts.
+pub fn of_product(prefix: &str, language: Language) -> Vec<String> {
+    let own: &[&str] = match language {
+        Language::C => &["Makefile", "CMakeLists.txt"],
+        Language::Rust => &["Cargo.toml", "src/main.rs", "tests/parts.rs"],
+    };
+    let mut paths: Vec<String> = own.iter().map(|path| (*path).to_owned()).collect();
+    if language == Language::C {
+        paths.push(format!("test/{prefix}_all.c"));
+    }
+    paths.extend([README.to_owned(), SUMS.to_owned()]);
+    paths
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

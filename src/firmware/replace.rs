@@ -23,6 +23,8 @@ struct Found {
     old: Vec<String>,
     /// Those of them that are not as they were written.
     edited: Vec<String>,
+    /// What `verify` wrote.
+    verified: Vec<String>,
     /// Files that are none of the bundle's.
     foreign: Vec<String>,
 }
@@ -59,9 +61,11 @@ impl Found {
             }
         }
         let others = folder.files()?.into_iter();
-        let others = others
-            .filter(|f| !found.old.contains(f) && !VERIFIED.contains(&f.as_str()) && f != BUILT);
-        found.foreign = others.collect();
+        // A product's parts are bundles in folders of their own.
+        let is = |path: &str, name: &str| path.rsplit('/').next() == Some(name);
+        let others = others.filter(|f| !found.old.contains(f) && !is(f, BUILT));
+        let (verified, foreign) = others.partition(|f| VERIFIED.iter().any(|name| is(f, name)));
+        (found.verified, found.foreign) = (verified, foreign);
         Ok(found)
     }
 
@@ -134,7 +138,7 @@ pub fn collect(
         results.remove(below.join(name));
     }
     // Of another bundle, which is gone.
-    for name in VERIFIED {
+    for name in &found.verified {
         if !found.old.is_empty() && path.join(name).is_file() {
             results.remove(below.join(name));
         }

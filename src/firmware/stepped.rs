@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 use crate::numeric::trace::ir::{Interval, Program};
 use crate::vectors::interpreter::Interpreter;
 use crate::vectors::model::Model;
-use crate::vectors::stimulus::{Lcg, LongRun, SEED, SEGMENT};
+use crate::vectors::stimulus::{Lcg, LongRun, SEED};
 
 /// Calls of the self-test, and of each of the three parts of the vectors.
 const CALLS: usize = 1024;
@@ -32,10 +32,12 @@ const RATE: u32 = 1 << 23;
 pub struct Stepped<'a> {
     /// Prefix of every name in C, the crate in Rust.
     pub prefix: &'a str,
-    /// The recorded block: one function with a state, one output.
+    /// The recorded block: one function with a state.
     pub program: &'a Program,
     /// Its bit-accurate model from the state at zeros.
     pub model: &'a dyn Fn() -> Box<dyn Calls + 'a>,
+    /// Calls between restarts of the long run.
+    pub long_restart: u64,
     /// `part` in the manifest.
     pub part: &'static str,
     /// Lines for the head of the sources.
@@ -123,8 +125,9 @@ pub fn emit(what: &Stepped, language: Language) -> Result<Vec<EmittedFile>> {
     let drawn: Vec<(Interval, u32)> = rates
         .map(|(k, range)| (*range, RATE / (k as u32 + 2)))
         .collect();
-    let long = long(what.model, drawn.clone(), &wide);
+    let long = long(what, drawn.clone(), &wide);
     view.with_long(drawn, (vectors::LONG, long), language);
+    view.long_restart = what.long_restart;
     let mut emitted = files::sources(&view, Part::Compensation, language)?;
     let names = function.inputs.iter().map(|(port, _)| port.name);
     let names = names.chain(function.outputs.iter().map(|(port, _)| port.name));
@@ -168,27 +171,31 @@ fn checksum<'a>(
 ) -> u64 {
     let mut lcg = Lcg(SEED);
     let mut calls = model();
-    let outputs = (0..CALLS).map(|n| calls.call(&random(&mut lcg, ranges, n % RESTART == 0)));
-    let h = outputs.fold(views::BASIS, |h, word| mix(h, word as u64));
+    let mut outputs = Vec::new();
+    for n in 0..CALLS {
+        calls.call(&random(&mut lcg, ranges, n % RESTART == 0), &mut outputs);
+    }
+    let h = outputs
+        .iter()
+        .fold(views::BASIS, |h, word| mix(h, *word as u64));
     vectors::with_state(h, &calls.state(), wide)
 }
 
 /// Of the model's first state, its records over a long run, and its state then.
-fn long<'a>(
-    model: &dyn Fn() -> Box<dyn Calls + 'a>,
-    drawn: Vec<(Interval, u32)>,
-    wide: &[bool],
-) -> u64 {
+fn long(what: &Stepped, drawn: Vec<(Interval, u32)>, wide: &[bool]) -> u64 {
     let mut run = LongRun::new(drawn, SEED);
-    let mut calls = model();
+    let mut calls = (what.model)();
     let mut h = vectors::with_state(views::BASIS, &calls.state(), wide);
-    let mut words = Vec::new();
+    let (mut words, mut outputs) = (Vec::new(), Vec::new());
     for n in 0..vectors::LONG {
         words.clear();
-        words.push(i128::from(n % SEGMENT == 0));
+        words.push(i128::from(n % what.long_restart == 0));
         words.extend(run.draw());
+        outputs.clear();
+        calls.call(&words, &mut outputs);
         // The record ends with the fault, which is none.
-        h = mix(mix(h, calls.call(&words) as u64), 0);
+        outputs.push(0);
+        h = outputs.iter().fold(h, |h, word| mix(h, *word as u64));
     }
     vectors::with_state(h, &calls.state(), wide)
 }
@@ -239,8 +246,9 @@ fn in_order<'a, 'm>(
     let mut text = names.chain(["fault"]).collect::<Vec<_>>().join(",") + "\n";
     let mut model = model();
     for mut line in calls {
-        let word = model.call(&line);
-        line.extend([word, 0]);
+        let mut record = Vec::new();
+        model.call(&line, &mut record);
+        line.extend(record.into_iter().chain([0]));
         text += &csv_line(&line);
     }
     EmittedFile {

@@ -54,6 +54,8 @@ pub struct View {
     /// Low end, width and rate of each word that a long run draws.
     pub(super) long_words: Vec<[String; 3]>,
     pub(super) long_steps: u64,
+    /// Calls between restarts.
+    pub(super) long_restart: u64,
     pub(super) long_checksum: String,
 }
 
@@ -134,6 +136,7 @@ impl View {
             vector_rows: 0,
             long_words: Vec::new(),
             long_steps: 0,
+            long_restart: stimulus::SEGMENT,
             long_checksum: String::new(),
             functions,
             tables,

@@ -2,6 +2,7 @@
 
 use super::compare::{self, Compared};
 use super::expected;
+use super::product;
 use super::target::{self, Target};
 use super::toolchain::{self, Harness};
 use crate::emit::views::Language;
@@ -113,6 +114,20 @@ pub fn verify(
     if !problems.is_empty() {
         // What is not what it must be is not run.
         toolchain_name = String::from("none: nothing was built");
+    } else if manifest.part == expected::PRODUCT {
+        if changed_files.is_empty() {
+            let product = product::Product {
+                language,
+                manifest: &manifest,
+                folder: &folder,
+                path,
+                target,
+            };
+            let found = product.verified(command)?;
+            (toolchain_name, selftest) = (found.toolchain, Some(found.selftest));
+            problems.extend(found.problems);
+            run.functions = found.functions;
+        }
     } else if manifest.part != "tables" {
         // Built from copies: no name of the folder's reaches a compiler.
         let made = TemporaryFolder::of_the_system()

@@ -8,7 +8,7 @@ use crate::firmware::manifest::{self, Manifest};
 use crate::firmware::paths;
 
 /// Functions without which there is no such part.
-const FUNCTIONS: [(&str, &[&str]); 5] = [
+const FUNCTIONS: [(&str, &[&str]); 7] = [
     (
         "chain",
         &[
@@ -23,8 +23,15 @@ const FUNCTIONS: [(&str, &[&str]); 5] = [
     ("compensation", &["bias", "rate", "compensate"]),
     ("function", &["evaluate"]),
     ("correction", &["correct"]),
+    ("conversion", &["convert"]),
     ("tables", &[]),
+    // Its parts have them.
+    (PRODUCT, &[]),
 ];
+/// The part that has parts.
+pub(super) const PRODUCT: &str = "all";
+/// Parts of one function that is called in order.
+const SEQUENCES: [&str; 2] = ["correction", "conversion"];
 /// Most words of a line of vectors.
 const MOST_WORDS: usize = 4096;
 /// Endings of files that a build takes.
@@ -102,7 +109,7 @@ fn vectors(manifest: &Manifest) -> Vec<String> {
     if manifest.part == "chain" {
         names.extend(["chain_input", "chain_output"]);
     }
-    if manifest.part == "correction" {
+    if SEQUENCES.contains(&manifest.part.as_str()) {
         names.push(crate::firmware::stepped::SEQUENCE);
     }
     names
@@ -119,8 +126,14 @@ pub(super) fn problems(manifest: &Manifest, folder: &Folder) -> Result<Vec<Strin
     let mut problems = Vec::new();
     let language = language(manifest);
     let only_tables = manifest.part == "tables";
-    let mut due = paths::sources(&manifest.prefix, only_tables, language);
-    due.extend(vectors(manifest));
+    let is_product = manifest.part == PRODUCT;
+    let due = match is_product {
+        true => of_product(manifest, folder, &mut problems),
+        false => {
+            let sources = paths::sources(&manifest.prefix, only_tables, language);
+            sources.into_iter().chain(vectors(manifest)).collect()
+        }
+    };
     let listed: Vec<&str> = manifest.files.iter().map(|f| f.path.as_str()).collect();
     for path in &due {
         match listed.iter().filter(|p| *p == path).count() {
@@ -146,7 +159,7 @@ pub(super) fn problems(manifest: &Manifest, folder: &Folder) -> Result<Vec<Strin
         }
     }
     entries(manifest, &mut problems);
-    if !only_tables {
+    if !only_tables && !is_product {
         declared(manifest, language, folder, &mut problems);
     }
     if !only_tables && folder.read_text(paths::SUMS).ok() != Some(sums(manifest)) {
@@ -157,6 +170,42 @@ pub(super) fn problems(manifest: &Manifest, folder: &Folder) -> Result<Vec<Strin
         problems.push("the manifest is not as it was written (its seal is another)".to_owned());
     }
     Ok(problems)
+}
+
+/// The files that a product has: its own, and those of its parts as their manifests name them, of which each is to be
+/// of the product's design, command and language.
+fn of_product(manifest: &Manifest, folder: &Folder, problems: &mut Vec<String>) -> Vec<String> {
+    let mut due = paths::of_product(&manifest.prefix, language(manifest));
+    let named = manifest.parts.iter().map(|p| p.part.as_str());
+    if !named.eq(paths::PARTS) {
+        problems.push(format!("its parts are not {}", paths::PARTS.join(", ")));
+    }
+    for part in paths::PARTS {
+        let path = format!("{part}/{}", manifest::NAME);
+        let text = folder.read_text(&path).unwrap_or_default();
+        due.push(path.clone());
+        let Ok(of_part) = serde_json::from_str::<Manifest>(&text) else {
+            problems.push(format!("{path} is no manifest of a bundle"));
+            continue;
+        };
+        let digest = crate::digest::sha256(text.as_bytes());
+        let known = |p: &manifest::PartEntry| p.part == part && p.digest == digest;
+        if !manifest.parts.iter().any(known) {
+            problems.push(format!(
+                "the digest of {path} is not that of the product's part"
+            ));
+        }
+        let whole = |m: &Manifest| {
+            let texts = [&m.version, &m.design_sha256, &m.command, &m.language];
+            texts.map(String::clone)
+        };
+        let prefix = paths::prefix_of(&manifest.prefix, part);
+        if of_part.part != part || of_part.prefix != prefix || whole(&of_part) != whole(manifest) {
+            problems.push(format!("{path} is not of this product"));
+        }
+        due.extend(of_part.files.iter().map(|f| format!("{part}/{}", f.path)));
+    }
+    due
 }
 
 /// The lines of the checksums for who has no gyrogen.
@@ -188,18 +237,16 @@ fn entries(manifest: &Manifest, problems: &mut Vec<String>) {
         }
     }
     let is_chain = part == "chain";
+    let is_sequence = SEQUENCES.contains(&part);
     let present = [
         ("chain", manifest.chain.is_some(), is_chain),
-        (
-            "sequence",
-            manifest.sequence.is_some(),
-            part == "correction",
-        ),
+        ("sequence", manifest.sequence.is_some(), is_sequence),
         (
             "long_run",
             manifest.long_run.is_some(),
-            is_chain || part == "correction",
+            is_chain || is_sequence,
         ),
+        ("parts", !manifest.parts.is_empty(), part == PRODUCT),
     ];
     for (key, is, due) in present {
         if is != due {
@@ -335,6 +382,11 @@ fn banners(manifest: &Manifest, folder: &Folder, problems: &mut Vec<String>) {
         .files
         .iter()
         .filter(|f| !f.path.starts_with("vectors/") && f.path != paths::SUMS)
+        // Each part is looked at by itself.
+        .filter(|f| {
+            let folder = f.path.split('/').next().unwrap_or("");
+            manifest.part != PRODUCT || !paths::PARTS.contains(&folder)
+        })
     {
         let text = folder.read_text(&file.path).unwrap_or_default();
         if !text.lines().take(3).any(|line| line.contains(&banner)) {

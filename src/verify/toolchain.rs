@@ -62,28 +62,9 @@ pub fn build(
             format!("{version}; {}", C_FLAGS.join(" "))
         }
         Language::Rust => {
-            let library = made.path().join(format!("lib{prefix}.rlib"));
-            let mut command = compiler.command();
-            command
-                .args(RUST_FLAGS)
-                .args(["--crate-type", "rlib", "--crate-name", prefix]);
-            command
-                .arg(folder.join("src/lib.rs"))
-                .arg("-o")
-                .arg(&library);
-            compile(command, "the emitted Rust", made.path())?;
-            let mut command = compiler.command();
-            let mut library_argument = std::ffi::OsString::from(format!("{prefix}="));
-            library_argument.push(&library);
-            command
-                .args(RUST_FLAGS)
-                .arg("--extern")
-                .arg(library_argument);
-            command
-                .arg(folder.join("src/bin/harness.rs"))
-                .arg("-o")
-                .arg(&program);
-            compile(command, "the emitted Rust", made.path())?;
+            let crates = [(prefix.to_owned(), folder.join("src/lib.rs"))];
+            let main = folder.join("src/bin/harness.rs");
+            rust_program(&compiler, &crates, &main, made.path(), &program)?;
             format!("{version}; {}", RUST_FLAGS.join(" "))
         }
     };
@@ -93,6 +74,54 @@ pub fn build(
         toolchain,
         _folder: made,
     })
+}
+
+/// Builds the program of a product's parts together in Rust: `crates` by their names, each with its `lib.rs`.
+///
+/// # Errors
+/// As [`build`].
+pub fn build_crates(crates: &[(String, PathBuf)], main: &Path) -> Result<Harness> {
+    let made = TemporaryFolder::of_the_system()
+        .map_err(|e| io_error(std::env::temp_dir(), "make a folder for the build", &e))?;
+    let program = made.path().join("harness");
+    let (compiler, version) = compiler(Language::Rust)?;
+    rust_program(&compiler, crates, main, made.path(), &program)?;
+    Ok(Harness {
+        program,
+        emulator: None,
+        toolchain: format!("{version}; {}", RUST_FLAGS.join(" ")),
+        _folder: made,
+    })
+}
+
+/// Compiles crates, and a program that uses them.
+fn rust_program(
+    compiler: &Compiler,
+    crates: &[(String, PathBuf)],
+    main: &Path,
+    made: &Path,
+    program: &Path,
+) -> Result<()> {
+    let mut linked = Vec::new();
+    for (name, source) in crates {
+        let library = made.join(format!("lib{name}.rlib"));
+        let mut command = compiler.command();
+        command
+            .args(RUST_FLAGS)
+            .args(["--crate-type", "rlib", "--crate-name", name]);
+        command.arg(source).arg("-o").arg(&library);
+        compile(command, "the emitted Rust", made)?;
+        let mut argument = std::ffi::OsString::from(format!("{name}="));
+        argument.push(&library);
+        linked.push(argument);
+    }
+    let mut command = compiler.command();
+    command.args(RUST_FLAGS);
+    for argument in linked {
+        command.arg("--extern").arg(argument);
+    }
+    command.arg(main).arg("-o").arg(program);
+    compile(command, "the emitted Rust", made)
 }
 
 /// A compiler's command: its program and the arguments that go before all others (`gcc -m64`).

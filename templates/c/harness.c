@@ -282,7 +282,7 @@ static uint64_t long_run(void)
             }
         }
 {% else %}stimulus(&stimuli, n, &in[1]);
-        in[0] = ((n % {{ v.long_segment() }}U) == 0U) ? 1 : 0;
+        in[0] = ((n % {{ v.long_restart }}U) == 0U) ? 1 : 0;
         step(&s, in, out);
         for (size_t k = 0U; k < {{ v.stream_outputs() }}U; ++k) {
             h = mix(h, out[k]);

@@ -194,7 +194,7 @@ fn long_run() -> u64 {
     let mut out = Vec::new();
 {% for o in v.long_state() %}    h = mix(h, {{ o }});
 {% endfor %}    for n in 0..{{ v.long_steps }}_u64 {
-        let mut words = vec![i64::from(n % {{ v.long_segment() }} == 0)];
+        let mut words = vec![i64::from(n % {{ v.long_restart }} == 0)];
         words.extend(stimulus.words(n));
         out.clear();
         step(&mut s, &words, &mut out);
