@@ -1,6 +1,7 @@
 //! The files of a firmware bundle: sources, harness, self-test, vectors, manifest.
 
 use super::calibrated;
+pub use super::emitted::EmittedFile;
 use super::manifest::{self, Header, Manifest};
 use super::paths;
 use super::vectors::{self, Checked};
@@ -15,15 +16,6 @@ use crate::vectors::chain;
 use crate::vectors::model;
 use askama::Template;
 use std::path::Path;
-
-/// A file of a bundle.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct EmittedFile {
-    /// Path inside the bundle, with `/`.
-    pub path: String,
-    /// Contents.
-    pub text: String,
-}
 
 macro_rules! page {
     ($name:ident, $path:literal) => {

@@ -1,6 +1,7 @@
 //! The bundle of one function that stands alone: no chain, no state, one word in, one word out.
 
-use super::files::{self, EmittedFile};
+use super::emitted::EmittedFile;
+use super::files;
 use super::manifest::{self, Header, Manifest};
 use super::vectors::{self, Checked};
 use super::view::View;

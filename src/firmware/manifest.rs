@@ -1,6 +1,6 @@
 //! What a bundle says of itself: the manifest, and the banner and facts at the head of each file.
 
-use super::files::EmittedFile;
+use super::emitted::EmittedFile;
 use super::view::View;
 use crate::design::{CompensationInput, Design, Outside};
 use crate::digest::sha256;

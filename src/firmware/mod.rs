@@ -8,6 +8,7 @@ pub mod approximation;
 pub mod calibrated;
 pub mod conversion;
 pub mod correction;
+mod emitted;
 pub mod files;
 pub mod folder;
 pub mod function;

@@ -2,7 +2,8 @@
 //! builds, checks and shows them together.
 
 use super::correction::Origin;
-use super::files::{self, EmittedFile};
+use super::emitted::EmittedFile;
+use super::files;
 use super::manifest::{self, Header, Manifest, PartEntry};
 use super::{conversion, correction, paths, stepped, vectors};
 use crate::correction::block::{self, INPUTS};

@@ -1,7 +1,7 @@
 //! A bundle in the place of an older one: what nobody edited is replaced whole, what somebody edited or put there is
 //! not touched unless that is asked for.
 
-use super::files::EmittedFile;
+use super::emitted::EmittedFile;
 use super::folder::{Folder, is_plain};
 use super::manifest::{self, Manifest};
 use crate::digest::sha256;

@@ -2,16 +2,17 @@
 //!
 //! Its first input restarts the state where it is 1. The state starts at zeros.
 
-use super::files::{self, EmittedFile};
+use super::emitted::EmittedFile;
+use super::files;
 use super::manifest::{self, Header, Manifest};
 use super::tested;
 use super::vectors::{self, csv_line};
-use super::view::View;
+use super::view::{StreamView, View};
 use crate::correction::Calls;
 use crate::emit::bundle::{Bundle, Part, states};
 use crate::emit::lower::lower;
 use crate::emit::views;
-use crate::emit::views::{FunctionView, Language, mix};
+use crate::emit::views::{Language, mix};
 use crate::error::{Error, Result};
 use crate::numeric::trace::ir::{Interval, Program};
 use crate::vectors::interpreter::Interpreter;
@@ -46,31 +47,6 @@ pub struct Stepped<'a> {
     pub request_sha256: &'a str,
     /// The command that makes it again.
     pub command: &'a str,
-}
-
-/// What the templates show beside the function.
-#[derive(Debug, Clone)]
-pub struct StreamView {
-    /// The function.
-    pub function: FunctionView,
-    /// Printed in.
-    pub language: Language,
-    /// What vectors and self-test call it.
-    pub name: &'static str,
-    /// The state's name.
-    pub state: String,
-    /// As a Rust type.
-    pub camel: String,
-    /// The state `s` as unsigned 64-bit words.
-    pub final_state: Vec<String>,
-    /// Number in the self-test.
-    pub number: u32,
-    /// Calls in the self-test.
-    pub count: usize,
-    /// A restart so often.
-    pub restart: usize,
-    /// FNV-1a of the outputs.
-    pub checksum: String,
 }
 
 /// The program as a bundle.

@@ -2,7 +2,7 @@
 //! where all inputs or a long run are compared.
 
 use super::calibrated;
-use super::files::EmittedFile;
+use super::emitted::EmittedFile;
 use super::outside;
 use crate::design::Design;
 use crate::emit::bundle::Bundle;

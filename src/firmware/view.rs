@@ -1,6 +1,5 @@
 //! Everything that the templates of a bundle see.
 
-use super::stepped::StreamView;
 use super::tested::{self, TestView, Tested};
 use super::vectors::{self, Checked};
 use crate::design::Design;
@@ -17,6 +16,31 @@ use crate::vectors::stimulus::{self, SEED};
 
 /// Draws for each function in the self-test.
 const SELFTEST_DRAWS: u32 = 256;
+
+/// What the templates show of a function with a state that is called once a reading.
+#[derive(Debug, Clone)]
+pub struct StreamView {
+    /// The function.
+    pub function: FunctionView,
+    /// Printed in.
+    pub language: Language,
+    /// What vectors and self-test call it.
+    pub name: &'static str,
+    /// The state's name.
+    pub state: String,
+    /// As a Rust type.
+    pub camel: String,
+    /// The state `s` as unsigned 64-bit words.
+    pub final_state: Vec<String>,
+    /// Number in the self-test.
+    pub number: u32,
+    /// Calls in the self-test.
+    pub count: usize,
+    /// A restart so often.
+    pub restart: usize,
+    /// FNV-1a of the outputs.
+    pub checksum: String,
+}
 
 /// Everything that the templates of one bundle see.
 #[derive(Debug)]
