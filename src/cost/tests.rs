@@ -21,7 +21,7 @@ fn cost(changes: &[(&str, &str)], target: Target) -> Cost {
 const PRODUCT: &str = "product = { format = \"Q2.22\"";
 
 /// Products of Q2.15 and less make the decimator's sums fit 32 bits: counted by hand in the compiler's assembly,
-/// `sample` falls from 103 to 71 instructions on Cortex-M4.
+/// `push` with `sample` in it falls from 102 to 71 instructions on Cortex-M4.
 #[test]
 fn words_of_32_bits_in_the_decimator_take_fewer_instructions() {
     let at = |format: &str, target| {
@@ -34,9 +34,10 @@ fn words_of_32_bits_in_the_decimator_take_fewer_instructions() {
         if target == Target::Host {
             continue;
         }
-        // But for the slow part's shifts, and for rounding constants that are no immediates (counted on Cortex-M0: 1.3 %).
+        // But for the slow part's shifts, and for rounding constants that are no immediates: the model loads them for
+        // each of the four products, a compiler once.
         assert!(
-            wide.abs_diff(same) * 100 < wide * 3,
+            wide.abs_diff(same) * 100 < wide * 4,
             "{target:?}: {wide} {same}"
         );
         assert!(short < wide * 4 / 5, "{target:?}: {short} of {wide}");
@@ -48,7 +49,8 @@ fn the_sample_rate_counts_as_often_as_it_runs() {
     let rows = |ratio: &str| cost(&[("ratio = 32", ratio)], Target::CortexM4);
     let (one, two) = (rows("ratio = 64"), rows("ratio = 128"));
     let sample = (two.instructions_per_row - one.instructions_per_row) as f64 / 64.0;
-    assert!((100.0..130.0).contains(&sample), "{sample}");
+    // Counted in the compiler's assembly: 102, less the return that is not taken.
+    assert!((87.0..113.0).contains(&sample), "{sample}");
     assert_eq!(one.rom_bytes, two.rom_bytes);
 }
 
@@ -57,7 +59,8 @@ fn cordic_costs_by_its_iterations() {
     let with = |n: &str| cost(&[("iterations = 20", n)], Target::CortexM4);
     let (few, many) = (with("iterations = 10"), with("iterations = 20"));
     let each = (many.instructions_per_row - few.instructions_per_row) as f64 / 10.0;
-    assert!((25.0..45.0).contains(&each), "{each}");
+    // Counted in the compiler's assembly: 16.
+    assert!((13.0..19.0).contains(&each), "{each}");
     assert_eq!(few.fabric.multiplier_tiles, many.fabric.multiplier_tiles);
 }
 
