@@ -54,10 +54,8 @@ fn agrees(folder: &Path, json: &Value, f: fn(f64) -> f64) -> (f64, f64) {
     let manifest = std::fs::read_to_string(folder.join("c/manifest.json")).unwrap();
     let manifest: Value = serde_json::from_str(&manifest).unwrap();
     let every = &manifest["functions"][0]["every_input"];
-    // All words of the input's format, whose ends are among the vectors, in blocks of 4096.
-    let first = |line: &str| line.split(',').next().unwrap().parse::<i128>().unwrap();
-    let inputs = || vectors.lines().skip(1).map(first);
-    let words = inputs().min().unwrap()..=inputs().max().unwrap();
+    // All words of the input's format, in blocks of 4096.
+    let words = evaluator.words.0..=evaluator.words.1;
     assert_eq!(
         every["inputs"].as_i64().unwrap() as i128,
         words.end() - words.start() + 1

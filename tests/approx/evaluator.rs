@@ -6,6 +6,8 @@ use serde_json::Value;
 pub struct Evaluator {
     /// First and last code of the domain.
     pub codes: (i128, i128),
+    /// Least and greatest word of the input's format.
+    pub words: (i128, i128),
     input_bits: i32,
     output: Format,
     shape: Shape,
@@ -140,6 +142,10 @@ impl Evaluator {
         };
         Evaluator {
             codes: (number(&codes[0]), number(&codes[1])),
+            words: match format(&text(&formats["input"])) {
+                f if f.signed => (-(1 << (f.bits - 1)), (1 << (f.bits - 1)) - 1),
+                f => (0, (1 << f.bits) - 1),
+            },
             input_bits: format(&text(&formats["input"])).fraction_bits,
             output: format(&text(&formats["output"])),
             shape,
