@@ -26,7 +26,7 @@ pub struct Standalone<'a> {
     pub request_sha256: &'a str,
     /// The command that makes it again.
     pub command: &'a str,
-    /// From [`vectors`]: the same in every language.
+    /// From [`vectors()`]: the same in every language.
     pub vectors: &'a [EmittedFile],
     /// From [`every`].
     pub every: Option<Checked>,

@@ -52,7 +52,7 @@ impl Scale {
     }
 
     /// With what the given design adds itself: a figure of another design is as good where the whole, instrument and
-    /// words, is at most [`WORSE`] worse than the given design's whole. Bias, drift and scale factor add up, noise and
+    /// words, is at most `WORSE` worse than the given design's whole. Bias, drift and scale factor add up, noise and
     /// lines in squares.
     pub fn beside(self, f: &Figures) -> Scale {
         let own = |value: f64| (1.0 + WORSE) * value.abs();
@@ -121,7 +121,7 @@ impl Scale {
     }
 
     /// True if every figure is within its limit: the whole of its interval, or the figure itself where it is at most
-    /// [`WORSE`] above `given`'s, which has run on the same noise.
+    /// `WORSE` above `given`'s, which has run on the same noise.
     pub fn holds(&self, f: &Figures, bounds: &Bounds, given: &Figures) -> bool {
         let names = [
             LimitName::Bias,

@@ -1,8 +1,8 @@
 //! A design that costs a quarter less than the given one and is as good: found, or how far it is proved that there is
 //! none.
 //!
-//! Where the search has none, the words concerned, those that by themselves move the price by [`CONCERNED`] at least,
-//! are tried in all combinations: every length up to the given one by which the word alone is not above [`HOPELESS`]
+//! Where the search has none, the words concerned, those that by themselves move the price by `CONCERNED` at least,
+//! are tried in all combinations: every length up to the given one by which the word alone is not above `HOPELESS`
 //! times a limit. The other words are as in the cheapest good design that the search found. Every combination is
 //! priced; every one that is cheap enough is run bit for bit. Nothing is skipped by a rule of thumb.
 
@@ -39,7 +39,7 @@ pub struct Tried {
     pub cheap: usize,
     /// The least merit of these, and which it is.
     pub best: Option<(f64, Lengths)>,
-    /// Those of a merit up to [`NEAR`].
+    /// Those of a merit up to `NEAR`.
     pub near: Vec<Lengths>,
 }
 
