@@ -215,7 +215,8 @@ class Bench:
         where = "." if hostility == "same folder" else "out"
         if self.random.random() < 0.3 and hostility not in ("same folder", "full", "read-only"):
             where = "out/new/er" if name not in ALONE else "out"
-        if self.random.random() < 0.3 and name != "init" and where == "out":
+        stale_first = self.random.random() < 0.3 and name != "init" and where == "out"
+        if stale_first:
             (out / files[0]).write_bytes(STALE)
         arguments = [a.replace("OUT", where) for a in arguments]
         results = folder / where
@@ -243,6 +244,8 @@ class Bench:
             wrong.append("status 2 without a word")
         # A design of the user's own in the folder of the results is not written over.
         guarded = hostility == "same folder" and "no result of an earlier run" in self.stderr
+        # Nor a file that is none of a bundle where one of a bundle goes.
+        guarded = guarded or (stale_first and "this folder is no unedited bundle" in self.stderr)
         if hostility in ("none", "same folder") and status == 2 and not guarded:
             wrong.append("status 2 of a run that nothing disturbs")
         if hostility == "read-only" and status != 2:
