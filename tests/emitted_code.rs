@@ -286,3 +286,35 @@ fn the_readmes_example_compiles_and_runs() {
         );
     }
 }
+
+/// GCC takes the sum of an unsigned word and of a short parameter's bits for one of signed words.
+#[test]
+fn a_short_product_in_a_sum_of_32_bits_compiles_without_a_warning() {
+    for bits in [10, 12, 13, 14] {
+        let to = format!("product = {{ format = \"Q2.{bits}\"");
+        let text = DEFAULT.replacen("product = { format = \"Q2.22\"", &to, 1);
+        let (_, files) = chain(&text);
+        let source = self::text(&files, "gyro.c");
+        assert!(
+            source.contains("_integrate(gyro_cic_t *s, int16_t product)"),
+            "{bits}"
+        );
+        let folder = tempfile::tempdir().expect("a folder");
+        gyrogen::firmware::files::write(&files, folder.path()).expect("written");
+        compile(
+            folder.path(),
+            &[
+                "-std=c99",
+                "-O2",
+                "-Wall",
+                "-Wextra",
+                "-Wconversion",
+                "-Wshadow",
+                "-pedantic",
+                "-Werror",
+                "-c",
+                "gyro.c",
+            ],
+        );
+    }
+}

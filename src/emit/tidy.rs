@@ -1,6 +1,6 @@
 //! What is left out of a lowered function, and what is written where it is used.
 
-use super::machine::{Expr, Lowered, Statement, Type, Typed, Value, visit_operands};
+use super::machine::{Expr, Lowered, Statement, Type, Typed, Value, Width, visit_operands};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Removes temporaries that nothing reads; notes of faults and calls stay.
@@ -67,10 +67,24 @@ fn note_assigned(body: &[Statement], kept: &mut Vec<usize>) {
     }
 }
 
+/// The bits of a parameter of fewer than 32 bits. GCC's `-Wconversion` takes their sum with an unsigned word for one
+/// of signed words, unless they have a name.
+fn is_of_a_narrow_parameter(expr: &Expr, taken: &BTreeMap<usize, (Type, Expr)>) -> bool {
+    let is_narrow = |v: &Typed| {
+        let ty = matches!(v.ty, Type::Signed(Width::W8 | Width::W16));
+        ty && matches!(v.value, Value::Input(_))
+    };
+    let Expr::Low(of) = expr else { return false };
+    match of.value {
+        Value::Temp(k) => matches!(taken.get(&k), Some((_, Expr::Convert(v))) if is_narrow(v)),
+        _ => is_narrow(of),
+    }
+}
+
 fn take(body: &mut Vec<Statement>, kept: &[usize], taken: &mut BTreeMap<usize, (Type, Expr)>) {
     body.retain(|s| match s {
         Statement::Let(k, ty, expr @ (Expr::Convert(_) | Expr::Low(_) | Expr::ToSigned(_)), _)
-            if !kept.contains(k) =>
+            if !kept.contains(k) && !is_of_a_narrow_parameter(expr, taken) =>
         {
             taken.insert(*k, (*ty, expr.clone()));
             false
