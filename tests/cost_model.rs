@@ -86,7 +86,8 @@ __attribute__((naked)) void _start(void)
 #if defined(__arm__)
     __asm__ volatile("bl driver_start");
 #else
-    __asm__ volatile("call driver_start");
+    /* The linker's relaxation addresses by gp. */
+    __asm__ volatile(".option push\n.option norelax\nla gp, __global_pointer$\n.option pop\ncall driver_start");
 #endif
 }
 "#;
@@ -182,110 +183,85 @@ fn designs() -> Vec<(&'static str, Design)> {
     ]
 }
 
-/// Ten more, which the model's tables were not made from: what they have and the first ten do not.
-fn fresh() -> Vec<(&'static str, Design)> {
-    let product = "product = { format = \"Q2.22\", rounding = \"half_up\"";
-    let output = "output = { format = \"Q2.22\", rounding = \"half_up\"";
-    let bias = "output = { format = \"Q12.12\", rounding = \"half_up\"";
-    let accumulator = "accumulator = { format = \"Q13.27\", rounding = \"half_up\"";
-    let with_loop = |more: &[(&str, &str)]| changed(&[&LOOP[..], more].concat());
-    vec![
-        (
-            "product Q2.10 half away",
-            changed(&[(
-                product,
-                "product = { format = \"Q2.10\", rounding = \"half_away\"",
-            )]),
-        ),
-        (
-            "one stage, ratio 100",
-            changed(&[("stages = 3", "stages = 1"), ("ratio = 32", "ratio = 100")]),
-        ),
-        (
-            "five stages, ratio 20, delay 2",
-            changed(&[
-                ("stages = 3", "stages = 5"),
-                ("ratio = 32", "ratio = 20"),
-                ("differential_delay = 1", "differential_delay = 2"),
-            ]),
-        ),
-        (
-            "8-bit table of 64, detuned",
-            changed(&[
-                ("table = \"Q1.15\"", "table = \"Q1.7\""),
-                ("table_address_bits = 12", "table_address_bits = 6"),
-                ("tuning_word = 134217728", "tuning_word = 134230000"),
-            ]),
-        ),
-        (
-            "oscillator of 24 bits, floor address",
-            changed(&[
-                ("phase_bits = 32", "phase_bits = 24"),
-                ("tuning_word = 134217728", "tuning_word = 524288"),
-                (
-                    "address_rounding = \"half_up\"",
-                    "address_rounding = \"floor\"",
-                ),
-            ]),
-        ),
-        (
-            "bias Q12.6, accumulator Q13.20",
-            changed(&[
-                (
-                    bias,
-                    "output = { format = \"Q12.6\", rounding = \"half_even\"",
-                ),
-                (
-                    accumulator,
-                    "accumulator = { format = \"Q13.20\", rounding = \"floor\"",
-                ),
-            ]),
-        ),
-        (
-            "CORDIC of 24 steps, angle of 30 bits",
-            changed(&[
-                ("iterations = 20", "iterations = 24"),
-                ("angle_bits = 24", "angle_bits = 30"),
-            ]),
-        ),
-        (
-            "decimated Q2.22 toward zero, product Q2.16",
-            changed(&[
-                (
-                    output,
-                    "output = { format = \"Q2.22\", rounding = \"toward_zero\"",
-                ),
-                (
-                    product,
-                    "product = { format = \"Q2.16\", rounding = \"half_up\"",
-                ),
-            ]),
-        ),
-        (
-            "phase loop, product Q2.15, two stages",
-            with_loop(&[
-                (
-                    product,
-                    "product = { format = \"Q2.15\", rounding = \"half_up\"",
-                ),
-                ("stages = 3", "stages = 2"),
-            ]),
-        ),
-        (
-            "phase loop, ratio 8, table Q1.19",
-            with_loop(&[
-                ("ratio = 32", "ratio = 8"),
-                ("table = \"Q1.15\"", "table = \"Q1.19\""),
-            ]),
-        ),
-    ]
+/// Numbers that follow one another (Knuth's constants).
+struct Dice(u64);
+
+impl Dice {
+    fn between(&mut self, low: u32, high: u32) -> u32 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        low + ((self.0 >> 33) % u64::from(high - low + 1)) as u32
+    }
+
+    fn one_of<T: Copy>(&mut self, all: &[T]) -> T {
+        all[self.between(0, all.len() as u32 - 1) as usize]
+    }
+}
+
+/// The default with every word and size drawn anew that a key states; `None` where such a design is refused.
+fn drawn(dice: &mut Dice) -> Option<(String, Design)> {
+    let roundings = ["half_up", "floor", "half_even", "half_away", "toward_zero"];
+    let cast = |key: &str, format: &str, dice: &mut Dice| {
+        let from = format!("{key} = {{ format = \"{format}\", rounding = \"half_up\"");
+        let (whole, fraction) = format.split_once('.').unwrap();
+        let fraction: u32 = fraction.parse().unwrap();
+        let fraction = dice.between(fraction - 10, fraction);
+        let rounding = dice.one_of(&roundings);
+        let to = format!("{key} = {{ format = \"{whole}.{fraction}\", rounding = \"{rounding}\"");
+        (from, to)
+    };
+    let mut changes = vec![
+        cast("product", "Q2.22", dice),
+        cast("output", "Q12.12", dice),
+        cast("accumulator", "Q13.27", dice),
+    ];
+    let mut size = |key: &str, given: u32, drawn: u32| {
+        changes.push((format!("{key} = {given}"), format!("{key} = {drawn}")));
+    };
+    size("stages", 3, dice.between(1, 6));
+    size("ratio", 32, dice.between(8, 100));
+    size("differential_delay", 1, dice.between(1, 2));
+    size("table_address_bits", 12, dice.between(5, 12));
+    size("iterations", 20, dice.between(8, 26));
+    size("angle_bits", 24, dice.between(16, 30));
+    size("guard_bits", 6, dice.between(2, 8));
+    let tuning = dice.one_of(&[134_217_728, 134_230_000, 120_000_001]);
+    size("tuning_word", 134_217_728, tuning);
+    let table = format!("table = \"Q1.{}\"", dice.between(7, 21));
+    changes.push(("table = \"Q1.15\"".to_owned(), table));
+    let address = dice.one_of(&["half_up", "floor"]);
+    let rounding = format!("address_rounding = \"{address}\"");
+    changes.push(("address_rounding = \"half_up\"".to_owned(), rounding));
+    if dice.between(0, 2) == 0 {
+        changes.extend(LOOP.map(|(from, to)| (from.to_owned(), to.to_owned())));
+    }
+    let mut text = template::DEFAULT.to_owned();
+    for (from, to) in &changes {
+        assert!(text.contains(from.as_str()), "{from}");
+        text = text.replacen(from.as_str(), to, 1);
+    }
+    let design = reader::parse(&text, None).ok()?;
+    let named = [0, 3, 4, 6, 10].map(|k| changes[k].1.as_str()).join(", ");
+    Some((named, design))
+}
+
+/// Ten drawn designs. A seed that the model's prices were looked at with judges them no longer: take another one.
+fn fresh() -> Vec<(String, Design)> {
+    let seed = std::env::var("GYROGEN_COST_SEED").map_or(11, |s| s.parse().unwrap());
+    let mut dice = Dice(seed);
+    std::iter::repeat_with(|| drawn(&mut dice))
+        .flatten()
+        .take(10)
+        .collect()
 }
 
 fn run(command: &mut Command) -> String {
     let out = command.output();
     let out = out.unwrap_or_else(|e| panic!("{command:?}: {e}; .ci/cross installs it"));
     let text = String::from_utf8_lossy(&out.stderr);
-    assert!(out.status.success(), "{command:?}: {text}");
+    assert!(out.status.success(), "{command:?}: {}: {text}", out.status);
     String::from_utf8_lossy(&out.stdout).into_owned()
 }
 
@@ -361,11 +337,11 @@ fn predicted_instructions_are_within_15_percent_of_counted_ones() {
 
 #[test]
 #[ignore = "needs the cross compilers and qemu"]
-fn so_they_are_of_ten_designs_that_the_model_was_not_made_from() {
+fn so_they_are_of_ten_drawn_designs() {
     within_15_percent(fresh());
 }
 
-fn within_15_percent(designs: Vec<(&str, Design)>) {
+fn within_15_percent<S: std::fmt::Display>(designs: Vec<(S, Design)>) {
     let verbose = std::env::var_os("GYROGEN_COST_BY_FUNCTION").is_some();
     let mut wrong = Vec::new();
     for (name, design) in designs {
