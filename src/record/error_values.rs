@@ -261,12 +261,13 @@ fn visits(time_s: &[f64], values: &[f64], cells: &[usize]) -> Vec<Visit> {
             },
         )
     };
-    let mut out = Vec::new();
+    let alike = || cells.chunk_by(|a, b| values[*a] == values[*b]);
+    // As long as it gets: a long record has as many visits as rows.
+    let mut out = Vec::with_capacity(alike().count());
     let mut start = 0;
-    while start < cells.len() {
-        let value = values[cells[start]];
-        let same = cells[start..].iter().take_while(|i| values[**i] == value);
-        let end = start + same.count().max(1);
+    for same in alike() {
+        let value = values[same[0]];
+        let end = start + same.len();
         let before = start.checked_sub(1).map(|a| step(a, start));
         let after = (end < cells.len()).then(|| step(end - 1, end));
         let between = |a: usize, b: usize| time_s[cells[b]] - time_s[cells[a]];
@@ -307,7 +308,7 @@ impl Scale {
     fn of_visits(visits: &[Visit]) -> Option<Scale> {
         let mut by_value: Vec<(f64, f64)> = visits.iter().map(|v| (v.value, v.per_row)).collect();
         by_value.retain(|v| v.1.is_finite());
-        by_value.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        by_value.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
         let each: Vec<f64> = by_value
             .chunk_by(|a, b| a.0 == b.0)
             .filter_map(|of_one| of_one.get(of_one.len() / 2))
