@@ -1,7 +1,7 @@
 //! The table of forms that meet a bound.
 
 use crate::cost::function::FunctionCost;
-use comfy_table::{CellAlignment, Table};
+use comfy_table::Table;
 
 /// A line: form in words, cost, errors as they are shown, undominated, chosen.
 pub(super) struct Line<'a> {
@@ -23,7 +23,7 @@ pub(super) fn table<'a>(errors: &[&str], lines: impl Iterator<Item = Line<'a>>) 
     ];
     let mut all: Vec<&str> = titles.into_iter().chain(errors.iter().copied()).collect();
     all.push("");
-    let mut table = super::table(&all);
+    let mut table = super::terminal::table(&all);
     for line in lines {
         let mark = match (line.chosen, line.undominated) {
             (true, _) => "chosen",
@@ -41,8 +41,6 @@ pub(super) fn table<'a>(errors: &[&str], lines: impl Iterator<Item = Line<'a>>) 
         row.push(mark.to_owned());
         table.add_row(row);
     }
-    for column in table.column_iter_mut().skip(1).take(4 + errors.len()) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
+    super::terminal::numbers(&mut table, 1..1 + 4 + errors.len());
     table
 }

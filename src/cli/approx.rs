@@ -1,7 +1,9 @@
 //! `gyrogen approx`: a function in fixed point, with its certified error.
 
+use super::alternatives;
 use super::recorded::Recorded;
-use super::{OutputFormat, alternatives};
+use super::stages::Stages;
+use super::terminal::OutputFormat;
 use crate::approx::form::polynomial::{Monomials, Scheme};
 use crate::design::target::Target;
 use crate::emit::views::Language;
@@ -14,11 +16,10 @@ use crate::tabulate::job;
 use crate::tabulate::job::{Asked, Request, Weight};
 use crate::tabulate::outcome::{Alternative, Outcome, Search};
 use crate::tabulate::selection::Reason;
-use crate::timing::{self, Stopwatch};
+use crate::timing;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::sync::Mutex;
-use std::time::{Duration, Instant};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Approximate a function in fixed point by a polynomial, table or segments with a proved error, in C and Rust.
 #[derive(Debug, clap::Args)]
@@ -96,7 +97,7 @@ pub struct Arguments {
 /// # Errors
 /// A request that cannot be used (exit 2); a bound that is not met (exit 1).
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
-    let watch = Stopwatch::start("approximating");
+    let watch = Stages::start("approximating");
     let request = request(arguments)?;
     let planned = ["approx.json", timing::NAME];
     let mut results = Results::claim(&arguments.out, &planned, &recorded.inputs)?;
@@ -105,13 +106,12 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
             replace::refuse(&[], &arguments.out.join(folder))?;
         }
     }
-    let bar = Progress::new();
+    let done = AtomicU64::new(0);
     let threads = super::threads(arguments.threads);
     let made = job::approximate(&request, &recorded.command, threads, &|total, count| {
-        bar.add(total, count)
-    });
-    bar.done();
-    let made = made?;
+        let done = count + done.fetch_add(count, Ordering::Relaxed);
+        watch.at(done, Some(total as u64));
+    })?;
     watch.stage("emitting");
     let model = crate::vectors::form::model(&made.settled)?;
     let vectors = approximation::vectors(&made.settled, &model);
@@ -136,7 +136,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     watch.write(&mut results, &made.outcome.design_sha256, &recorded.command)?;
     results.finish()?;
     match arguments.format {
-        OutputFormat::Json => say!("{}", json.trim_end()),
+        OutputFormat::Json => super::terminal::give(&json),
         OutputFormat::Text => print(&made.outcome, &arguments.out),
     }
     if made.outcome.holds {
@@ -200,15 +200,16 @@ fn spelled<T: clap::ValueEnum>(value: &T) -> String {
 fn print(o: &Outcome, out: &std::path::Path) {
     if let Some(listed) = &o.alternatives {
         let table = alternatives::table(&["certified error"], listed.iter().map(alternative));
-        say!("{table}");
+        super::terminal::show(&table);
     }
     if let Some(search) = &o.search {
-        let mut table = super::table(&["coefficients", "ideal evaluation", "whole evaluation"]);
+        let mut table =
+            super::terminal::table(&["coefficients", "ideal evaluation", "whole evaluation"]);
         for c in &search.compared {
             let total = c.total_max_abs.map_or("-".into(), |v| format!("{v:.5e}"));
             table.add_row([c.name.to_owned(), format!("{:.5e}", c.ideal_max_abs), total]);
         }
-        say!("{table}");
+        super::terminal::show(&table);
         say!("{}", taken(search));
     }
     say!("{} on {}: {}", o.function, o.domain, o.detail);
@@ -299,41 +300,4 @@ fn taken(search: &Search) -> String {
         _ => "",
     };
     format!("taken: {why}{gain}{best}")
-}
-
-/// A bar on a terminal for what takes over two seconds.
-struct Progress {
-    started: Instant,
-    bar: Mutex<(u64, Option<indicatif::ProgressBar>)>,
-}
-
-impl Progress {
-    fn new() -> Self {
-        Progress {
-            started: Instant::now(),
-            bar: Mutex::new((0, None)),
-        }
-    }
-
-    fn add(&self, total: u128, count: u64) {
-        let Ok(mut state) = self.bar.lock() else {
-            return;
-        };
-        state.0 += count;
-        if state.1.is_none() && self.started.elapsed() > Duration::from_secs(2) {
-            // Draws to stderr, and only on a terminal.
-            state.1 = Some(indicatif::ProgressBar::new(total as u64));
-        }
-        if let Some(bar) = &state.1 {
-            bar.set_position(state.0);
-        }
-    }
-
-    fn done(&self) {
-        if let Ok(state) = self.bar.lock()
-            && let Some(bar) = &state.1
-        {
-            bar.finish_and_clear();
-        }
-    }
 }

@@ -1,13 +1,13 @@
 //! `gyrogen check`: what is proved of a design, what it costs, what could be better.
 
-use super::OutputFormat;
 use super::recorded::Recorded;
+use super::stages::Stages;
+use super::terminal::OutputFormat;
 use crate::check::outcome::{Check, NodeCheck, Overflows};
 use crate::check::{self, SAMPLES};
 use crate::error::{Error, Result};
 use crate::output::Results;
-use crate::timing::{self, Stopwatch};
-use comfy_table::CellAlignment;
+use crate::timing;
 use std::path::PathBuf;
 
 /// Prove the range of every word of a design, say what overflows, what each rounding and each part costs.
@@ -34,7 +34,7 @@ const PLANNED: [&str; 2] = ["check.json", timing::NAME];
 /// # Errors
 /// An unusable design (exit 2); a word that overflows for certain, a requirement that is not met (exit 1).
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
-    let watch = Stopwatch::start("proving and running");
+    let watch = Stages::start("proving and running");
     let design = super::design(arguments.design.as_deref())?;
     let claim = |out: &PathBuf| Results::claim(out, &PLANNED, &recorded.inputs);
     let results = arguments.out.as_ref().map(claim).transpose()?;
@@ -47,7 +47,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         results.finish()?;
     }
     match arguments.format {
-        OutputFormat::Json => say!("{}", json.trim_end()),
+        OutputFormat::Json => super::terminal::give(&json),
         OutputFormat::Text => print(&check),
     }
     if check.holds {
@@ -60,7 +60,7 @@ fn print(check: &Check) {
     for reason in &check.reasons {
         say!("{reason}");
     }
-    let mut table = super::table(&[
+    let mut table = super::terminal::table(&[
         "word",
         "format",
         "proved range, raw",
@@ -73,10 +73,8 @@ fn print(check: &Check) {
     for node in &check.nodes {
         table.add_row(row(node));
     }
-    for column in table.column_iter_mut().skip(2) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    say!("{table}");
+    super::terminal::numbers(&mut table, 2..);
+    super::terminal::show(&table);
     for node in check
         .nodes
         .iter()
@@ -104,7 +102,7 @@ fn print(check: &Check) {
             check.samples
         );
     }
-    let mut table = super::table(&[
+    let mut table = super::terminal::table(&[
         "processor",
         "instructions a row",
         "cycles a row",
@@ -124,10 +122,8 @@ fn print(check: &Check) {
         row.extend(numbers.map(|n| n.to_string()));
         table.add_row(row);
     }
-    for column in table.column_iter_mut().skip(1) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    say!("{table}");
+    super::terminal::numbers(&mut table, 1..);
+    super::terminal::show(&table);
     if let Some(cost) = check.costs.first() {
         let f = &cost.fabric;
         say!(
@@ -164,7 +160,8 @@ fn requirements(check: &Check) {
     if check.requirements.is_empty() {
         return;
     }
-    let mut table = super::table(&["required", "on", "limit", "obtained", "between", "met"]);
+    let mut table =
+        super::terminal::table(&["required", "on", "limit", "obtained", "between", "met"]);
     for r in &check.requirements {
         let sign = if r.at_least { ">=" } else { "<=" };
         let between = r.bounds.map_or("-".to_owned(), |[low, high]| {
@@ -179,10 +176,8 @@ fn requirements(check: &Check) {
             if r.met { "yes" } else { "NO" }.to_owned(),
         ]);
     }
-    for column in table.column_iter_mut().skip(2) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    say!("{table}");
+    super::terminal::numbers(&mut table, 2..);
+    super::terminal::show(&table);
     if let Some(c) = &check.confidence {
         say!(
             "the {} intervals hold at once with {:.0} % confidence ({}: each by itself with {:.2} %)",

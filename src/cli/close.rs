@@ -1,7 +1,8 @@
 //! `gyrogen close`: what a measurement says beyond its declared model.
 
-use super::OutputFormat;
 use super::recorded::Recorded;
+use super::stages::Stages;
+use super::terminal::OutputFormat;
 use crate::capture;
 use crate::correction::Planned;
 use crate::design::Design;
@@ -20,9 +21,8 @@ use crate::thermal::close::Closed;
 use crate::thermal::firmware::emitted;
 use crate::thermal::firmware::emitted::{Emitted, Told};
 use crate::thermal::search::Effort;
-use crate::timing::{self, Stopwatch};
+use crate::timing;
 use crate::verdict::{Closure, Verdict};
-use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
 /// Find what a measured record holds beyond the declared bias: a named cause or an honest refusal, and new firmware.
@@ -88,7 +88,7 @@ const PLANNED: [&str; 6] = [
 /// An unusable design or record; with `--verify` no compiler (exit 2); emitted code that differs from the model,
 /// and with `--controls` a name for a column without meaning (exit 1).
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
-    let watch = Stopwatch::start("reading the input");
+    let watch = Stages::start("reading the input");
     if let Some(stray) = &arguments.stray {
         return Err(stray_file(stray));
     }
@@ -97,17 +97,10 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     if arguments.self_test {
         return super::self_test::run(arguments, &design, recorded, &watch);
     }
-    let loud = std::io::stderr().is_terminal();
-    let closing = |path: &Path| {
-        if loud {
-            talk!("closing {} ...", path.display());
-        }
-        watch.stage("closing");
-    };
     let out = arguments.out.as_deref().unwrap_or(Path::new(FOLDER));
     let mut results = Results::claim(out, &PLANNED, &recorded.inputs)?;
     let (closure, compared, controls) = if let Some(path) = &arguments.capture {
-        closing(path);
+        watch.stage("closing");
         let closed = capture::close(path, &design, &recorded.command)?;
         watch.stage("writing");
         let page = crate::report::capture::html(&closed, &name_of(path))?;
@@ -118,7 +111,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
             crate::verify::firmware::refuse_edited(out)?;
         }
         let (record, warnings) = crate::record::read_any(path, &design.record)?;
-        closing(path);
+        watch.stage("closing");
         if arguments.format == OutputFormat::Text {
             say!("read: {}", record.understood());
         }
@@ -139,7 +132,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         };
         watch.stage("controls");
         let controls = if arguments.controls {
-            Some(super::controls::run(&closed, &record, &design)?)
+            Some(super::controls::run(&closed, &record, &design, &watch)?)
         } else {
             None
         };
@@ -172,7 +165,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     watch.write(&mut results, &closure.design_sha256, &recorded.command)?;
     results.finish()?;
     match arguments.format {
-        OutputFormat::Json => say!("{}", json.trim_end()),
+        OutputFormat::Json => super::terminal::give(&json),
         OutputFormat::Text => print(&closure, compared.as_ref(), controls.as_ref(), out),
     }
     for warning in &closure.warnings {
@@ -297,8 +290,9 @@ fn write(
         crate::thermal::residuals::write(closed, path)
     })?;
     results.write("report.html", page.as_bytes())?;
+    // A design's text on a terminal; `design.toml` has it.
     if let Some((diff, _)) = &augmented
-        && std::io::stderr().is_terminal()
+        && std::io::IsTerminal::is_terminal(&std::io::stderr())
     {
         talk!("{}", diff.sentence());
     }
@@ -307,7 +301,8 @@ fn write(
 
 fn print(c: &Closure, compared: Option<&Emitted>, controls: Option<&Controls>, out: &Path) {
     if !c.steps.is_empty() {
-        let mut table = super::table(&["step", "parameters", "held-out rms", "p", "like it"]);
+        let mut table =
+            super::terminal::table(&["step", "parameters", "held-out rms", "p", "like it"]);
         for s in &c.steps {
             let parameters: Vec<String> = s
                 .parameters
@@ -325,7 +320,7 @@ fn print(c: &Closure, compared: Option<&Emitted>, controls: Option<&Controls>, o
                 s.indistinguishable_from.join("\n"),
             ]);
         }
-        say!("{table}");
+        super::terminal::show(&table);
     }
     say!("{}", sentence(c));
     say!(
@@ -341,7 +336,7 @@ fn print(c: &Closure, compared: Option<&Emitted>, controls: Option<&Controls>, o
         say!("firmware cannot carry this: the warnings say why");
     }
     if let Some(compared) = compared {
-        say!("{}", super::comparison_table(&compared.functions));
+        super::terminal::show(&super::comparison_table(&compared.functions));
         say!("emitted C and Rust: {}", compared.sentence());
     }
     if let Some(controls) = controls {

@@ -1,39 +1,13 @@
 //! What the subcommands share: lines and tables on the terminal, progress, JSON, the design that was named.
 
+use super::terminal;
 use crate::emit::views::Language;
 use crate::error::Result;
 use crate::firmware::files::EmittedFile;
 use crate::firmware::replace;
 use crate::output::Results;
 use crate::verify::compare::{Compared, language_name};
-use clap::ValueEnum;
-use std::io::IsTerminal;
 use std::path::Path;
-use std::sync::Mutex;
-
-/// A line on stdout; what cannot be written is an error at the end, for what is written to files is.
-macro_rules! say {
-    ($($words:tt)*) => {
-        crate::output::standard::line(format_args!($($words)*))
-    };
-}
-
-/// A line on stderr.
-macro_rules! talk {
-    ($($words:tt)*) => {
-        crate::output::standard::talk(format_args!($($words)*))
-    };
-}
-
-/// How results are printed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
-pub(super) enum OutputFormat {
-    /// Tables and sentences.
-    #[default]
-    Text,
-    /// The JSON that is written to the file.
-    Json,
-}
 
 /// Reads the design named on the command line, or the embedded default.
 pub(super) fn design(path: Option<&Path>) -> Result<crate::design::Design> {
@@ -77,25 +51,6 @@ pub(super) fn threads(asked: Option<u16>) -> usize {
     )
 }
 
-/// Something with a bar of its progress (done, in all) on a terminal, gone when it ends.
-pub(super) fn with_bar<T>(work: impl FnOnce(crate::selftest::Progress<'_>) -> T) -> T {
-    let bar: Mutex<Option<indicatif::ProgressBar>> = Mutex::new(None);
-    let loud = std::io::stderr().is_terminal();
-    let progress = |done: usize, total: usize| {
-        if let Ok(mut bar) = bar.lock()
-            && loud
-        {
-            let bar = bar.get_or_insert_with(|| indicatif::ProgressBar::new(total as u64));
-            bar.set_position(done as u64);
-        }
-    };
-    let out = work(&progress);
-    if let Ok(Some(bar)) = bar.into_inner() {
-        bar.finish_and_clear();
-    }
-    out
-}
-
 /// Indented JSON with a final newline: what is written and what `--format json` prints.
 pub(super) fn json<T: serde::Serialize>(value: &T) -> String {
     crate::text::json(value)
@@ -126,17 +81,9 @@ pub(super) fn bundle(
     Ok(())
 }
 
-/// A table of numbers for the terminal.
-pub(super) fn table(header: &[&str]) -> comfy_table::Table {
-    let mut table = comfy_table::Table::new();
-    table.load_style(comfy_table::presets::UTF8_HORIZONTAL_ONLY);
-    table.set_header(header);
-    table
-}
-
 /// Emitted code against the model, a line each.
 pub(super) fn comparison_table(compared: &[Compared]) -> comfy_table::Table {
-    let mut table = table(&[
+    let mut table = terminal::table(&[
         "emitted",
         "language",
         "inputs",
@@ -157,8 +104,6 @@ pub(super) fn comparison_table(compared: &[Compared]) -> comfy_table::Table {
             c.mismatches.to_string(),
         ]);
     }
-    for column in table.column_iter_mut().skip(2) {
-        column.set_cell_alignment(comfy_table::CellAlignment::Right);
-    }
+    super::terminal::numbers(&mut table, 2..);
     table
 }

@@ -1,5 +1,6 @@
 //! `gyrogen close --controls`: what a name, and what silence is worth in this record.
 
+use super::stages::Stages;
 use crate::design::Design;
 use crate::error::Result;
 use crate::record::ThermalRecord;
@@ -11,22 +12,27 @@ use crate::thermal::close::Closed;
 ///
 /// # Errors
 /// A record that cannot be closed with what is added.
-pub fn run(closed: &Closed, record: &ThermalRecord, design: &Design) -> Result<Controls> {
-    super::with_bar(|progress| {
-        controls::run(closed, record, design, super::threads(None), progress)
-    })
+pub fn run(
+    closed: &Closed,
+    record: &ThermalRecord,
+    design: &Design,
+    stages: &Stages,
+) -> Result<Controls> {
+    let progress = |done: usize, of: usize| stages.at(done as u64, Some(of as u64));
+    controls::run(closed, record, design, super::threads(None), &progress)
 }
 
 /// The tables.
 pub fn print(c: &Controls) {
-    let mut table = super::table(&["fake column", "spectrum of", "p", "p beside", "control"]);
+    let mut table =
+        super::terminal::table(&["fake column", "spectrum of", "p", "p beside", "control"]);
     for fake in &c.negative.fakes {
         table.add_row(words::fake(fake));
     }
-    say!("{table}");
+    super::terminal::show(&table);
     say!("negative control: {}", words::negative(c));
     if !c.positive.is_empty() {
-        let mut table = super::table(&[
+        let mut table = super::terminal::table(&[
             "planted",
             "90 % from",
             "planted x",
@@ -37,7 +43,7 @@ pub fn print(c: &Controls) {
         for planted in &c.positive {
             table.add_row(words::planted(planted));
         }
-        say!("{table}");
+        super::terminal::show(&table);
     }
     say!("positive control: {}", words::positive(c));
 }

@@ -4,6 +4,7 @@
 //! another one is asked for, and then it is said what is missing.
 
 use super::recorded::Recorded;
+use super::terminal::{self, OutputFormat};
 use crate::design::{Compensation, Design};
 use crate::emit::bundle::Part;
 use crate::emit::views::Language;
@@ -31,6 +32,9 @@ pub struct Arguments {
     /// Overwrite a bundle's files that were edited; files that are none of a bundle's stay.
     #[arg(long)]
     force: bool,
+    /// How the result is printed: in words on stderr, or the bundle's manifest on stdout.
+    #[arg(long, value_enum, default_value = "text")]
+    format: OutputFormat,
 }
 
 /// Runs the command.
@@ -50,6 +54,10 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let bundle = emitted(&design, part, arguments.lang, &recorded.command)?;
     super::common::bundle(&bundle, "", &mut results, arguments.force)?;
     results.finish()?;
+    if arguments.format == OutputFormat::Json {
+        let manifest = bundle.iter().find(|f| f.path == manifest::NAME);
+        terminal::give(manifest.map_or("", |f| &f.text));
+    }
     for remark in remarks(&design, part, arguments.part.is_some()) {
         talk!("{remark}");
     }

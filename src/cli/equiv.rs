@@ -1,7 +1,8 @@
 //! `gyrogen equiv`: float against fixed node by node, model against emitted C and Rust.
 
-use super::OutputFormat;
 use super::recorded::Recorded;
+use super::stages::Stages;
+use super::terminal::OutputFormat;
 use crate::cosim::stream::stimulus;
 use crate::design::Design;
 use crate::emit::views::Language;
@@ -11,7 +12,7 @@ use crate::equivalence::shrink;
 use crate::error::{Error, Result};
 use crate::output::{Results, name_of};
 use crate::record::capture::CaptureReader;
-use crate::timing::{self, Stopwatch};
+use crate::timing;
 use std::path::{Path, PathBuf};
 
 /// Compare the fixed-point circuit with its float twin, every word within a bound, and the emitted code with the model.
@@ -63,7 +64,7 @@ const SAMPLES: usize = 10_000_000;
 /// An unusable design or capture, no compiler (exit 2); a node outside its bound, an overflow, emitted
 /// code that differs, a difference from the design given with `--against` (exit 1).
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
-    let watch = Stopwatch::start("making the stimulus");
+    let watch = Stages::start("making the stimulus");
     let design = super::design(arguments.design.as_deref())?;
     let planned = ["equiv.json", job::COUNTEREXAMPLE, timing::NAME];
     let mut results = Results::claim(&arguments.out, &planned, &recorded.inputs)?;
@@ -97,7 +98,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     watch.write(&mut results, &result.design_sha256, &recorded.command)?;
     results.finish()?;
     match arguments.format {
-        OutputFormat::Json => say!("{}", json.trim_end()),
+        OutputFormat::Json => super::terminal::give(&json),
         OutputFormat::Text => print(&result),
     }
     if result.holds {
@@ -144,7 +145,7 @@ fn read(design: &Design, path: &Path, most: usize) -> Result<(Vec<i32>, Vec<i32>
 }
 
 fn print(e: &Equivalence) {
-    let mut table = super::table(&[
+    let mut table = super::terminal::table(&[
         "node",
         "max error",
         "bound",
@@ -158,10 +159,8 @@ fn print(e: &Equivalence) {
     for n in &e.nodes {
         table.add_row(row(n));
     }
-    for column in table.column_iter_mut().skip(1).take(7) {
-        column.set_cell_alignment(comfy_table::CellAlignment::Right);
-    }
-    say!("{table}");
+    super::terminal::numbers(&mut table, 1..1 + 7);
+    super::terminal::show(&table);
     say!("{} ADC samples, {} rows: {}", e.samples, e.rows, e.stimulus);
     for (emitted, language) in [(&e.model_vs_c, "C"), (&e.model_vs_rust, "Rust")] {
         let Some(emitted) = emitted else {
@@ -191,7 +190,7 @@ fn print(e: &Equivalence) {
     }
     print_spurs(e);
     if !e.loops.is_empty() {
-        say!("{}", super::simulate::loops(&e.loops));
+        super::terminal::show(&super::simulate::loops(&e.loops));
     }
     if let Some(against) = &e.against {
         match &against.first_difference {

@@ -17,7 +17,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<()> {
     let text = crate::design::template::DEFAULT;
     let Some(path) = &arguments.file else {
-        say!("{}", text.trim_end());
+        super::terminal::give(text);
         return Ok(());
     };
     if path.symlink_metadata().is_ok() {

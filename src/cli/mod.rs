@@ -4,6 +4,8 @@
 //! 1 = a check does not hold, 2 = the input cannot be used (`docs/manual.md`).
 
 #[macro_use]
+mod terminal;
+
 mod common;
 
 mod alternatives;
@@ -19,14 +21,16 @@ mod replay;
 mod run;
 mod schema;
 mod self_test;
+mod shell;
 mod simulate;
+mod stages;
 mod study;
 mod values;
 mod verify;
 
 use crate::error::{Error, Result};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use common::{OutputFormat, comparison_table, design, json, table, threads, with_bar};
+use common::{comparison_table, design, json, threads};
 use recorded::Recorded;
 use std::process::ExitCode;
 
@@ -36,6 +40,12 @@ use std::process::ExitCode;
 struct Cli {
     #[command(subcommand)]
     command: Command,
+    /// Print errors only; files are written, and exit statuses are what they are.
+    #[arg(long, short, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+    /// Print each stage of the work and what it took.
+    #[arg(long, short, global = true)]
+    verbose: bool,
 }
 
 #[derive(Debug, Subcommand)]
@@ -43,9 +53,11 @@ enum Command {
     Approx(approx::Arguments),
     Check(check::Arguments),
     Close(close::Arguments),
+    Completions(shell::Completions),
     Emit(emit::Arguments),
     Equiv(equiv::Arguments),
     Init(init::Arguments),
+    Man(shell::Man),
     Replay(replay::Arguments),
     Run(run::Arguments),
     Schema(schema::Arguments),
@@ -61,6 +73,11 @@ pub fn main() -> ExitCode {
     let result = match parser.clone().try_get_matches() {
         Ok(matches) => {
             let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
+            terminal::set_loudness(match (cli.quiet, cli.verbose) {
+                (true, _) => terminal::Loudness::Quiet,
+                (_, true) => terminal::Loudness::Verbose,
+                _ => terminal::Loudness::Usual,
+            });
             run(&cli.command, &recorded::recorded(&parser, &matches))
         }
         Err(e) if e.use_stderr() => e.exit(),
@@ -78,8 +95,10 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(e) => {
             match &e {
-                Error::Check(text) => talk!("check failed: {text}"),
-                Error::Input(_) => talk!("{e}"),
+                Error::Check(text) => {
+                    terminal::complain(format_args!("check failed: {text}"));
+                }
+                Error::Input(_) => terminal::complain(format_args!("{e}")),
                 Error::ReaderGone => {}
             }
             ExitCode::from(e.exit_status())
@@ -99,9 +118,11 @@ fn run(command: &Command, recorded: &Recorded) -> Result<()> {
         Command::Approx(arguments) => approx::run(arguments, recorded),
         Command::Check(arguments) => check::run(arguments, recorded),
         Command::Close(arguments) => close::run(arguments, recorded),
+        Command::Completions(arguments) => shell::completions(arguments, Cli::command()),
         Command::Emit(arguments) => emit::run(arguments, recorded),
         Command::Equiv(arguments) => equiv::run(arguments, recorded),
         Command::Init(arguments) => init::run(arguments),
+        Command::Man(arguments) => shell::man(arguments, Cli::command()),
         Command::Replay(arguments) => replay::run(arguments, recorded),
         Command::Run(arguments) => run::run(arguments, recorded),
         Command::Schema(arguments) => schema::run(arguments),

@@ -12,7 +12,9 @@ use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 
 /// Options that say where and how a result is written, not what it is.
-const NOT_OF_THE_RESULT: [&str; 6] = ["out", "format", "threads", "shard", "merge", "force"];
+const NOT_OF_THE_RESULT: [&str; 8] = [
+    "out", "format", "threads", "shard", "merge", "force", "quiet", "verbose",
+];
 
 /// What was asked for.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

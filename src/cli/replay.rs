@@ -1,6 +1,7 @@
 //! `gyrogen replay`: captured ADC codes through the circuit, bit for bit.
 
 use super::recorded::Recorded;
+use super::stages::Stages;
 use crate::circuit::engine::{self, ArithmeticKind, Rows};
 use crate::design::Design;
 use crate::error::{Error, Result};
@@ -52,6 +53,7 @@ const BLOCK: usize = 1 << 16;
 /// An unusable design or capture (exit 2), or an overflow where the design says `error` (exit 1);
 /// no file is written then.
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
+    let stages = Stages::start("replaying");
     let design = super::design(arguments.design.as_deref())?;
     let kind = ArithmeticKind::from(arguments.arith);
     crate::output::refuse_inputs(&arguments.out, &recorded.inputs)?;
@@ -70,7 +72,8 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let mut engine = engine::engine(&design, kind);
     let mut rows = engine.no_rows();
     let (mut drive, mut sense) = (Vec::new(), Vec::new());
-    let mut progress = Progress::new(capture.rows_hint());
+    let of = capture.rows_hint();
+    let started = Instant::now();
     let (mut samples, mut index) = (0u64, 0u64);
     let mut busy = Duration::ZERO;
     loop {
@@ -85,15 +88,15 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         busy += start.elapsed();
         samples += count as u64;
         index = write(&mut rows, columns.len(), index, &mut writer)?;
-        progress.show(samples);
+        stages.at(samples, of);
     }
-    progress.done();
     writer.finish()?;
+    stages.over();
     talk!(
         "replayed {samples} samples into {index} rows: {:.1} M samples/s in the circuit, \
          {:.1} M/s with reading and writing, one thread",
         rate(samples, busy),
-        rate(samples, progress.started.elapsed()),
+        rate(samples, started.elapsed()),
     );
     Ok(())
 }
@@ -146,41 +149,5 @@ pub(super) fn warn_of_mismatches(design: &Design, capture: &CaptureReader) {
         design.circuit.adc.format.bits(),
     ) {
         talk!("warning: {warning}");
-    }
-}
-
-/// A bar on a terminal for what takes over two seconds.
-struct Progress {
-    started: Instant,
-    total: Option<u64>,
-    bar: Option<indicatif::ProgressBar>,
-}
-
-impl Progress {
-    fn new(total: Option<u64>) -> Self {
-        Progress {
-            started: Instant::now(),
-            total,
-            bar: None,
-        }
-    }
-
-    fn show(&mut self, samples: u64) {
-        if self.bar.is_none() && self.started.elapsed() > Duration::from_secs(2) {
-            // Draws to stderr, and only on a terminal.
-            self.bar = Some(match self.total {
-                Some(total) => indicatif::ProgressBar::new(total),
-                None => indicatif::ProgressBar::new_spinner(),
-            });
-        }
-        if let Some(bar) = &self.bar {
-            bar.set_position(samples);
-        }
-    }
-
-    fn done(&self) {
-        if let Some(bar) = &self.bar {
-            bar.finish_and_clear();
-        }
     }
 }

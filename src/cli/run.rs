@@ -1,15 +1,16 @@
 //! `gyrogen run`: the main job, end to end.
 
+use super::alternatives;
 use super::recorded::Recorded;
-use super::{OutputFormat, alternatives};
+use super::stages::Stages;
+use super::terminal::OutputFormat;
 use crate::emit::views::Language;
 use crate::error::{Error, Result};
 use crate::job;
 use crate::job::bound::Line;
 use crate::job::outcome::{Drift, Outcome};
 use crate::output::Results;
-use crate::timing::{self, Stopwatch};
-use std::io::IsTerminal;
+use crate::timing;
 use std::path::PathBuf;
 
 /// Fit the bias to a thermal record, round it to fixed point, emit C and Rust, build and compare them, report.
@@ -53,7 +54,7 @@ const PLANNED: [&str; 5] = [
 /// # Errors
 /// An unusable design or record (exit 2); emitted code that differs from the model (exit 1).
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
-    let watch = Stopwatch::start("reading the design");
+    let watch = Stages::start("reading the design");
     let mut design = super::design(arguments.design.as_deref())?;
     design.record.undo_correction = arguments.undo_correction;
     let mut results = Results::claim(&arguments.out, &PLANNED, &recorded.inputs)?;
@@ -61,19 +62,12 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         crate::verify::firmware::refuse_edited(&arguments.out)?;
     }
     let languages = super::common::languages(arguments.lang)?;
-    let loud = std::io::stderr().is_terminal();
-    let say = |step: &str| {
-        watch.stage(step);
-        if loud {
-            talk!("{step} ...");
-        }
-    };
     let outcome = job::run(
         &design,
         arguments.record.as_deref(),
         &recorded.command,
         &languages,
-        &say,
+        &|step| watch.stage(step),
     )?;
     watch.stage("writing");
     let html = crate::report::html(&outcome)?;
@@ -95,7 +89,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     )?;
     results.finish()?;
     match arguments.format {
-        OutputFormat::Json => say!("{}", json.trim_end()),
+        OutputFormat::Json => super::terminal::give(&json),
         OutputFormat::Text => print(&outcome, &arguments.out),
     }
     for warning in &outcome.summary.warnings {
@@ -118,8 +112,8 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
     if let Some(columns) = &outcome.parts.understood {
         say!("read: {columns}");
     }
-    say!("{}", super::comparison_table(&s.equivalence.functions));
-    let mut table = super::table(&[
+    super::terminal::show(&super::comparison_table(&s.equivalence.functions));
+    let mut table = super::terminal::table(&[
         "rate output at rest",
         "drift pp, deg/s",
         "rms, deg/s",
@@ -148,10 +142,8 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
             row(name, drift);
         }
     }
-    for column in table.column_iter_mut().skip(1) {
-        column.set_cell_alignment(comfy_table::CellAlignment::Right);
-    }
-    say!("{table}");
+    super::terminal::numbers(&mut table, 1..);
+    super::terminal::show(&table);
     say!(
         "fit: order {} in {}, {}; held-out rms {:.4} deg/s (noise floor {:.4})",
         s.fit.order,

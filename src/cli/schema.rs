@@ -24,7 +24,7 @@ fn names() -> clap::builder::PossibleValuesParser {
 /// None: the parser lets only known names through.
 pub fn run(arguments: &Arguments) -> Result<()> {
     if let Some(schema) = schemas::schema(&arguments.name) {
-        say!("{}", super::json(&schema).trim_end());
+        super::terminal::give(&super::json(&schema));
     }
     Ok(())
 }

@@ -1,15 +1,16 @@
 //! `gyrogen close --self-test`: what the search finds, and what its silence means.
 
-use super::OutputFormat;
 use super::close::Arguments;
 use super::recorded::Recorded;
+use super::stages::Stages;
+use super::terminal::OutputFormat;
 use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::output::Results;
 use crate::report::text::significant;
 use crate::selftest::outcome::{EffectScore, Minimum, Outcome};
 use crate::selftest::{self, Request};
-use crate::timing::{self, Stopwatch};
+use crate::timing;
 use std::path::PathBuf;
 
 /// Of a self-test.
@@ -44,7 +45,7 @@ pub fn run(
     arguments: &Arguments,
     design: &Design,
     recorded: &Recorded,
-    watch: &Stopwatch,
+    watch: &Stages,
 ) -> Result<()> {
     let options = &arguments.test;
     let planned = ["selftest.json", "selftest.html", timing::NAME];
@@ -65,7 +66,8 @@ pub fn run(
     };
     watch.stage("planting and searching");
     let record = read.as_ref().map(|(r, w)| (r, w.as_slice()));
-    let outcome = super::with_bar(|progress| selftest::run(design, record, &request, progress))?;
+    let progress = |done: usize, of: usize| watch.at(done as u64, Some(of as u64));
+    let outcome = selftest::run(design, record, &request, &progress)?;
     watch.stage("writing");
     let json = super::json(&outcome);
     if let Some(mut results) = results {
@@ -76,7 +78,7 @@ pub fn run(
         results.finish()?;
     }
     match arguments.format {
-        OutputFormat::Json => say!("{}", json.trim_end()),
+        OutputFormat::Json => super::terminal::give(&json),
         OutputFormat::Text => print(&outcome),
     }
     if let (Some(out), OutputFormat::Text) = (&arguments.out, arguments.format) {
@@ -94,11 +96,11 @@ fn print(o: &Outcome) {
     header.extend(sizes.iter().map(|s| format!("{} x", s.times_noise)));
     header.extend(["wrong names", "90 % found from", "which is"].map(str::to_owned));
     let header: Vec<&str> = header.iter().map(String::as_str).collect();
-    let mut table = super::table(&header);
+    let mut table = super::terminal::table(&header);
     for e in &o.effects {
         table.add_row(row(e));
     }
-    say!("{table}");
+    super::terminal::show(&table);
     say!(
         "found: named, or listed as indistinguishable, of records with an effect that leaves so many times the noise \
          of a row ({} deg/s) beyond the declared model",

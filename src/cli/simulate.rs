@@ -1,18 +1,17 @@
 //! `gyrogen simulate`: plant and circuit in closed loop, float and fixed.
 
-use super::OutputFormat;
 use super::recorded::Recorded;
 use super::replay::Arith;
+use super::stages::Stages;
+use super::terminal::OutputFormat;
 use crate::error::{Error, Result};
 use crate::output::Results;
 use crate::simulation::hunting::Hunting;
 use crate::simulation::outcome::{Both, Outcome};
 use crate::simulation::trace::Wanted;
 use crate::simulation::{self, Course, Request, record_csv};
-use crate::timing::{self, Stopwatch};
+use crate::timing;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
-use std::time::{Duration, Instant};
 
 /// Simulate the gyro and its circuit in closed loop, in float and in fixed point: thermal record, traces, figures.
 #[derive(Debug, clap::Args)]
@@ -79,7 +78,7 @@ impl TraceFormat {
 /// # Errors
 /// An unusable design or profile (exit 2); a circuit that stops on an overflow, a phase loop that does not lock (exit 1).
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
-    let watch = Stopwatch::start("reading the design");
+    let watch = Stages::start("reading the design");
     let design = super::design(arguments.design.as_deref())?;
     let trace = arguments.trace_format.file_name();
     let planned = [
@@ -107,13 +106,11 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         },
         command: recorded.command.clone(),
     };
-    let bar = Bar::default();
     let progress = |what: &str, done: u64, total: u64| {
         watch.stage(what);
-        bar.show(what, done, total);
+        watch.at(done, Some(total));
     };
     let outcome = simulation::simulate(&design, &request, &progress)?;
-    bar.done();
     watch.stage("writing");
     let json = super::json(&outcome.summary);
     let html = crate::report::simulation::html(&outcome)?;
@@ -125,7 +122,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     )?;
     results.finish()?;
     match arguments.format {
-        OutputFormat::Json => say!("{}", json.trim_end()),
+        OutputFormat::Json => super::terminal::give(&json),
         OutputFormat::Text => print(&outcome, &arguments.out),
     }
     for warning in &outcome.summary.warnings {
@@ -161,7 +158,7 @@ fn write(
 fn print(outcome: &Outcome, out: &Path) {
     let s = &outcome.summary;
     if !s.paper.is_empty() {
-        let mut table = super::table(&[
+        let mut table = super::terminal::table(&[
             "published figure",
             "source",
             "published",
@@ -180,9 +177,10 @@ fn print(outcome: &Outcome, out: &Path) {
                 if f.agrees { "agrees" } else { "differs" }.to_owned(),
             ]);
         }
-        say!("{table}");
+        super::terminal::show(&table);
     }
-    let mut table = super::table(&["rate output", "drift pp, deg/s", "rms, deg/s", "of before"]);
+    let mut table =
+        super::terminal::table(&["rate output", "drift pp, deg/s", "rms, deg/s", "of before"]);
     let mut rows = |name: &str, both: &Both| {
         for (path, drift, before) in [
             ("float", both.float, s.before.float),
@@ -201,12 +199,10 @@ fn print(outcome: &Outcome, out: &Path) {
     if let Some(after) = &s.after {
         rows("after", after);
     }
-    for column in table.column_iter_mut().skip(1) {
-        column.set_cell_alignment(comfy_table::CellAlignment::Right);
-    }
-    say!("{table}");
+    super::terminal::numbers(&mut table, 1..);
+    super::terminal::show(&table);
     if !s.loops.is_empty() {
-        say!("{}", loops(&s.loops));
+        super::terminal::show(&loops(&s.loops));
     }
     print_sentences(outcome);
     say!("wrote {}", out.display());
@@ -252,7 +248,7 @@ fn print_sentences(outcome: &Outcome) {
 
 /// What quantisation leaves of the loops.
 pub(super) fn loops(found: &[Hunting]) -> comfy_table::Table {
-    let mut table = super::table(&[
+    let mut table = super::terminal::table(&[
         "loop without noise",
         "degC",
         "output pp",
@@ -276,57 +272,11 @@ pub(super) fn loops(found: &[Hunting]) -> comfy_table::Table {
             format!("{:.0} LSB", h.predicted_dead_band_lsb),
         ]);
     }
-    for column in table.column_iter_mut().skip(1) {
-        column.set_cell_alignment(comfy_table::CellAlignment::Right);
-    }
+    super::terminal::numbers(&mut table, 1..);
     table
 }
 
 /// Decimals that show a tolerance.
 fn decimals(tolerance: f64) -> usize {
     (-tolerance.log10()).ceil().max(0.0) as usize
-}
-
-/// A bar on a terminal for what takes over two seconds.
-struct Bar {
-    started: Instant,
-    state: Mutex<Option<(String, indicatif::ProgressBar)>>,
-}
-
-impl Default for Bar {
-    fn default() -> Self {
-        Bar {
-            started: Instant::now(),
-            state: Mutex::new(None),
-        }
-    }
-}
-
-impl Bar {
-    fn show(&self, what: &str, done: u64, total: u64) {
-        if self.started.elapsed() < Duration::from_secs(2) {
-            return;
-        }
-        // A poisoned lock means that another thread panics already.
-        let Ok(mut state) = self.state.lock() else {
-            return;
-        };
-        if state.as_ref().is_none_or(|(shown, _)| shown != what) {
-            // Draws to stderr, and only on a terminal.
-            let bar = indicatif::ProgressBar::new(total);
-            bar.set_message(what.to_owned());
-            *state = Some((what.to_owned(), bar));
-        }
-        if let Some((_, bar)) = state.as_ref() {
-            bar.set_position(done);
-        }
-    }
-
-    fn done(&self) {
-        if let Ok(mut state) = self.state.lock()
-            && let Some((_, bar)) = state.take()
-        {
-            bar.finish_and_clear();
-        }
-    }
 }

@@ -1,7 +1,8 @@
 //! `gyrogen study`: what each bit of the circuit buys.
 
-use super::OutputFormat;
 use super::recorded::Recorded;
+use super::stages::Stages;
+use super::terminal::OutputFormat;
 use crate::design::Limits;
 use crate::error::{Error, Result, io_error};
 use crate::output::Results;
@@ -10,8 +11,7 @@ use crate::study::journal;
 use crate::study::outcome::{Point, Study};
 use crate::study::progress::{Progress, Step};
 use crate::study::shard::Part;
-use crate::timing::{self, Stopwatch};
-use std::io::IsTerminal;
+use crate::timing;
 use std::path::PathBuf;
 use std::sync::Mutex;
 use std::time::Instant;
@@ -50,7 +50,7 @@ const PLANNED: [&str; 3] = ["study.json", "report.html", timing::NAME];
 /// An unusable design, words that it does not have, an incomplete study (exit 2); a design that overflows, a
 /// requirement that cannot be met (exit 1).
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
-    let watch = Stopwatch::start("searching and verifying");
+    let watch = Stages::start("searching and verifying");
     let design = super::design(arguments.design.as_deref())?;
     let limits = match &arguments.limits {
         Some(text) => Limits::parse(text)?,
@@ -61,23 +61,19 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     std::fs::create_dir_all(&arguments.out)
         .map_err(|e| io_error(&arguments.out, "make the folder", &e))?;
     let mut results = Results::claim(&arguments.out, &PLANNED, &recorded.inputs)?;
-    let loud = std::io::stderr().is_terminal();
     let begun: Mutex<Option<(Step, Instant)>> = Mutex::new(None);
     let said = |progress: Progress| {
-        if let Ok(mut begun) = begun.lock()
-            && loud
-        {
+        if let Ok(mut begun) = begun.lock() {
             let since = match *begun {
                 Some((step, since)) if step == progress.step => since,
                 _ => begun.insert((progress.step, Instant::now())).1,
             };
-            // Blanks over what is left of a longer line.
-            eprint!("\r{:<72}", progress.line(since.elapsed().as_secs_f64()));
+            watch.says(&progress.line(since.elapsed().as_secs_f64()));
         }
     };
     if let Some(part) = arguments.shard {
         let path = job::part(&design, part, threads, &arguments.out, &said)?;
-        say!("{}", path.display());
+        super::terminal::give(&path.display().to_string());
         return Ok(());
     }
     let request = Request {
@@ -89,9 +85,6 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         heuristic: false,
     };
     let done = job::study(&design, &request, &said)?;
-    if loud {
-        eprintln!();
-    }
     let json = super::json(&done.study);
     let html = crate::report::study::html(&done.study)?;
     let files = done
@@ -105,7 +98,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     results.finish()?;
     journal::remove(&arguments.out)?;
     match arguments.format {
-        OutputFormat::Json => say!("{}", json.trim_end()),
+        OutputFormat::Json => super::terminal::give(&json),
         OutputFormat::Text => print(&done.study),
     }
     let unmet = done.study.chosen.iter().filter(|c| c.point.is_none());
@@ -133,14 +126,12 @@ fn print(s: &Study) {
         "merit",
         "by",
     ]);
-    let mut table = super::table(&header);
+    let mut table = super::terminal::table(&header);
     for p in std::iter::once(&s.reference).chain(&s.front) {
         table.add_row(row(p, &targets));
     }
-    for column in table.column_iter_mut().skip(2) {
-        column.set_cell_alignment(comfy_table::CellAlignment::Right);
-    }
-    say!("{table}");
+    super::terminal::numbers(&mut table, 2..);
+    super::terminal::show(&table);
     say!(
         "merit 1: {}; {} designs considered, {} run bit for bit ({}), {} points verified",
         s.limits_from,
@@ -149,7 +140,8 @@ fn print(s: &Study) {
         s.method,
         s.front.len()
     );
-    let mut words = super::table(&["word", "given", "first that hurts", "last that helps"]);
+    let mut words =
+        super::terminal::table(&["word", "given", "first that hurts", "last that helps"]);
     let shown = |l: Option<u32>| l.map_or("-".to_owned(), |l| l.to_string());
     for (sweep, parameter) in s.sweeps.iter().zip(&s.parameters) {
         words.add_row([
@@ -159,7 +151,7 @@ fn print(s: &Study) {
             shown(sweep.last_that_helps),
         ]);
     }
-    say!("{words}");
+    super::terminal::show(&words);
     for chosen in &s.chosen {
         match chosen.point {
             Some(point) => say!("{}: point {point}, {}", chosen.target, chosen.reason),

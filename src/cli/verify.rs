@@ -1,14 +1,15 @@
 //! `gyrogen verify`: rebuilds a bundle from its own files alone and runs its vectors.
 
-use super::OutputFormat;
 use super::recorded::Recorded;
+use super::stages::Stages;
+use super::terminal::OutputFormat;
 use crate::emit::bundle::Part;
 use crate::emit::views::Language;
 use crate::error::{Error, InputError, Result};
 use crate::firmware::files::EmittedFile;
 use crate::firmware::manifest::Manifest;
 use crate::output::Results;
-use crate::timing::{self, Stopwatch};
+use crate::timing;
 use crate::verify::bundle::{self, Against, Verification};
 use crate::verify::target::Target;
 use std::path::{Path, PathBuf};
@@ -41,7 +42,7 @@ pub struct Arguments {
 /// # Errors
 /// A folder that holds no bundle, no compiler for the target (exit 2); a difference (exit 1).
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
-    let watch = Stopwatch::start("building and running");
+    let watch = Stages::start("building and running");
     if let Some(digest) = &arguments.digest {
         let is_digest = digest.len() == 64 && digest.chars().all(|c| c.is_ascii_hexdigit());
         if !is_digest {
@@ -74,7 +75,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     watch.write(&mut results, &verification.design_sha256, &recorded.command)?;
     results.finish()?;
     match arguments.format {
-        OutputFormat::Json => say!("{}", json.trim_end()),
+        OutputFormat::Json => super::terminal::give(&json),
         OutputFormat::Text => print(&verification),
     }
     if verification.holds {
@@ -123,7 +124,7 @@ fn of_design(path: &Path, manifest: &Manifest) -> Result<Vec<EmittedFile>> {
 }
 
 fn print(v: &Verification) {
-    say!("{}", super::comparison_table(&v.functions));
+    super::terminal::show(&super::comparison_table(&v.functions));
     let selftest = match v.selftest {
         Some(true) => "pass",
         Some(false) => "FAIL",

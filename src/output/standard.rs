@@ -1,10 +1,7 @@
-//! The standard output: every failed write is an error, but for a reader that has gone away (`| head`). What would
-//! command a terminal or is not seen is written as what it is ([`crate::text`]).
+//! The standard output: every failed write is an error, but for a reader that has gone away (`| head`).
 
 use super::io_error;
 use crate::error::Result;
-use crate::text::{Place, lines};
-use std::fmt;
 use std::io::{self, Write};
 use std::sync::{Mutex, PoisonError};
 
@@ -12,18 +9,13 @@ use std::sync::{Mutex, PoisonError};
 static FAILED: Mutex<Option<io::Error>> = Mutex::new(None);
 
 /// Prints a line. What fails is kept for [`check`]: what is written to files does not depend on it.
-pub fn line(words: fmt::Arguments<'_>) {
-    keep(writeln!(io::stdout(), "{}", on_screen(words)));
+pub fn line(text: &str) {
+    keep(writeln!(io::stdout(), "{text}"));
 }
 
 /// Says a line on the standard error, where nobody has to listen.
-pub fn talk(words: fmt::Arguments<'_>) {
-    _ = writeln!(io::stderr(), "{}", on_screen(words));
-}
-
-/// The words as a terminal may have them, users' names and paths among them.
-fn on_screen(words: fmt::Arguments<'_>) -> String {
-    lines(&words.to_string(), Place::Screen)
+pub fn talk(text: &str) {
+    _ = writeln!(io::stderr(), "{text}");
 }
 
 /// Everything has been printed, or nobody reads it any more.
