@@ -1,6 +1,6 @@
 //! The nearest of the words that are known: what was meant by one that is not.
 
-/// The known word within two edits of `word`, the nearest first.
+/// The known word within two edits of `word`, the nearest first; else the only one that begins with it.
 pub fn nearest<'a>(word: &str, known: &[&'a str]) -> Option<&'a str> {
     known
         .iter()
@@ -8,6 +8,16 @@ pub fn nearest<'a>(word: &str, known: &[&'a str]) -> Option<&'a str> {
         .filter(|(distance, key)| *distance <= 2 && *distance < key.len())
         .min_by_key(|(distance, _)| *distance)
         .map(|(_, key)| key)
+        .or_else(|| only_one_that_begins_with(word, known))
+}
+
+/// Two letters begin too many words.
+fn only_one_that_begins_with<'a>(word: &str, known: &[&'a str]) -> Option<&'a str> {
+    let mut longer = known.iter().filter(|key| key.starts_with(word));
+    match (longer.next(), longer.next()) {
+        (Some(key), None) if word.len() > 2 => Some(key),
+        _ => None,
+    }
 }
 
 /// Insertions, deletions, replacements and swaps of neighbours that lead from `a` to `b`.
@@ -39,5 +49,13 @@ mod tests {
         assert_eq!(edits("raito", "ratio"), 1);
         assert_eq!(edits("", "abc"), 3);
         assert_eq!(edits("kitten", "sitting"), 3);
+    }
+
+    #[test]
+    fn a_beginning_names_the_word_if_it_is_of_one_alone() {
+        let known = ["bias_dps", "drift_dps", "chamber_degc", "chamber_k"];
+        assert_eq!(nearest("bias", &known), Some("bias_dps"));
+        assert_eq!(nearest("chamber", &known), None);
+        assert_eq!(nearest("dr", &known), None);
     }
 }

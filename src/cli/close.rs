@@ -92,6 +92,14 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     if let Some(stray) = &arguments.stray {
         return Err(stray_file(stray));
     }
+    for (file, option) in [
+        (&arguments.record, "--record"),
+        (&arguments.capture, "--capture"),
+    ] {
+        if let Some(file) = file {
+            super::common::refuse_design(file, option)?;
+        }
+    }
     let mut design = super::design(arguments.design.as_deref())?;
     design.record.undo_correction = arguments.undo_correction;
     if arguments.self_test {

@@ -43,6 +43,30 @@ fn refuse_record(path: &std::path::Path) -> Result<()> {
     }
 }
 
+/// A design in a record's or a capture's place is named as what it is; `option` is the one that it was given with.
+pub(super) fn refuse_design(path: &Path, option: &str) -> Result<()> {
+    use std::io::Read;
+    if !std::fs::metadata(path).is_ok_and(|m| m.is_file()) {
+        return Ok(());
+    }
+    let mut text = String::new();
+    let read = std::fs::File::open(path).and_then(|f| f.take(1 << 20).read_to_string(&mut text));
+    let is_design = |text: &str| {
+        let parsed = text.parse::<toml_edit::DocumentMut>();
+        parsed.is_ok_and(|d| d.iter().any(|(_, item)| item.is_table() || item.is_value()))
+    };
+    match read {
+        Ok(_) if is_design(&text) => Err(crate::error::InputError::new(format!(
+            "this is a design (TOML), and `{option}` takes measured data"
+        ))
+        .in_file(path)
+        .help("give the design before the options, or with --design where there is that option")
+        .into()),
+        // What cannot be read is the reader's to say.
+        _ => Ok(()),
+    }
+}
+
 /// The threads that were asked for, or as many as the machine has.
 pub(super) fn threads(asked: Option<u16>) -> usize {
     asked.map_or_else(

@@ -55,6 +55,7 @@ const BLOCK: usize = 1 << 16;
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let stages = Stages::start("replaying");
     let design = super::design(arguments.design.as_deref())?;
+    super::common::refuse_design(&arguments.capture, "--capture")?;
     let kind = ArithmeticKind::from(arguments.arith);
     crate::output::refuse_inputs(&arguments.out, &recorded.inputs)?;
     let mut capture = CaptureReader::open(&arguments.capture, design.circuit.adc.format)?;

@@ -55,6 +55,9 @@ const PLANNED: [&str; 5] = [
 /// An unusable design or record (exit 2); emitted code that differs from the model (exit 1).
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let watch = Stages::start("reading the design");
+    if let Some(record) = &arguments.record {
+        super::common::refuse_design(record, "--record")?;
+    }
     let mut design = super::design(arguments.design.as_deref())?;
     design.record.undo_correction = arguments.undo_correction;
     let mut results = Results::claim(&arguments.out, &PLANNED, &recorded.inputs)?;

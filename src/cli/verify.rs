@@ -7,7 +7,7 @@ use crate::emit::bundle::Part;
 use crate::emit::views::Language;
 use crate::error::{Error, InputError, Result};
 use crate::firmware::files::EmittedFile;
-use crate::firmware::manifest::Manifest;
+use crate::firmware::manifest::{self, Manifest};
 use crate::output::Results;
 use crate::timing;
 use crate::verify::bundle::{self, Against, Verification};
@@ -52,6 +52,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
             .into());
         }
     }
+    refuse_no_bundle(&arguments.bundle)?;
     let against = Against {
         digest: arguments.digest.clone(),
         design: arguments.design.clone(),
@@ -121,6 +122,25 @@ fn of_design(path: &Path, manifest: &Manifest) -> Result<Vec<EmittedFile>> {
         _ => Language::Rust,
     };
     super::emit::emitted(&design, part, language, &manifest.command)
+}
+
+/// Refuses what holds no manifest, and names the bundles that stand below it.
+fn refuse_no_bundle(folder: &Path) -> Result<()> {
+    // A link or a pipe of that name is for the reader to refuse.
+    if folder.join(manifest::NAME).symlink_metadata().is_ok() {
+        return Ok(());
+    }
+    let below = ["c", "rust", "firmware/c", "firmware/rust"].map(|name| folder.join(name));
+    let bundles = below.iter().filter(|b| b.join(manifest::NAME).is_file());
+    let named: Vec<String> = bundles.map(|b| b.display().to_string()).collect();
+    let help = match named.is_empty() {
+        true => {
+            "give the folder of sources that `emit`, `run`, `close` or `approx` wrote".to_owned()
+        }
+        false => format!("did you mean {}?", named.join(" or ")),
+    };
+    let what = format!("no bundle is here: there is no {}", manifest::NAME);
+    Err(InputError::new(what).in_file(folder).help(help).into())
 }
 
 fn print(v: &Verification) {

@@ -153,8 +153,22 @@ impl Limits {
                     .into()
             };
             let Some(name) = LimitName::of_name(word) else {
-                let help =
-                    format!("name one of {names}, as in \"bias_dps<=0.01 arw_deg_rth<=0.01\"");
+                let all = LimitName::ALL.map(LimitName::name);
+                // `bias_dps=0.01` has no sign of an inequality.
+                let (figure, rest) = word.split_once(['=', '<', '>']).unwrap_or((word, ""));
+                let near = crate::nearest::nearest(figure, &all);
+                let help = match LimitName::of_name(figure).map(|f| f.is_least()) {
+                    Some(true) => format!("write `{figure}>={rest}`"),
+                    Some(false) => format!("write `{figure}<={rest}`"),
+                    None => near.map_or_else(
+                        || {
+                            format!(
+                                "name one of {names}, as in \"bias_dps<=0.01 arw_deg_rth<=0.01\""
+                            )
+                        },
+                        |near| format!("did you mean `{near}`?"),
+                    ),
+                };
                 return Err(refused(format!("`{word}` is no figure"), help));
             };
             let (sign, other) = if name.is_least() {

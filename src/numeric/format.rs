@@ -95,7 +95,15 @@ impl FromStr for Format {
 
     /// Reads `Qm.n` or `UQm.n`; the error says which rule the text breaks.
     fn from_str(text: &str) -> Result<Self, String> {
-        let shape = || format!("`{text}` is not a format of the form Qm.n or UQm.n");
+        let shape = || {
+            let plain = text.split_once('.').filter(|(m, n)| {
+                [m, n]
+                    .iter()
+                    .all(|d| !d.is_empty() && d.bytes().all(|b| b.is_ascii_digit()))
+            });
+            let meant = plain.map_or(String::new(), |_| format!("; did you mean `Q{text}`?"));
+            format!("`{text}` is not a format of the form Qm.n or UQm.n{meant}")
+        };
         let (signed, rest) = match text.strip_prefix("UQ") {
             Some(rest) => (false, rest),
             None => (true, text.strip_prefix('Q').ok_or_else(shape)?),

@@ -34,12 +34,6 @@ impl Results {
     /// # Errors
     /// An input that would be written over; a folder or a file in it that cannot be written.
     pub fn claim(out: &Path, planned: &[&str], inputs: &[PathBuf]) -> Result<Self> {
-        for name in planned {
-            let path = out.join(name);
-            same::refuse(&path, inputs)?;
-            super::check_writable(&path)?;
-        }
-        refuse_foreign(out, planned)?;
         let failed = |e: &io::Error| io_error(out, "make the folder", e);
         let (existing, missing) = existing(out).map_err(|e| failed(&e))?;
         if !existing.is_dir() {
@@ -49,6 +43,12 @@ impl Results {
                 .help("name another folder with --out")
                 .into());
         }
+        for name in planned {
+            let path = out.join(name);
+            same::refuse(&path, inputs)?;
+            super::check_writable(&path)?;
+        }
+        refuse_foreign(out, planned)?;
         let staged = TemporaryFolder::new(&existing).map_err(|e| {
             let error = InputError::new(format!("cannot write into this folder: {e}"));
             error

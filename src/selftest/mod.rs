@@ -142,8 +142,13 @@ pub fn run_with(
     };
     let known: Vec<String> = cases.iter().map(|c| c.kind.id()).collect();
     if let Some(id) = request.only.iter().find(|id| !known.contains(id)) {
-        return Err(InputError::new(format!("no effect {id} can be planted"))
-            .help(format!("these can: {}", known.join(", ")))
+        let names: Vec<&str> = known.iter().map(String::as_str).collect();
+        let help = match crate::nearest::nearest(id, &names) {
+            Some(near) => format!("did you mean `{near}`?"),
+            None => format!("these can: {}", known.join(", ")),
+        };
+        return Err(InputError::new(format!("no effect `{id}` can be planted"))
+            .help(help)
             .into());
     }
     cases.retain(|c| request.only.is_empty() || request.only.contains(&c.kind.id()));

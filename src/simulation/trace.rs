@@ -135,7 +135,10 @@ fn chosen(signals: Vec<Signal>, wanted: &[String]) -> Result<Vec<Signal>> {
     for name in wanted {
         if !signals.iter().any(|s| names(s, name)) {
             let all: Vec<&str> = signals.iter().map(|s| s.name.as_str()).collect();
-            let near = suggest::nearest_word(name, &all);
+            // `circuit.cordic` stands for all of its nodes.
+            let beginnings = all.iter().filter_map(|n| n.split_once(' ')).map(|n| n.0);
+            let words: Vec<&str> = all.iter().copied().chain(beginnings).collect();
+            let near = suggest::nearest_word(name, &words);
             let help = match near {
                 Some(near) => format!("did you mean `{near}`?"),
                 None => format!("the nodes are: {}", all.join(", ")),
