@@ -1,6 +1,7 @@
 //! Runs a chain over captured codes: in `f64`, or bit-accurately in the narrowest lanes that the
 //! traced ranges fit into.
 
+use super::block_kernel::{BlockKernel, Instructions};
 use super::chain::{Chain, FastState, Held, Row, SlowState};
 use crate::design::Design;
 use crate::numeric::arithmetic::{Arithmetic, Block};
@@ -102,15 +103,25 @@ fn is_flagged(design: &Design) -> bool {
     compensation.is_some_and(|c| c.flagged_range().is_some())
 }
 
-/// The engine of a design.
+/// The engine of a design, with the fastest instructions that the processor has.
 pub fn engine(design: &Design, kind: ArithmeticKind) -> Box<dyn Engine> {
+    engine_with(design, kind, Instructions::best())
+}
+
+/// The engine of a design, with these instructions where a kernel applies and the processor has
+/// them. The rows are the same with all.
+pub fn engine_with(
+    design: &Design,
+    kind: ArithmeticKind,
+    instructions: Instructions,
+) -> Box<dyn Engine> {
     match design.circuit.decimator.stages {
-        1 => with_stages::<1>(design, kind),
-        2 => with_stages::<2>(design, kind),
-        3 => with_stages::<3>(design, kind),
-        4 => with_stages::<4>(design, kind),
-        5 => with_stages::<5>(design, kind),
-        _ => with_stages::<6>(design, kind),
+        1 => with_stages::<1>(design, kind, instructions),
+        2 => with_stages::<2>(design, kind, instructions),
+        3 => with_stages::<3>(design, kind, instructions),
+        4 => with_stages::<4>(design, kind, instructions),
+        5 => with_stages::<5>(design, kind, instructions),
+        _ => with_stages::<6>(design, kind, instructions),
     }
 }
 
@@ -150,35 +161,47 @@ pub fn lane_bits<const N: usize>(chain: &Chain<N>, program: &Program) -> LaneBit
     }
 }
 
-fn with_stages<const N: usize>(design: &Design, kind: ArithmeticKind) -> Box<dyn Engine> {
+fn with_stages<const N: usize>(
+    design: &Design,
+    kind: ArithmeticKind,
+    instructions: Instructions,
+) -> Box<dyn Engine> {
     let chain = Chain::<N>::new(design);
     let float_scale = FloatScale::new(design);
     if kind == ArithmeticKind::Float {
-        return Box::new(Running::new(chain, Float, Float, float_scale));
+        return Box::new(Running::new(chain, Float, Float, float_scale, None));
     }
     let bits = lane_bits(&chain, &chain.trace());
     let narrow = bits.fast <= 64 && bits.residue <= 64;
     let idle = chain.mixers.iter().all(|m| m.product.is_idle());
+    let kernel = narrow
+        .then(|| BlockKernel::new(&chain, instructions))
+        .flatten();
+    let parts = (chain, float_scale, kernel);
     match (narrow, idle, bits.slow <= 64) {
-        (true, true, true) => {
-            fixed::<Fixed<i64, i64, true>, Fixed<i64, i64>, N>(chain, float_scale)
-        }
-        (true, true, false) => {
-            fixed::<Fixed<i64, i64, true>, Fixed<i128, i64>, N>(chain, float_scale)
-        }
-        (true, false, true) => fixed::<Fixed<i64, i64>, Fixed<i64, i64>, N>(chain, float_scale),
-        (true, false, false) => fixed::<Fixed<i64, i64>, Fixed<i128, i64>, N>(chain, float_scale),
-        _ if bits.fast <= 64 => fixed::<Fixed<i64, i128>, Fixed<i128, i128>, N>(chain, float_scale),
-        _ => fixed::<Fixed<i128, i128>, Fixed<i128, i128>, N>(chain, float_scale),
+        (true, true, true) => fixed::<Fixed<i64, i64, true>, Fixed<i64, i64>, N>(parts),
+        (true, true, false) => fixed::<Fixed<i64, i64, true>, Fixed<i128, i64>, N>(parts),
+        (true, false, true) => fixed::<Fixed<i64, i64>, Fixed<i64, i64>, N>(parts),
+        (true, false, false) => fixed::<Fixed<i64, i64>, Fixed<i128, i64>, N>(parts),
+        _ if bits.fast <= 64 => fixed::<Fixed<i64, i128>, Fixed<i128, i128>, N>(parts),
+        _ => fixed::<Fixed<i128, i128>, Fixed<i128, i128>, N>(parts),
     }
 }
 
-fn fixed<F, S, const N: usize>(chain: Chain<N>, scale: FloatScale) -> Box<dyn Engine>
+fn fixed<F, S, const N: usize>(
+    (chain, scale, kernel): (Chain<N>, FloatScale, Option<BlockKernel<N>>),
+) -> Box<dyn Engine>
 where
     F: Ends + Default + 'static,
     S: Ends + Default + Arithmetic<Residue = F::Residue> + 'static,
 {
-    Box::new(Running::new(chain, F::default(), S::default(), scale))
+    Box::new(Running::new(
+        chain,
+        F::default(),
+        S::default(),
+        scale,
+        kernel,
+    ))
 }
 
 /// What turns a float row into the contract's units.
@@ -207,6 +230,13 @@ trait Ends: Arithmetic {
     fn turns(residue: Self::Residue, bits: u32) -> u64;
     /// A drive gain, 0 to 1.
     fn gain(word: Self::Word, scale: &FloatScale) -> f64;
+    /// Runs the samples that a kernel left nothing over of.
+    fn run_kernel<const N: usize>(
+        _kernel: &mut BlockKernel<N>,
+        _state: &mut FastState<Self::Residue, N>,
+        _codes: [&[i32]; 2],
+    ) {
+    }
     fn at(&self, _sample: u64) {}
     fn stopped(&self) -> Option<Overflowed> {
         None
@@ -237,6 +267,13 @@ impl<W: HasKernel, R: Lane, const IDLE: bool> Ends for Fixed<W, R, IDLE> {
     }
     fn gain(word: W, scale: &FloatScale) -> f64 {
         word.wide() as f64 * scale.gain_lsb
+    }
+    fn run_kernel<const N: usize>(
+        kernel: &mut BlockKernel<N>,
+        state: &mut FastState<R, N>,
+        [drive, sense]: [&[i32]; 2],
+    ) {
+        kernel.run(state, drive, sense);
     }
     #[inline(always)]
     fn at(&self, sample: u64) {
@@ -303,6 +340,8 @@ struct Running<F: Arithmetic, S: Arithmetic<Residue = F::Residue>, const N: usiz
     fast_state: FastState<F::Residue, N>,
     slow_state: SlowState<S::Word>,
     scale: FloatScale,
+    /// What runs codes at the sample rate, where it applies.
+    kernel: Option<BlockKernel<N>>,
     /// Samples so far.
     samples: u64,
     /// Samples of the period at hand.
@@ -314,7 +353,13 @@ struct Running<F: Arithmetic, S: Arithmetic<Residue = F::Residue>, const N: usiz
 }
 
 impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Running<F, S, N> {
-    fn new(chain: Chain<N>, fast: F, slow: S, scale: FloatScale) -> Self {
+    fn new(
+        chain: Chain<N>,
+        fast: F,
+        slow: S,
+        scale: FloatScale,
+        kernel: Option<BlockKernel<N>>,
+    ) -> Self {
         let product = &chain.mixers[0].product;
         let mut running = Running {
             fast_state: chain.start_fast(&fast),
@@ -325,6 +370,7 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Runnin
             fast,
             slow,
             scale,
+            kernel,
             samples: 0,
             phase: 0,
             gain: None,
@@ -358,14 +404,33 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Runnin
         self.samples += drive.len() as u64;
     }
 
-    /// Codes of any number of periods; `word` makes a word of a code.
+    /// Codes inside one period, by the kernel where there is one.
+    #[inline(always)]
+    fn codes(&mut self, drive: &[i32], sense: &[i32]) {
+        let left_over = match &self.kernel {
+            Some(kernel) => kernel.left_over(drive.len()),
+            None => drive.len(),
+        };
+        let fraction_bits = self.chain.code_fraction_bits;
+        let (single, drive) = drive.split_at(left_over);
+        let (single_sense, sense) = sense.split_at(left_over);
+        self.block(single, single_sense, |ar, code| {
+            ar.code(code, fraction_bits)
+        });
+        if let Some(kernel) = self.kernel.as_mut().filter(|_| !drive.is_empty()) {
+            F::run_kernel(kernel, &mut self.fast_state, [drive, sense]);
+            self.samples += drive.len() as u64;
+        }
+    }
+
+    /// Codes or inputs of any number of periods; `block` takes what is inside one.
     #[inline(always)]
     fn periods<T: Copy>(
         &mut self,
         drive: &[T],
         sense: &[T],
         rows: &mut Rows,
-        word: impl Fn(&F, T) -> F::Word,
+        block: impl Fn(&mut Self, &[T], &[T]),
     ) -> Result<(), Box<Overflowed>> {
         let ratio = self.chain.cics[0].ratio as usize;
         let (mut drive, mut sense) = (drive, sense);
@@ -374,7 +439,7 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Runnin
             let (d, s);
             (d, drive) = drive.split_at(count);
             (s, sense) = sense.split_at(count);
-            self.block(d, s, &word);
+            block(self, d, s);
             // The fast rate comes first in the order of steps; an overflow there is the earlier.
             if let Some(overflowed) = self.fast.stopped() {
                 return Err(Box::new(overflowed));
@@ -415,8 +480,7 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Engine
         sense: &[i32],
         rows: &mut Rows,
     ) -> Result<(), Box<Overflowed>> {
-        let fraction_bits = self.chain.code_fraction_bits;
-        self.periods(drive, sense, rows, |ar, code| ar.code(code, fraction_bits))
+        self.periods(drive, sense, rows, Self::codes)
     }
 
     fn process_inputs(
@@ -428,8 +492,8 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Engine
         let fraction_bits = self.chain.code_fraction_bits;
         let range = self.chain.code_range;
         let limits = [range.low as f64, range.high as f64];
-        self.periods(drive_lsb, sense_lsb, rows, |ar, lsb| {
-            ar.input(lsb, fraction_bits, limits)
+        self.periods(drive_lsb, sense_lsb, rows, |running, drive, sense| {
+            running.block(drive, sense, |ar, lsb| ar.input(lsb, fraction_bits, limits));
         })
     }
 
