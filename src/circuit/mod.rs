@@ -22,6 +22,7 @@ pub mod compensation;
 pub mod cordic;
 pub mod decimator;
 pub mod demodulator;
+mod ends;
 pub mod engine;
 pub mod in_range;
 pub mod nco;
