@@ -38,7 +38,9 @@ const ROUNDINGS: [Rounding; 6] = [
 /// A design whose sample rate is drawn; the rest is the default's.
 fn design(draw: &mut Draw) -> Design {
     let mut design = default_design().expect("the default");
-    design.compensation = None;
+    if draw.one_in(2) {
+        design.compensation = None;
+    }
     let circuit = &mut design.circuit;
     circuit.amplitude_loop = None;
     circuit.adc.format = Format::q(1, draw.within(1, 23));

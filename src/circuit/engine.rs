@@ -4,6 +4,7 @@
 use super::block_kernel::{BlockKernel, Instructions};
 use super::chain::{Chain, FastState, Held, SlowState};
 use super::ends::{Ends, FloatScale};
+use super::row_batch::RowBatch;
 use crate::design::Design;
 use crate::numeric::arithmetic::{Arithmetic, Block};
 use crate::numeric::fixed::{Fixed, Overflowed};
@@ -164,10 +165,10 @@ fn with_stages<const N: usize>(
     kind: ArithmeticKind,
     instructions: Instructions,
 ) -> Box<dyn Engine> {
-    let chain = Chain::<N>::new(design);
+    let mut chain = Chain::<N>::new(design);
     let float_scale = FloatScale::new(design);
     if kind == ArithmeticKind::Float {
-        return Box::new(Running::new(chain, Float, Float, float_scale, None));
+        return Box::new(Running::new(chain, Float, Float, float_scale, (None, None)));
     }
     let bits = lane_bits(&chain, &chain.trace());
     let narrow = bits.fast <= 64 && bits.residue <= 64;
@@ -175,7 +176,10 @@ fn with_stages<const N: usize>(
     let kernel = narrow
         .then(|| BlockKernel::new(&chain, instructions))
         .flatten();
-    let parts = (chain, float_scale, kernel);
+    let batch = (narrow && bits.slow <= 64)
+        .then(|| RowBatch::new(&mut chain, instructions))
+        .flatten();
+    let parts = (chain, float_scale, (kernel, batch));
     match (narrow, idle, bits.slow <= 64) {
         (true, true, true) => fixed::<Fixed<i64, i64, true>, Fixed<i64, i64>, N>(parts),
         (true, true, false) => fixed::<Fixed<i64, i64, true>, Fixed<i128, i64>, N>(parts),
@@ -187,20 +191,18 @@ fn with_stages<const N: usize>(
 }
 
 fn fixed<F, S, const N: usize>(
-    (chain, scale, kernel): (Chain<N>, FloatScale, Option<BlockKernel<N>>),
+    (chain, scale, fast_ways): (Chain<N>, FloatScale, FastWays<N>),
 ) -> Box<dyn Engine>
 where
     F: Ends + Default + 'static,
     S: Ends + Default + Arithmetic<Residue = F::Residue> + 'static,
 {
-    Box::new(Running::new(
-        chain,
-        F::default(),
-        S::default(),
-        scale,
-        kernel,
-    ))
+    let (fast, slow) = (F::default(), S::default());
+    Box::new(Running::new(chain, fast, slow, scale, fast_ways))
 }
+
+/// The kernel of the sample rate and the batch of the decimated rate, where they apply.
+type FastWays<const N: usize> = (Option<BlockKernel<N>>, Option<RowBatch>);
 
 /// A chain at work: `F` at the sample rate, `S` at the decimated rate.
 struct Running<F: Arithmetic, S: Arithmetic<Residue = F::Residue>, const N: usize> {
@@ -212,6 +214,8 @@ struct Running<F: Arithmetic, S: Arithmetic<Residue = F::Residue>, const N: usiz
     scale: FloatScale,
     /// What runs codes at the sample rate, where it applies.
     kernel: Option<BlockKernel<N>>,
+    /// Rows that wait; none do between two calls.
+    batch: Option<RowBatch>,
     /// Samples so far.
     samples: u64,
     /// Samples of the period at hand.
@@ -228,7 +232,7 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Runnin
         fast: F,
         slow: S,
         scale: FloatScale,
-        kernel: Option<BlockKernel<N>>,
+        (kernel, batch): FastWays<N>,
     ) -> Self {
         let product = &chain.mixers[0].product;
         let mut running = Running {
@@ -241,6 +245,7 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Runnin
             slow,
             scale,
             kernel,
+            batch,
             samples: 0,
             phase: 0,
             gain: None,
@@ -323,10 +328,20 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Runnin
                 }
             }
         }
+        if let (Some(batch), Rows::Integer(rows)) = (&mut self.batch, rows) {
+            batch.put(&self.chain, rows);
+        }
         Ok(())
     }
 
     fn end_of_period(&mut self, rows: &mut Rows) {
+        if let (Some(batch), Rows::Integer(rows)) = (&mut self.batch, &mut *rows) {
+            let channels = self.chain.decimated(&self.slow, &mut self.fast_state);
+            if batch.push(channels.map(S::raw)) {
+                batch.put(&self.chain, rows);
+            }
+            return;
+        }
         self.slow.at(self.samples - 1);
         let row = self
             .chain

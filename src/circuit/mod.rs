@@ -27,6 +27,7 @@ pub mod engine;
 pub mod in_range;
 pub mod nco;
 pub mod phase_loop;
+mod row_batch;
 mod sample_lanes;
 #[cfg(target_arch = "x86_64")]
 mod sample_lanes_x86;
