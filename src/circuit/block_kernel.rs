@@ -78,6 +78,24 @@ pub struct BlockKernel<const N: usize> {
     product: Kernel<i64>,
     /// A's coefficients C(h + k - 1, k) for the number h of samples in a part.
     growth: (usize, [i64; N]),
+    /// Samples of a decimation period.
+    ratio: usize,
+    /// Carriers of whole periods, where the tuning word makes few different ones.
+    known: Known,
+}
+
+/// The most samples of periods whose carriers are kept.
+const KNOWN_SAMPLES: u64 = 1024;
+
+/// Carriers of a coherent tuning word: period after period the phase starts at one of few places.
+#[derive(Debug, Clone, Default)]
+struct Known {
+    /// What the phase advances by before each sample.
+    step: u64,
+    /// Samples of a block.
+    samples: usize,
+    /// By the phase before the block: the carriers, by sample of a part, part and channel.
+    blocks: Vec<(u64, Vec<[[i64; 4]; 2]>)>,
 }
 
 /// How a product is quantised: chosen when the loop is compiled.
@@ -132,6 +150,8 @@ impl<const N: usize> BlockKernel<N> {
             half_step,
             product,
             growth: (0, [0; N]),
+            ratio: chain.cics[0].ratio as usize,
+            known: Known::default(),
         })
     }
 
@@ -177,10 +197,12 @@ impl<const N: usize> BlockKernel<N> {
             phase: phase.wrapping_add(self.half_step),
             step,
         };
+        let known = self.known_carriers(simd, walk, drive.len());
+        let codes = [drive, sense];
         let moments = match self.product.form() {
-            form::IDLE => self.moments::<S, { form::IDLE }>(simd, walk, drive, sense),
-            form::ROUNDED => self.moments::<S, { form::ROUNDED }>(simd, walk, drive, sense),
-            _ => self.moments::<S, { form::ANY }>(simd, walk, drive, sense),
+            form::IDLE => self.moments::<S, { form::IDLE }>(simd, walk, known, codes),
+            form::ROUNDED => self.moments::<S, { form::ROUNDED }>(simd, walk, known, codes),
+            _ => self.moments::<S, { form::ANY }>(simd, walk, known, codes),
         };
         let advance = oscillator.tuning.times(R::low(drive.len() as i128));
         oscillator.phase = oscillator.phase.plus(advance);
@@ -215,40 +237,114 @@ impl<const N: usize> BlockKernel<N> {
         &self,
         simd: S,
         walk: Walk,
-        drive: &[i32],
-        sense: &[i32],
+        known: Option<usize>,
+        [drive, sense]: [&[i32]; 2],
     ) -> [[[i64; 4]; 2]; N] {
         let length = drive.len() / S::PARTS;
-        let (first, second) = (
-            Part::new(drive, sense, 0..length),
-            Part::new(drive, sense, length..2 * length),
-        );
-        let second = if S::PARTS == 1 { first } else { second };
-        let addresses = self.carriers.len();
-        // No address is out of the table: its length is a power of two.
-        if addresses == 0 {
-            return [[[0; 4]; 2]; N];
-        }
-        let carriers = &self.carriers[..addresses];
-        let at = |phase: u64| &carriers[(phase >> self.address_shift) as usize & (addresses - 1)];
-        let ahead = walk.step.wrapping_mul(length as u64);
-        let mut phase = walk.phase;
-        let mut integrators = [simd.splat(0); N];
+        let first = Part::new(drive, sense, 0..length);
+        let second = match S::PARTS {
+            1 => first,
+            _ => Part::new(drive, sense, length..2 * length),
+        };
         let codes = first.drive.iter().zip(second.drive);
-        for ((d0, d1), (s0, s1)) in codes.zip(first.sense.iter().zip(second.sense)) {
-            let four = simd.codes([d0, d1], [s0, s1]);
-            for k in 0..4 {
-                phase = phase.wrapping_add(walk.step);
-                let pairs = simd.carriers([at(phase), at(phase.wrapping_add(ahead))]);
-                let exact = simd.low_products(simd.code(four, k), pairs);
-                let mut carried = self.product.in_lanes::<S, FORM>(simd, exact);
-                for integrator in &mut integrators {
-                    *integrator = simd.plus(*integrator, carried);
-                    carried = *integrator;
+        let codes = codes.zip(first.sense.iter().zip(second.sense));
+        let codes = codes.map(|((d0, d1), (s0, s1))| simd.codes([d0, d1], [s0, s1]));
+        let mut integrators = [simd.splat(0); N];
+        if let Some((_, carriers)) = known.and_then(|k| self.known.blocks.get(k)) {
+            for (four, carriers) in codes.zip(carriers.as_chunks::<4>().0) {
+                for (k, carrier) in carriers.iter().enumerate() {
+                    let exact = simd.low_products(simd.code(four, k), simd.of_channels(carrier));
+                    self.integrate::<S, FORM>(simd, &mut integrators, exact);
+                }
+            }
+        } else {
+            let addresses = self.carriers.len();
+            // No address is out of the table: its length is a power of two.
+            if addresses == 0 {
+                return [[[0; 4]; 2]; N];
+            }
+            let carriers = &self.carriers[..addresses];
+            let shift = self.address_shift;
+            let at = |phase: u64| &carriers[(phase >> shift) as usize & (addresses - 1)];
+            let ahead = walk.step.wrapping_mul(length as u64);
+            let mut phase = walk.phase;
+            for four in codes {
+                for k in 0..4 {
+                    phase = phase.wrapping_add(walk.step);
+                    let pairs = simd.carriers([at(phase), at(phase.wrapping_add(ahead))]);
+                    let exact = simd.low_products(simd.code(four, k), pairs);
+                    self.integrate::<S, FORM>(simd, &mut integrators, exact);
                 }
             }
         }
         integrators.map(|words| simd.by_channel(words))
+    }
+
+    /// One sample of each part into the integrators.
+    #[inline(always)]
+    fn integrate<S: SampleLanes, const FORM: u8>(
+        &self,
+        simd: S,
+        integrators: &mut [S::Words; N],
+        exact: S::Words,
+    ) {
+        let mut carried = self.product.in_lanes::<S, FORM>(simd, exact);
+        for integrator in integrators {
+            *integrator = simd.plus(*integrator, carried);
+            carried = *integrator;
+        }
+    }
+
+    /// The carriers of a block of a whole period, made at its first time, where there are few
+    /// different ones; `None` elsewhere.
+    #[inline(always)]
+    fn known_carriers<S: SampleLanes>(
+        &mut self,
+        simd: S,
+        walk: Walk,
+        samples: usize,
+    ) -> Option<usize> {
+        let known = &mut self.known;
+        if known.step != walk.step || known.samples != samples {
+            // Only what has just been seen is likely to come again: a loop moves the step.
+            *known = Known {
+                step: walk.step,
+                samples,
+                blocks: Vec::new(),
+            };
+            return None;
+        }
+        let place = known
+            .blocks
+            .iter()
+            .position(|(phase, _)| *phase == walk.phase);
+        if place.is_some() {
+            return place;
+        }
+        let advance = walk.step.wrapping_mul(self.ratio as u64);
+        let different = 1u64
+            .checked_shl(64 - advance.trailing_zeros())
+            .unwrap_or(u64::MAX);
+        let whole = samples + self.left_over(self.ratio) == self.ratio;
+        if !whole || different.saturating_mul(samples as u64) > KNOWN_SAMPLES {
+            return None;
+        }
+        self.learn(simd, walk, samples);
+        None
+    }
+
+    /// Keeps the carriers of a block.
+    #[cold]
+    #[inline(never)]
+    fn learn<S: SampleLanes>(&mut self, simd: S, walk: Walk, samples: usize) {
+        let length = samples / S::PARTS;
+        let at = |k: usize| {
+            let phase = walk.phase.wrapping_add(walk.step.wrapping_mul(k as u64));
+            &self.carriers[(phase >> self.address_shift) as usize & (self.carriers.len() - 1)]
+        };
+        let one = |k| simd.by_channel(simd.carriers([at(k), at(k + length)]));
+        let carriers = (1..=length).map(one).collect();
+        self.known.blocks.push((walk.phase, carriers));
     }
 
     /// Makes A for parts of `length` samples.

@@ -51,6 +51,10 @@ fn design(draw: &mut Draw) -> Design {
     circuit.nco.address_rounding = draw.of(&[Rounding::Floor, Rounding::HalfUp]);
     let circle = circuit.nco.phase_bits.min(63);
     circuit.nco.tuning_word = (draw.next() & ((1 << circle) - 1)) as i64;
+    if draw.one_in(3) {
+        // Few different periods: a coherent word.
+        circuit.nco.tuning_word &= !((1 << (circle - 5)) - 1);
+    }
     let exact = circuit.adc.format.fraction_bits + table.fraction_bits;
     let fraction_bits = if draw.one_in(3) {
         exact

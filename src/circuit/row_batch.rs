@@ -63,11 +63,19 @@ impl RowBatch {
         let [drive_i, drive_q, sense_i, _] = self.channels;
         let [phase, magnitude] = ar.call(&chain.cordic, "", &mut (), [drive_i, drive_q]);
         let (compensation, in_range) = chain.compensated(&ar, sense_i, [phase]);
-        let rate = compensation.map(|[_, rate]| rate);
+        let mut columns = [&phase; 8];
+        columns[5] = &magnitude;
+        for (to, channel) in columns.iter_mut().zip(&self.channels) {
+            *to = channel;
+        }
+        let mut count = 6;
+        let rate = compensation.as_ref().map(|[_, rate]| rate);
+        for column in [rate, in_range.as_ref()].into_iter().flatten() {
+            columns[count] = column;
+            count += 1;
+        }
         for k in 0..self.count.min(WIDTH) {
-            let [a, b, c, d] = self.channels.map(|words| i128::from(words[k]));
-            rows.extend_from_slice(&[a, b, c, d, i128::from(phase[k]), i128::from(magnitude[k])]);
-            rows.extend([rate, in_range].iter().flatten().map(|w| i128::from(w[k])));
+            rows.extend(columns[..count].iter().map(|words| i128::from(words[k])));
         }
         self.count = 0;
     }

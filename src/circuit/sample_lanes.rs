@@ -18,6 +18,8 @@ pub trait SampleLanes: Copy {
     fn code(self, codes: Self::Words, k: usize) -> Self::Words;
     /// Sine and cosine, of each part, by channel: in the low half of each lane.
     fn carriers(self, pairs: [&CarrierPair; 2]) -> Self::Words;
+    /// Words of each part by channel; with one part the second is ignored.
+    fn of_channels(self, words: &[[i64; 4]; 2]) -> Self::Words;
     /// Exact products of the low halves, read as signed.
     fn low_products(self, a: Self::Words, b: Self::Words) -> Self::Words;
     /// Sum.
@@ -68,6 +70,10 @@ impl SampleLanes for Portable {
     fn carriers(self, pairs: [&CarrierPair; 2]) -> [i64; 4] {
         let [sine, _, cosine, _] = pairs[0].map(i64::from);
         [sine, cosine, sine, cosine]
+    }
+    #[inline(always)]
+    fn of_channels(self, words: &[[i64; 4]; 2]) -> [i64; 4] {
+        words[0]
     }
     #[inline(always)]
     fn low_products(self, a: [i64; 4], b: [i64; 4]) -> [i64; 4] {

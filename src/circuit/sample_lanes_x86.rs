@@ -45,6 +45,10 @@ impl SampleLanes for V3 {
         cast(self.avx2._mm256_broadcastsi128_si256(cast(*pairs[0])))
     }
     #[inline(always)]
+    fn of_channels(self, words: &[[i64; 4]; 2]) -> pulp::i64x4 {
+        cast(words[0])
+    }
+    #[inline(always)]
     fn low_products(self, a: pulp::i64x4, b: pulp::i64x4) -> pulp::i64x4 {
         cast(self.avx2._mm256_mul_epi32(cast(a), cast(b)))
     }
@@ -110,6 +114,10 @@ impl SampleLanes for V4 {
             self.avx512f
                 ._mm512_mask_broadcast_i32x4(first, 0xff00, second),
         )
+    }
+    #[inline(always)]
+    fn of_channels(self, words: &[[i64; 4]; 2]) -> pulp::i64x8 {
+        cast(*words)
     }
     #[inline(always)]
     fn low_products(self, a: pulp::i64x8, b: pulp::i64x8) -> pulp::i64x8 {
