@@ -12,6 +12,7 @@ use super::phase_loop::{PhaseLoop, PhaseLoopState};
 use crate::design::{Circuit, Compensation, CompensationInput, Design};
 use crate::numeric::arithmetic::{Arithmetic, Block, Port};
 use crate::numeric::cast::Cast;
+use crate::numeric::format::Overflow;
 use crate::numeric::trace::Trace;
 use crate::numeric::trace::ir::{Interval, Program};
 
@@ -270,6 +271,50 @@ impl<const N: usize> Chain<N> {
         }
     }
 
+    /// The channels at the end of a decimation period.
+    #[inline(always)]
+    pub fn decimated<A: Arithmetic>(
+        &self,
+        ar: &A,
+        fast: &mut FastState<A::Residue, N>,
+    ) -> [A::Word; 4] {
+        let mut channels = [ar.constant(0, 0); 4];
+        for k in 0..4 {
+            let block = Decimate(&self.cics[k]);
+            [channels[k]] = ar.call(&block, CIC_MEMBERS[k], &mut fast.cics[k], []);
+        }
+        channels
+    }
+
+    /// Bias and compensated rate, and whether the thermometer is inside the calibrated range, where
+    /// the design asks for them.
+    #[inline(always)]
+    pub fn compensated<A: Arithmetic>(
+        &self,
+        ar: &A,
+        sense_i: A::Word,
+        thermometer: [A::Word; 1],
+    ) -> (Option<[A::Word; 2]>, Option<A::Word>) {
+        let Some((bias, rate)) = &self.compensation else {
+            return (None, None);
+        };
+        let [bias] = ar.call(bias, "", &mut (), thermometer);
+        let [rate] = ar.call(rate, "", &mut (), [sense_i, bias]);
+        let in_range = self.in_range.as_ref().map(|block| {
+            let [inside] = ar.call(block, "", &mut (), thermometer);
+            inside
+        });
+        (Some([bias, rate]), in_range)
+    }
+
+    /// True if no row needs the one before it but by the decimators, and no cast can stop the run.
+    pub fn is_row_by_row_free(&mut self) -> bool {
+        let closed = self.phase_loop.is_some() || self.amplitude_loop.is_some();
+        let stops =
+            |cast: &mut &mut Cast| cast.overflow == Some(Overflow::Error) && !cast.is_proved();
+        !closed && !self.by_tuning_word && !self.casts_mut().iter_mut().any(stops)
+    }
+
     /// The end of a decimation period.
     #[inline(always)]
     pub fn period<A: Arithmetic>(
@@ -278,28 +323,15 @@ impl<const N: usize> Chain<N> {
         fast: &mut FastState<A::Residue, N>,
         slow: &mut SlowState<A::Word>,
     ) -> Row<A::Word> {
-        let mut channels = [ar.constant(0, 0); 4];
-        for k in 0..4 {
-            let block = Decimate(&self.cics[k]);
-            [channels[k]] = ar.call(&block, CIC_MEMBERS[k], &mut fast.cics[k], []);
-        }
+        let channels = self.decimated(ar, fast);
         let [drive_i, drive_q, sense_i, _] = channels;
         let [phase, magnitude] = ar.call(&self.cordic, "", &mut (), [drive_i, drive_q]);
-        let mut in_range = None;
-        let compensation = self.compensation.as_ref().map(|(bias, rate)| {
-            let thermometer = if self.by_tuning_word {
-                ar.call(&Detuning(&self.nco), "nco", &mut fast.oscillator, [])
-            } else {
-                [phase]
-            };
-            let [bias] = ar.call(bias, "", &mut (), thermometer);
-            let [rate] = ar.call(rate, "", &mut (), [sense_i, bias]);
-            if let Some(block) = &self.in_range {
-                let [inside] = ar.call(block, "", &mut (), thermometer);
-                in_range = Some(inside);
-            }
-            [bias, rate]
-        });
+        let thermometer = if self.compensation.is_some() && self.by_tuning_word {
+            ar.call(&Detuning(&self.nco), "nco", &mut fast.oscillator, [])
+        } else {
+            [phase]
+        };
+        let (compensation, in_range) = self.compensated(ar, sense_i, thermometer);
         if let (Some(block), Some(state)) = (&self.phase_loop, &mut slow.phase_loop) {
             let [correction] = ar.call(block, "phase_loop", state, [phase]);
             let [] = ar.call(

@@ -1,14 +1,14 @@
 //! Runs a chain over captured codes: in `f64`, or bit-accurately in the narrowest lanes that the
 //! traced ranges fit into.
 
-use super::chain::{Chain, FastState, Held, Row, SlowState};
+use super::block_kernel::{BlockKernel, Instructions};
+use super::chain::{Chain, FastState, Held, SlowState};
+use super::ends::{Ends, FloatScale};
+use super::row_batch::RowBatch;
 use crate::design::Design;
 use crate::numeric::arithmetic::{Arithmetic, Block};
-use crate::numeric::cast::HasKernel;
 use crate::numeric::fixed::{Fixed, Overflowed};
 use crate::numeric::float::Float;
-use crate::numeric::format::pow2;
-use crate::numeric::lane::Lane;
 use crate::numeric::trace::ir::Program;
 
 /// Which arithmetic a chain runs in.
@@ -102,15 +102,25 @@ fn is_flagged(design: &Design) -> bool {
     compensation.is_some_and(|c| c.flagged_range().is_some())
 }
 
-/// The engine of a design.
+/// The engine of a design, with the fastest instructions that the processor has.
 pub fn engine(design: &Design, kind: ArithmeticKind) -> Box<dyn Engine> {
+    engine_with(design, kind, Instructions::best())
+}
+
+/// The engine of a design, with these instructions where a kernel applies and the processor has
+/// them. The rows are the same with all.
+pub fn engine_with(
+    design: &Design,
+    kind: ArithmeticKind,
+    instructions: Instructions,
+) -> Box<dyn Engine> {
     match design.circuit.decimator.stages {
-        1 => with_stages::<1>(design, kind),
-        2 => with_stages::<2>(design, kind),
-        3 => with_stages::<3>(design, kind),
-        4 => with_stages::<4>(design, kind),
-        5 => with_stages::<5>(design, kind),
-        _ => with_stages::<6>(design, kind),
+        1 => with_stages::<1>(design, kind, instructions),
+        2 => with_stages::<2>(design, kind, instructions),
+        3 => with_stages::<3>(design, kind, instructions),
+        4 => with_stages::<4>(design, kind, instructions),
+        5 => with_stages::<5>(design, kind, instructions),
+        _ => with_stages::<6>(design, kind, instructions),
     }
 }
 
@@ -150,150 +160,49 @@ pub fn lane_bits<const N: usize>(chain: &Chain<N>, program: &Program) -> LaneBit
     }
 }
 
-fn with_stages<const N: usize>(design: &Design, kind: ArithmeticKind) -> Box<dyn Engine> {
-    let chain = Chain::<N>::new(design);
+fn with_stages<const N: usize>(
+    design: &Design,
+    kind: ArithmeticKind,
+    instructions: Instructions,
+) -> Box<dyn Engine> {
+    let mut chain = Chain::<N>::new(design);
     let float_scale = FloatScale::new(design);
     if kind == ArithmeticKind::Float {
-        return Box::new(Running::new(chain, Float, Float, float_scale));
+        return Box::new(Running::new(chain, Float, Float, float_scale, (None, None)));
     }
     let bits = lane_bits(&chain, &chain.trace());
     let narrow = bits.fast <= 64 && bits.residue <= 64;
     let idle = chain.mixers.iter().all(|m| m.product.is_idle());
+    let kernel = narrow
+        .then(|| BlockKernel::new(&chain, instructions))
+        .flatten();
+    let batch = (narrow && bits.slow <= 64)
+        .then(|| RowBatch::new(&mut chain, instructions))
+        .flatten();
+    let parts = (chain, float_scale, (kernel, batch));
     match (narrow, idle, bits.slow <= 64) {
-        (true, true, true) => {
-            fixed::<Fixed<i64, i64, true>, Fixed<i64, i64>, N>(chain, float_scale)
-        }
-        (true, true, false) => {
-            fixed::<Fixed<i64, i64, true>, Fixed<i128, i64>, N>(chain, float_scale)
-        }
-        (true, false, true) => fixed::<Fixed<i64, i64>, Fixed<i64, i64>, N>(chain, float_scale),
-        (true, false, false) => fixed::<Fixed<i64, i64>, Fixed<i128, i64>, N>(chain, float_scale),
-        _ if bits.fast <= 64 => fixed::<Fixed<i64, i128>, Fixed<i128, i128>, N>(chain, float_scale),
-        _ => fixed::<Fixed<i128, i128>, Fixed<i128, i128>, N>(chain, float_scale),
+        (true, true, true) => fixed::<Fixed<i64, i64, true>, Fixed<i64, i64>, N>(parts),
+        (true, true, false) => fixed::<Fixed<i64, i64, true>, Fixed<i128, i64>, N>(parts),
+        (true, false, true) => fixed::<Fixed<i64, i64>, Fixed<i64, i64>, N>(parts),
+        (true, false, false) => fixed::<Fixed<i64, i64>, Fixed<i128, i64>, N>(parts),
+        _ if bits.fast <= 64 => fixed::<Fixed<i64, i128>, Fixed<i128, i128>, N>(parts),
+        _ => fixed::<Fixed<i128, i128>, Fixed<i128, i128>, N>(parts),
     }
 }
 
-fn fixed<F, S, const N: usize>(chain: Chain<N>, scale: FloatScale) -> Box<dyn Engine>
+fn fixed<F, S, const N: usize>(
+    (chain, scale, fast_ways): (Chain<N>, FloatScale, FastWays<N>),
+) -> Box<dyn Engine>
 where
     F: Ends + Default + 'static,
     S: Ends + Default + Arithmetic<Residue = F::Residue> + 'static,
 {
-    Box::new(Running::new(chain, F::default(), S::default(), scale))
+    let (fast, slow) = (F::default(), S::default());
+    Box::new(Running::new(chain, fast, slow, scale, fast_ways))
 }
 
-/// What turns a float row into the contract's units.
-#[derive(Debug, Clone, Copy)]
-struct FloatScale {
-    sample_rate_hz: f64,
-    gain_lsb: f64,
-}
-
-impl FloatScale {
-    fn new(design: &Design) -> Self {
-        let loop_bits = design.circuit.amplitude_loop.as_ref().map(|l| l.gain_bits);
-        FloatScale {
-            sample_rate_hz: design.circuit.sample_rate_hz,
-            gain_lsb: pow2(1 - loop_bits.unwrap_or(1) as i32),
-        }
-    }
-}
-
-/// How an arithmetic meets the outside: codes in, columns out, overflows.
-trait Ends: Arithmetic {
-    fn code(&self, code: i32, fraction_bits: i32) -> Self::Word;
-    /// An ADC input in LSB; `limits` are the codes'.
-    fn input(&self, lsb: f64, fraction_bits: i32, limits: [f64; 2]) -> Self::Word;
-    /// A phase or step of a ring of `bits` in 2^-64 turn.
-    fn turns(residue: Self::Residue, bits: u32) -> u64;
-    /// A drive gain, 0 to 1.
-    fn gain(word: Self::Word, scale: &FloatScale) -> f64;
-    fn at(&self, _sample: u64) {}
-    fn stopped(&self) -> Option<Overflowed> {
-        None
-    }
-    fn no_rows() -> Rows;
-    /// Appends a row; the tuning word is an element of a ring of `phase_bits`.
-    fn put(
-        row: &Row<Self::Word>,
-        tuning: Option<Self::Residue>,
-        phase_bits: u32,
-        scale: &FloatScale,
-        rows: &mut Rows,
-    );
-}
-
-impl<W: HasKernel, R: Lane, const IDLE: bool> Ends for Fixed<W, R, IDLE> {
-    #[inline(always)]
-    fn code(&self, code: i32, _fraction_bits: i32) -> W {
-        W::from_i32(code)
-    }
-    #[inline(always)]
-    fn input(&self, lsb: f64, _fraction_bits: i32, [low, high]: [f64; 2]) -> W {
-        // Of at most 32 bits: the sum with a half is exact.
-        W::from_i32((lsb.max(low).min(high) + 0.5).floor().min(high) as i32)
-    }
-    fn turns(residue: R, bits: u32) -> u64 {
-        (residue.wide() as u64) << (64 - bits)
-    }
-    fn gain(word: W, scale: &FloatScale) -> f64 {
-        word.wide() as f64 * scale.gain_lsb
-    }
-    #[inline(always)]
-    fn at(&self, sample: u64) {
-        self.at_sample(sample);
-    }
-    fn stopped(&self) -> Option<Overflowed> {
-        self.overflowed()
-    }
-    fn no_rows() -> Rows {
-        Rows::Integer(Vec::new())
-    }
-    fn put(row: &Row<W>, tuning: Option<R>, phase_bits: u32, _scale: &FloatScale, rows: &mut Rows) {
-        let Rows::Integer(rows) = rows else { return };
-        rows.extend(row.channels.iter().map(|w| w.wide()));
-        rows.extend([row.phase.wide(), row.magnitude.wide()]);
-        rows.extend(row.compensation.map(|[_, rate]| rate.wide()));
-        rows.extend(tuning.map(|t| t.wide() & ((1 << phase_bits) - 1)));
-        rows.extend(row.gain.map(|g| g.wide()));
-        rows.extend(row.in_range.map(|w| w.wide()));
-    }
-}
-
-impl Ends for Float {
-    fn code(&self, code: i32, fraction_bits: i32) -> f64 {
-        f64::from(code) * pow2(-fraction_bits)
-    }
-    #[inline(always)]
-    fn input(&self, lsb: f64, fraction_bits: i32, _limits: [f64; 2]) -> f64 {
-        lsb * pow2(-fraction_bits)
-    }
-    fn turns(residue: i128, _bits: u32) -> u64 {
-        // One turn is the whole 128-bit circle.
-        (residue >> 64) as u64
-    }
-    fn gain(word: f64, scale: &FloatScale) -> f64 {
-        word * scale.gain_lsb
-    }
-    fn no_rows() -> Rows {
-        Rows::Real(Vec::new())
-    }
-    fn put(
-        row: &Row<f64>,
-        tuning: Option<i128>,
-        _phase_bits: u32,
-        scale: &FloatScale,
-        rows: &mut Rows,
-    ) {
-        let Rows::Real(rows) = rows else { return };
-        rows.extend(row.channels);
-        rows.extend([row.phase, row.magnitude]);
-        rows.extend(row.compensation.map(|[_, rate]| rate));
-        // A turn is the whole 128-bit circle.
-        rows.extend(tuning.map(|t| t as u128 as f64 * pow2(-128) * scale.sample_rate_hz));
-        rows.extend(row.gain.map(|g| g * scale.gain_lsb));
-        rows.extend(row.in_range);
-    }
-}
+/// The kernel of the sample rate and the batch of the decimated rate, where they apply.
+type FastWays<const N: usize> = (Option<BlockKernel<N>>, Option<RowBatch>);
 
 /// A chain at work: `F` at the sample rate, `S` at the decimated rate.
 struct Running<F: Arithmetic, S: Arithmetic<Residue = F::Residue>, const N: usize> {
@@ -303,6 +212,10 @@ struct Running<F: Arithmetic, S: Arithmetic<Residue = F::Residue>, const N: usiz
     fast_state: FastState<F::Residue, N>,
     slow_state: SlowState<S::Word>,
     scale: FloatScale,
+    /// What runs codes at the sample rate, where it applies.
+    kernel: Option<BlockKernel<N>>,
+    /// Rows that wait; none do between two calls.
+    batch: Option<RowBatch>,
     /// Samples so far.
     samples: u64,
     /// Samples of the period at hand.
@@ -314,7 +227,13 @@ struct Running<F: Arithmetic, S: Arithmetic<Residue = F::Residue>, const N: usiz
 }
 
 impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Running<F, S, N> {
-    fn new(chain: Chain<N>, fast: F, slow: S, scale: FloatScale) -> Self {
+    fn new(
+        chain: Chain<N>,
+        fast: F,
+        slow: S,
+        scale: FloatScale,
+        (kernel, batch): FastWays<N>,
+    ) -> Self {
         let product = &chain.mixers[0].product;
         let mut running = Running {
             fast_state: chain.start_fast(&fast),
@@ -325,6 +244,8 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Runnin
             fast,
             slow,
             scale,
+            kernel,
+            batch,
             samples: 0,
             phase: 0,
             gain: None,
@@ -358,14 +279,33 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Runnin
         self.samples += drive.len() as u64;
     }
 
-    /// Codes of any number of periods; `word` makes a word of a code.
+    /// Codes inside one period, by the kernel where there is one.
+    #[inline(always)]
+    fn codes(&mut self, drive: &[i32], sense: &[i32]) {
+        let left_over = match &self.kernel {
+            Some(kernel) => kernel.left_over(drive.len()),
+            None => drive.len(),
+        };
+        let fraction_bits = self.chain.code_fraction_bits;
+        let (single, drive) = drive.split_at(left_over);
+        let (single_sense, sense) = sense.split_at(left_over);
+        self.block(single, single_sense, |ar, code| {
+            ar.code(code, fraction_bits)
+        });
+        if let Some(kernel) = self.kernel.as_mut().filter(|_| !drive.is_empty()) {
+            F::run_kernel(kernel, &mut self.fast_state, [drive, sense]);
+            self.samples += drive.len() as u64;
+        }
+    }
+
+    /// Codes or inputs of any number of periods; `block` takes what is inside one.
     #[inline(always)]
     fn periods<T: Copy>(
         &mut self,
         drive: &[T],
         sense: &[T],
         rows: &mut Rows,
-        word: impl Fn(&F, T) -> F::Word,
+        block: impl Fn(&mut Self, &[T], &[T]),
     ) -> Result<(), Box<Overflowed>> {
         let ratio = self.chain.cics[0].ratio as usize;
         let (mut drive, mut sense) = (drive, sense);
@@ -374,7 +314,7 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Runnin
             let (d, s);
             (d, drive) = drive.split_at(count);
             (s, sense) = sense.split_at(count);
-            self.block(d, s, &word);
+            block(self, d, s);
             // The fast rate comes first in the order of steps; an overflow there is the earlier.
             if let Some(overflowed) = self.fast.stopped() {
                 return Err(Box::new(overflowed));
@@ -388,10 +328,20 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Runnin
                 }
             }
         }
+        if let (Some(batch), Rows::Integer(rows)) = (&mut self.batch, rows) {
+            batch.put(&self.chain, rows);
+        }
         Ok(())
     }
 
     fn end_of_period(&mut self, rows: &mut Rows) {
+        if let (Some(batch), Rows::Integer(rows)) = (&mut self.batch, &mut *rows) {
+            let channels = self.chain.decimated(&self.slow, &mut self.fast_state);
+            if batch.push(channels.map(S::raw)) {
+                batch.put(&self.chain, rows);
+            }
+            return;
+        }
         self.slow.at(self.samples - 1);
         let row = self
             .chain
@@ -415,8 +365,7 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Engine
         sense: &[i32],
         rows: &mut Rows,
     ) -> Result<(), Box<Overflowed>> {
-        let fraction_bits = self.chain.code_fraction_bits;
-        self.periods(drive, sense, rows, |ar, code| ar.code(code, fraction_bits))
+        self.periods(drive, sense, rows, Self::codes)
     }
 
     fn process_inputs(
@@ -428,8 +377,8 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Engine
         let fraction_bits = self.chain.code_fraction_bits;
         let range = self.chain.code_range;
         let limits = [range.low as f64, range.high as f64];
-        self.periods(drive_lsb, sense_lsb, rows, |ar, lsb| {
-            ar.input(lsb, fraction_bits, limits)
+        self.periods(drive_lsb, sense_lsb, rows, |running, drive, sense| {
+            running.block(drive, sense, |ar, lsb| ar.input(lsb, fraction_bits, limits));
         })
     }
 

@@ -10,20 +10,27 @@
 //!                    NCO
 //! ```
 //!
-//! [`chain`] wires the blocks; [`engine`] runs a chain in the arithmetic and the lanes that fit it.
+//! [`chain`] wires the blocks; [`engine`] runs a chain in the arithmetic and the lanes that fit it,
+//! the sample rate by [`block_kernel`] where that applies.
 //! The behaviour is that of `docs/manual.md`, step by step.
 
 pub mod amplitude_loop;
+pub mod block_kernel;
 pub mod chain;
 pub mod compensate;
 pub mod compensation;
 pub mod cordic;
 pub mod decimator;
 pub mod demodulator;
+mod ends;
 pub mod engine;
 pub mod in_range;
 pub mod nco;
 pub mod phase_loop;
+mod row_batch;
+mod sample_lanes;
+#[cfg(target_arch = "x86_64")]
+mod sample_lanes_x86;
 pub mod scale;
 
 /// The four channels, in the contract's order.

@@ -239,11 +239,16 @@ impl HasKernel for i128 {
 
 /// What a kernel does with a word outside its limits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum End {
+pub(crate) enum End {
+    /// Nothing: no word is outside.
     Exact,
+    /// Keeps the low bits, sign-extended.
     WrapSigned,
+    /// Keeps the low bits.
     WrapUnsigned,
+    /// The nearest limit.
     Clamp,
+    /// The nearest limit, and a report.
     Report,
 }
 
@@ -263,17 +268,26 @@ enum End {
 #[derive(Debug, Clone)]
 pub struct Kernel<L> {
     idle: bool,
-    left: u32,
-    right: u32,
-    base: L,
-    negative: L,
-    odd: L,
+    /// Zeros appended.
+    pub(crate) left: u32,
+    /// Bits dropped.
+    pub(crate) right: u32,
+    /// Of the table above.
+    pub(crate) base: L,
+    /// Of the table above.
+    pub(crate) negative: L,
+    /// Of the table above.
+    pub(crate) odd: L,
     /// Drops more bits than any word has: the result depends on the sign alone.
     sign_only: Option<(L, L)>,
-    end: End,
-    bits: u32,
-    low: L,
-    high: L,
+    /// The overflow step.
+    pub(crate) end: End,
+    /// Bits that a wrap keeps.
+    pub(crate) bits: u32,
+    /// The lower limit.
+    pub(crate) low: L,
+    /// The upper limit.
+    pub(crate) high: L,
 }
 
 impl<L: Lane> Kernel<L> {
@@ -338,6 +352,11 @@ impl<L: Lane> Kernel<L> {
                 v.clamp(self.low, self.high)
             }
         }
+    }
+
+    /// True if the word before the overflow step is what the table says: no shift exceeds the lane.
+    pub(crate) fn follows_the_table(&self) -> bool {
+        self.left < L::BITS && self.sign_only.is_none()
     }
 
     /// The word before the overflow step: rounded, not limited.

@@ -1,11 +1,12 @@
 //! Formats, rounding, overflow, and the arithmetics that the circuit is written over.
 //!
 //! [`mod@format`] and [`cast`] say what a quantiser does; [`arithmetic`] is the interface of the
-//! blocks; [`float`], [`fixed`], [`trace`] and [`paired`] implement it; [`constants`] decides the integers
+//! blocks; [`float`], [`fixed`], [`batch`], [`trace`] and [`paired`] implement it; [`constants`] decides the integers
 //! nearest to sines, arc tangents and the CORDIC gain; [`turn`] holds elementary functions with the same bits on every
 //! machine.
 
 pub mod arithmetic;
+pub mod batch;
 pub mod cast;
 pub mod constants;
 pub mod fixed;

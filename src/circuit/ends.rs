@@ -1,0 +1,147 @@
+//! How an arithmetic meets the outside of a chain: codes in, columns out, overflows.
+
+use super::block_kernel::BlockKernel;
+use super::chain::{FastState, Row};
+use super::engine::Rows;
+use crate::design::Design;
+use crate::numeric::arithmetic::Arithmetic;
+use crate::numeric::cast::HasKernel;
+use crate::numeric::fixed::{Fixed, Overflowed};
+use crate::numeric::float::Float;
+use crate::numeric::format::pow2;
+use crate::numeric::lane::Lane;
+
+/// What turns a float row into the contract's units.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct FloatScale {
+    sample_rate_hz: f64,
+    gain_lsb: f64,
+}
+
+impl FloatScale {
+    pub(super) fn new(design: &Design) -> Self {
+        let loop_bits = design.circuit.amplitude_loop.as_ref().map(|l| l.gain_bits);
+        FloatScale {
+            sample_rate_hz: design.circuit.sample_rate_hz,
+            gain_lsb: pow2(1 - loop_bits.unwrap_or(1) as i32),
+        }
+    }
+}
+
+/// How an arithmetic meets the outside: codes in, columns out, overflows.
+pub(super) trait Ends: Arithmetic {
+    fn code(&self, code: i32, fraction_bits: i32) -> Self::Word;
+    /// An ADC input in LSB; `limits` are the codes'.
+    fn input(&self, lsb: f64, fraction_bits: i32, limits: [f64; 2]) -> Self::Word;
+    /// A phase or step of a ring of `bits` in 2^-64 turn.
+    fn turns(residue: Self::Residue, bits: u32) -> u64;
+    /// A drive gain, 0 to 1.
+    fn gain(word: Self::Word, scale: &FloatScale) -> f64;
+    /// The raw word of a row, in 64 bits; of no meaning without quantisation.
+    fn raw(_word: Self::Word) -> i64 {
+        0
+    }
+    /// Runs the samples that a kernel left nothing over of.
+    fn run_kernel<const N: usize>(
+        _kernel: &mut BlockKernel<N>,
+        _state: &mut FastState<Self::Residue, N>,
+        _codes: [&[i32]; 2],
+    ) {
+    }
+    fn at(&self, _sample: u64) {}
+    fn stopped(&self) -> Option<Overflowed> {
+        None
+    }
+    fn no_rows() -> Rows;
+    /// Appends a row; the tuning word is an element of a ring of `phase_bits`.
+    fn put(
+        row: &Row<Self::Word>,
+        tuning: Option<Self::Residue>,
+        phase_bits: u32,
+        scale: &FloatScale,
+        rows: &mut Rows,
+    );
+}
+
+impl<W: HasKernel, R: Lane, const IDLE: bool> Ends for Fixed<W, R, IDLE> {
+    #[inline(always)]
+    fn code(&self, code: i32, _fraction_bits: i32) -> W {
+        W::from_i32(code)
+    }
+    #[inline(always)]
+    fn input(&self, lsb: f64, _fraction_bits: i32, [low, high]: [f64; 2]) -> W {
+        // Of at most 32 bits: the sum with a half is exact.
+        W::from_i32((lsb.max(low).min(high) + 0.5).floor().min(high) as i32)
+    }
+    fn turns(residue: R, bits: u32) -> u64 {
+        (residue.wide() as u64) << (64 - bits)
+    }
+    fn gain(word: W, scale: &FloatScale) -> f64 {
+        word.wide() as f64 * scale.gain_lsb
+    }
+    fn raw(word: W) -> i64 {
+        word.wide() as i64
+    }
+    fn run_kernel<const N: usize>(
+        kernel: &mut BlockKernel<N>,
+        state: &mut FastState<R, N>,
+        [drive, sense]: [&[i32]; 2],
+    ) {
+        kernel.run(state, drive, sense);
+    }
+    #[inline(always)]
+    fn at(&self, sample: u64) {
+        self.at_sample(sample);
+    }
+    fn stopped(&self) -> Option<Overflowed> {
+        self.overflowed()
+    }
+    fn no_rows() -> Rows {
+        Rows::Integer(Vec::new())
+    }
+    fn put(row: &Row<W>, tuning: Option<R>, phase_bits: u32, _scale: &FloatScale, rows: &mut Rows) {
+        let Rows::Integer(rows) = rows else { return };
+        rows.extend(row.channels.iter().map(|w| w.wide()));
+        rows.extend([row.phase.wide(), row.magnitude.wide()]);
+        rows.extend(row.compensation.map(|[_, rate]| rate.wide()));
+        rows.extend(tuning.map(|t| t.wide() & ((1 << phase_bits) - 1)));
+        rows.extend(row.gain.map(|g| g.wide()));
+        rows.extend(row.in_range.map(|w| w.wide()));
+    }
+}
+
+impl Ends for Float {
+    fn code(&self, code: i32, fraction_bits: i32) -> f64 {
+        f64::from(code) * pow2(-fraction_bits)
+    }
+    #[inline(always)]
+    fn input(&self, lsb: f64, fraction_bits: i32, _limits: [f64; 2]) -> f64 {
+        lsb * pow2(-fraction_bits)
+    }
+    fn turns(residue: i128, _bits: u32) -> u64 {
+        // One turn is the whole 128-bit circle.
+        (residue >> 64) as u64
+    }
+    fn gain(word: f64, scale: &FloatScale) -> f64 {
+        word * scale.gain_lsb
+    }
+    fn no_rows() -> Rows {
+        Rows::Real(Vec::new())
+    }
+    fn put(
+        row: &Row<f64>,
+        tuning: Option<i128>,
+        _phase_bits: u32,
+        scale: &FloatScale,
+        rows: &mut Rows,
+    ) {
+        let Rows::Real(rows) = rows else { return };
+        rows.extend(row.channels);
+        rows.extend([row.phase, row.magnitude]);
+        rows.extend(row.compensation.map(|[_, rate]| rate));
+        // A turn is the whole 128-bit circle.
+        rows.extend(tuning.map(|t| t as u128 as f64 * pow2(-128) * scale.sample_rate_hz));
+        rows.extend(row.gain.map(|g| g * scale.gain_lsb));
+        rows.extend(row.in_range);
+    }
+}
