@@ -1,13 +1,15 @@
 //! The HTML report: one file that needs nothing else, for people.
 //!
 //! [`page`] and [`tables`] turn an outcome into what the template prints, [`figures`] draws it on
-//! what [`scene`] prepares, [`svg`] with [`axis`] is the plot writer under the figures, [`text`]
-//! formats numbers; [`simulation`] is the page of `simulate`, [`closure`] that of `close`, [`capture`] that of `close --capture`, [`design_diff`] what a closure changes in the design, [`selftest`] that of its self-test, [`study`] that of a word-length study. Colours and layout are in `templates/report/`.
+//! what [`scene`] prepares, [`svg`] with [`axis`] is the plot writer under the figures, [`figure`] puts legend, drawing and data
+//! together, `density` draws many points, [`text`] formats numbers; [`simulation`] is the page of `simulate`, [`closure`] that of `close`, [`capture`] that of `close --capture`, [`design_diff`] what a closure changes in the design, [`selftest`] that of its self-test, [`study`] that of a word-length study. Colours and layout are in `templates/report/`.
 
 pub mod axis;
 pub mod capture;
 pub mod closure;
+mod density;
 pub mod design_diff;
+pub mod figure;
 pub mod figures;
 pub mod page;
 pub mod scene;

@@ -2,7 +2,7 @@
 
 pub mod figures;
 
-use super::figures::Figure;
+use super::figure::Figure;
 use super::text::{decimals_of, fixed, percent, significant};
 use crate::error::{InputError, Result};
 use crate::simulation::outcome::{Drift, Outcome};

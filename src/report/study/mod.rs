@@ -2,7 +2,7 @@
 
 mod figures;
 
-use super::figures::Figure;
+use super::figure::{Figure, both, one};
 use super::text::significant;
 use crate::error::{InputError, Result};
 use crate::study::outcome::{Point, Study};
@@ -72,18 +72,24 @@ pub fn html(s: &Study) -> Result<String> {
             .collect(),
         required: s.required.iter().map(required).collect(),
         points: all.map(|p| row(p, &targets)).collect(),
-        fronts: targets.iter().map(|t| figures::front(s, t)).collect(),
+        fronts: both(|width| {
+            targets
+                .iter()
+                .map(|t| figures::front(s, t, width))
+                .collect()
+        }),
         targets,
-        budget: figures::budget(s),
+        budget: one(|width| figures::budget(s, width)),
         budget_rows: budget_rows(s),
         words: figures::words(s),
         word_rows: word_rows(s),
-        tornados: s
-            .chosen
-            .iter()
-            .filter_map(|c| figures::tornado(s, c))
-            .collect(),
-        parallel: figures::parallel(s),
+        tornados: both(|width| {
+            let chosen = s.chosen.iter();
+            chosen
+                .filter_map(|c| figures::tornado(s, c, width))
+                .collect()
+        }),
+        parallel: one(|width| figures::parallel(s, width)),
         notes: s.notes.clone(),
         provenance: vec![
             ["command".to_owned(), s.command.clone()],
