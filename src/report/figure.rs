@@ -1,7 +1,7 @@
 //! A figure of a page: drawn once for wide pages and once for narrow ones, with its legend, its data as CSV and its
 //! figures in numbers for those who cannot see it.
 
-use super::svg::{Shape, Swatch, mark};
+use super::svg::{Shape, Swatch, path};
 use super::text::{escape, significant};
 use std::fmt::Write as _;
 
@@ -83,9 +83,9 @@ impl Figure {
             out.push_str("<ul class=\"legend\">\n");
             for (class, swatch, words) in &self.legend {
                 let drawn = match swatch {
-                    Swatch::Line => mark(class, "M0 7h24"),
-                    Swatch::Area => mark(class, "M0 1h24v12h-24z"),
-                    Swatch::Marker(shape) => mark(class, &shape.path(12.0, 7.0, 5.0)),
+                    Swatch::Line => path(class, "M0 7h24"),
+                    Swatch::Area => path(class, "M0 1h24v12h-24z"),
+                    Swatch::Marker(shape) => path(class, &shape.path(12.0, 7.0, 5.0)),
                 };
                 let _ = writeln!(
                     out,

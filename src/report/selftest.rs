@@ -2,9 +2,10 @@
 
 use super::axis::{Axis, Interval};
 use super::figure::{Figure, SMALL};
+use super::narrow::rendered;
 use super::svg::{Shape, Svg, Swatch};
 use super::text::{percent, significant};
-use crate::error::{InputError, Result};
+use crate::error::Result;
 use crate::selftest::outcome::{EffectScore, Outcome};
 use askama::Template;
 
@@ -77,8 +78,7 @@ pub fn html(o: &Outcome) -> Result<String> {
             .collect(),
         provenance: provenance(o),
     };
-    page.render()
-        .map_err(|e| InputError::new(format!("the report cannot be rendered: {e}")).into())
+    rendered(&page)
 }
 
 fn headline(o: &Outcome) -> String {

@@ -18,9 +18,10 @@ mod page_tests;
 
 use super::design_diff::{DesignDiff, Line};
 use super::figure::Figure;
+use super::narrow::rendered;
 use super::page::Equivalent;
 use super::text::grouped;
-use crate::error::{InputError, Result};
+use crate::error::Result;
 use crate::selftest::controls::Controls;
 use crate::thermal::close::Closed;
 use crate::thermal::firmware::emitted::Emitted;
@@ -191,6 +192,5 @@ pub fn page(c: &Closure, name: &str, own: Own) -> Result<String> {
             .collect(),
         own,
     };
-    page.render()
-        .map_err(|e| InputError::new(format!("the report cannot be rendered: {e}")).into())
+    rendered(&page)
 }

@@ -3,8 +3,9 @@
 mod figures;
 
 use super::figure::{Figure, both, one};
+use super::narrow::rendered;
 use super::text::significant;
-use crate::error::{InputError, Result};
+use crate::error::Result;
 use crate::study::outcome::{Point, Study};
 use askama::Template;
 
@@ -111,8 +112,7 @@ pub fn html(s: &Study) -> Result<String> {
             ],
         ],
     };
-    page.render()
-        .map_err(|e| InputError::new(format!("the report cannot be rendered: {e}")).into())
+    rendered(&page)
 }
 
 /// A sentence for each target of which it is known whether a design costs a quarter less.
