@@ -144,19 +144,10 @@ fn drawn(view: &View, curves: &[(&str, Vec<(f64, f64)>)], period_s: f64, width: 
         .logarithmic(&x, &y);
     for (words, line) in &parts {
         frame.line("bound", line);
-        // Where the part is largest: the end that its slope leads up to.
-        let end = if words.starts_with("white") {
-            line.first()
-        } else {
-            line.last()
-        };
-        if let Some((x, y)) = end.filter(|_| line.len() > 1) {
-            let anchor = if words.starts_with("white") {
-                "start"
-            } else {
-                "end"
-            };
-            frame.note("slope", (*x, *y), anchor, words);
+        if let (Some((at, level)), true) = (line.last(), line.len() > 1) {
+            let share = (at - x.interval.low) / (x.interval.high - x.interval.low);
+            let anchor = if share > 0.6 { "end" } else { "start" };
+            frame.note("slope", (*at, *level), anchor, words);
         }
     }
     for (class, points) in &data {

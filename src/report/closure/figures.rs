@@ -7,6 +7,7 @@ use super::view::View;
 use crate::report::axis::{Axis, Interval};
 use crate::report::figure::{DOT, Figure, SMALL, both};
 use crate::report::svg::{Frame, Svg, Swatch};
+use crate::report::text::significant;
 use crate::thermal::channels::range;
 
 /// Most small figures.
@@ -178,6 +179,7 @@ fn step(view: &View, k: usize, contribution: &Contribution, width: f64) -> Optio
     let step = view.closed.closure.steps.get(k)?;
     let term = view.closed.after.terms.get(k)?;
     let abscissa = curve::abscissa(view, step, contribution);
+    let (contribution, constant) = &without_constant(contribution);
     let value = &contribution.value_dps;
     let partial: Vec<f64> = view.after.iter().zip(value).map(|(r, v)| r + v).collect();
     let (low, high) = band_within(&partial, contribution);
@@ -204,10 +206,27 @@ fn step(view: &View, k: usize, contribution: &Contribution, width: f64) -> Optio
     let equation = term.candidate.equation();
     let caption = format!(
         "{}: {}. The deviation counts coefficients and shape, estimated together with the declared model and all other \
-         steps: it is wide where those could take its place.{} {CROWDED}",
+         steps: it is wide where those could take its place.{}{constant} {CROWDED}",
         step.effect, equation, abscissa.remark
     );
     Some(svg.figure(title, caption))
+}
+
+/// The contribution less its mean where it is far from 0 throughout, as a gain times a supply voltage is, and a sentence that
+/// says so: the declared model's constant takes the mean up.
+fn without_constant(contribution: &Contribution) -> (Contribution, String) {
+    let mut out = contribution.clone();
+    let (least, greatest) = range(&out.value_dps);
+    let mean = out.value_dps.iter().sum::<f64>() / out.value_dps.len().max(1) as f64;
+    if mean.abs() <= greatest - least {
+        return (out, String::new());
+    }
+    out.value_dps.iter_mut().for_each(|v| *v -= mean);
+    let told = format!(
+        " Its mean, {} deg/s, is taken off here.",
+        significant(mean, 3)
+    );
+    (out, told)
 }
 
 /// The contribution as a line with its band; a bar for each row where the deviation is no curve.
