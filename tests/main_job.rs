@@ -74,7 +74,7 @@ fn the_default_design_reproduces_the_published_figures_through_all_paths() {
         assert_eq!(file["sha256"], sum.as_str(), "{}", path.display());
     }
     let report = std::fs::read_to_string(folder.path().join("report.html")).expect("report.html");
-    assert_eq!(report.matches("<svg").count(), 4);
+    assert_eq!(report.matches("<figure>").count(), 4);
     // One file: nothing is fetched.
     for outside in ["src=", "href=\"http", "url(", "@import", "<script"] {
         assert!(!report.contains(outside), "{outside}");

@@ -99,7 +99,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let watch = Stages::start("approximating");
     let request = request(arguments)?;
-    let planned = ["approx.json", timing::NAME];
+    let planned = ["approx.json", "report.html", timing::NAME];
     let mut results = Results::claim(&arguments.out, &planned, &recorded.inputs)?;
     if !arguments.force {
         for folder in ["c", "rust"] {
@@ -133,6 +133,8 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         super::common::bundle(files, folder, &mut results, arguments.force)?;
     }
     results.write("approx.json", json.as_bytes())?;
+    let page = crate::report::approx::html(&made)?;
+    results.write("report.html", page.as_bytes())?;
     watch.write(&mut results, &made.outcome.design_sha256, &recorded.command)?;
     results.finish()?;
     match arguments.format {

@@ -66,7 +66,12 @@ const SAMPLES: usize = 10_000_000;
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let watch = Stages::start("making the stimulus");
     let design = super::design(arguments.design.as_deref())?;
-    let planned = ["equiv.json", job::COUNTEREXAMPLE, timing::NAME];
+    let planned = [
+        "equiv.json",
+        "equiv.html",
+        job::COUNTEREXAMPLE,
+        timing::NAME,
+    ];
     let mut results = Results::claim(&arguments.out, &planned, &recorded.inputs)?;
     let languages = super::common::languages(arguments.lang)?;
     let (drive, sense, origin) = codes(&design, arguments)?;
@@ -88,6 +93,8 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     watch.stage("writing");
     let json = super::json(&result);
     results.write("equiv.json", json.as_bytes())?;
+    let page = crate::report::equivalence::html(&design, &result)?;
+    results.write("equiv.html", page.as_bytes())?;
     if let Some((drive, sense)) = counterexample {
         let text = shrink::capture_text(&design, &drive, &sense);
         results.write(job::COUNTEREXAMPLE, text.as_bytes())?;

@@ -4,6 +4,7 @@ use super::against::{Against, FirstDifference};
 use super::overflow::{self, Repair};
 use super::predicted::Prediction;
 use crate::design::Design;
+use crate::nodes::histogram::Histogram;
 use crate::nodes::node::Node;
 use crate::nodes::probe::Seen;
 use crate::simulation::hunting::Hunting;
@@ -58,6 +59,9 @@ pub struct NodeReport {
     pub overflows: u64,
     /// Conditions that do not hold; see `notes`.
     pub flags: Vec<&'static str>,
+    /// How often fixed - float was how large; for the report.
+    #[serde(skip)]
+    pub errors: Histogram,
 }
 
 impl NodeReport {
@@ -93,6 +97,7 @@ impl NodeReport {
             headroom_bits: node.headroom_bits(),
             overflows: node.overflows,
             flags: prediction.flags.clone(),
+            errors: node.errors.clone(),
         }
     }
 }

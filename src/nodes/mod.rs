@@ -3,9 +3,10 @@
 //! One run of the circuit in [`Paired`](crate::numeric::paired::Paired) gives for every node the error fixed - float of every
 //! sample, a bound on it that is computed beside it, and what overflowed ([`run`], [`probe`], [`node`], [`layout`]). [`polar`]
 //! bounds the CORDIC, [`loops`] the closed phase loop; [`quantisation`] are the moments of a rounding, [`activity`] says
-//! whether a node's words move enough for them.
+//! whether a node's words move enough for them, [`histogram`] counts errors.
 
 pub mod activity;
+pub mod histogram;
 pub mod layout;
 pub mod loops;
 pub mod node;

@@ -1,6 +1,7 @@
 //! What is known of one node after a run: its range, its errors, its bound.
 
 use super::activity::Sketch;
+use super::histogram::Histogram;
 use crate::numeric::cast::Label;
 use crate::numeric::lane::Lane;
 use crate::numeric::paired::Pair;
@@ -65,6 +66,8 @@ pub struct Node {
     pub sum_error: f64,
     /// Sum of its square.
     pub sum_square: f64,
+    /// How often fixed - float was how large.
+    pub errors: Histogram,
     /// Greatest bound.
     pub max_bound: f64,
     /// Greatest error / bound of a sample, and the ADC sample.
@@ -95,6 +98,7 @@ impl Node {
     /// A node that has seen nothing.
     pub fn new(identity: Identity) -> Self {
         Node {
+            errors: Histogram::new(crate::numeric::format::pow2(-identity.fraction_bits)),
             identity,
             different: Sketch::new(1 << 14),
             count: 0,
@@ -144,6 +148,7 @@ impl Node {
         self.balance += i64::from(real > 0.0) - i64::from(real < 0.0);
         self.sum_error += error;
         self.sum_square += error * error;
+        self.errors.add(error);
         self.max_abs_error = self.max_abs_error.max(size);
         self.max_bound = self.max_bound.max(bound);
         if size > self.worst.0 * bound {

@@ -49,6 +49,7 @@ impl Results {
             super::check_writable(&path)?;
         }
         refuse_foreign(out, planned)?;
+        refuse_of_another(out, planned)?;
         let staged = TemporaryFolder::new(&existing).map_err(|e| {
             let error = InputError::new(format!("cannot write into this folder: {e}"));
             error
@@ -190,12 +191,13 @@ impl Results {
 }
 
 /// Files that tell that others beside them are results.
-const RESULTS: [&str; 5] = [
+const RESULTS: [&str; 6] = [
     "summary.json",
     "closure.json",
     "simulate.json",
     "equiv.json",
     "selftest.json",
+    "approx.json",
 ];
 
 /// Refuses to write over a design or a table that no earlier run has put there: a folder of the user's own files has such
@@ -214,6 +216,35 @@ fn refuse_foreign(out: &Path, planned: &[&str]) -> Result<()> {
             .in_file(path)
             .help("move it away, or give another place with --out")
             .into()),
+    }
+}
+
+/// The wall times of the last command, whichever it was.
+const WALL_TIMES: &str = "timing.json";
+
+/// Refuses to write over what another command has put there: `simulate` and `close` both have a `report.html`. Where this
+/// command's own results are there as well, files of such names are taken for its own.
+fn refuse_of_another(out: &Path, planned: &[&str]) -> Result<()> {
+    let is_there = |name: &&&str| out.join(name).is_file();
+    let mut own = planned
+        .iter()
+        .filter(|name| RESULTS.contains(name))
+        .peekable();
+    if own.peek().is_none() || own.any(|name| is_there(&name)) {
+        return Ok(());
+    }
+    let Some(other) = RESULTS.iter().find(is_there) else {
+        return Ok(());
+    };
+    let mut shared = planned.iter().filter(|name| **name != WALL_TIMES);
+    match shared.find(is_there) {
+        None => Ok(()),
+        Some(name) => Err(InputError::new(format!(
+            "this file would be written over, and it belongs to the results of another command: {other} lies beside it"
+        ))
+        .in_file(out.join(name))
+        .help("give these results a folder of their own with --out")
+        .into()),
     }
 }
 

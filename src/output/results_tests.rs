@@ -146,3 +146,32 @@ fn a_users_own_design_is_not_taken_for_an_earlier_result() {
     fs::write(top.path().join("closure.json"), "{}").unwrap();
     assert!(Results::claim(top.path(), &planned, &[]).is_ok());
 }
+
+#[test]
+fn results_of_another_command_are_not_written_over() {
+    const SIMULATE: [&str; 3] = ["simulate.json", "report.html", "timing.json"];
+    const CLOSE: [&str; 3] = ["closure.json", "report.html", "timing.json"];
+    const EQUIV: [&str; 3] = ["equiv.json", "equiv.html", "timing.json"];
+    let top = tempfile::tempdir().unwrap();
+    let write = |planned: &[&str]| {
+        let mut results = Results::claim(top.path(), planned, &[])?;
+        for name in planned {
+            results.write(name, planned[0].as_bytes())?;
+        }
+        results.finish()
+    };
+    write(&SIMULATE).unwrap();
+    let told = write(&CLOSE).unwrap_err().to_string();
+    for part in ["report.html", "simulate.json lies beside it", "--out"] {
+        assert!(told.contains(part), "{told}");
+    }
+    assert_eq!(
+        fs::read(top.path().join("report.html")).unwrap(),
+        b"simulate.json"
+    );
+    // Its own results a command does write over, and what shares no name but the wall time's gets on with it.
+    write(&SIMULATE).unwrap();
+    write(&EQUIV).unwrap();
+    write(&SIMULATE).unwrap();
+    assert!(write(&CLOSE).is_err());
+}

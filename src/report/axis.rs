@@ -101,9 +101,9 @@ pub fn ticks(interval: Interval, most: usize) -> Ticks {
     }
 }
 
-/// Ticks of a logarithmic axis whose interval is in powers of ten: whole powers, with twice and five times
-/// of each where there are fewer than three of them.
-pub fn decades(interval: Interval) -> Ticks {
+/// Ticks of a logarithmic axis whose interval is in powers of ten: at most about `most` whole powers, with twice and five
+/// times of each where there are fewer than three of them.
+pub fn decades(interval: Interval, most: usize) -> Ticks {
     let (low, high) = (interval.low.ceil() as i32, interval.high.floor() as i32);
     let mantissas: &[f64] = if high - low >= 2 {
         &[1.0]
@@ -115,7 +115,8 @@ pub fn decades(interval: Interval) -> Ticks {
         labels: Vec::new(),
         exponent: 0,
     };
-    for power in low.saturating_sub(1)..=high {
+    let every = 1 + (high - low).max(0) / most.max(2) as i32;
+    for power in (low.saturating_sub(1)..=high).filter(|p| p.rem_euclid(every) == 0) {
         for mantissa in mantissas {
             let at = f64::from(power) + mantissa.log10();
             if at >= interval.low && at <= interval.high {
@@ -175,7 +176,7 @@ mod tests {
     use super::*;
 
     fn labels(low: f64, high: f64) -> Vec<String> {
-        decades(Interval { low, high }).labels
+        decades(Interval { low, high }, 10).labels
     }
 
     #[test]
@@ -184,10 +185,12 @@ mod tests {
         assert_eq!(labels(-2.1, -1.5), ["0.01", "0.02"]);
         assert_eq!(labels(0.2, 0.8), ["2", "5"]);
         assert_eq!(labels(-5.1, -4.9), ["10⁻⁵"]);
-        let ticks = decades(Interval {
+        let interval = Interval {
             low: -7.0,
             high: -4.0,
-        });
+        };
+        let ticks = decades(interval, 10);
+        assert_eq!(decades(interval, 2).values, [-6.0, -4.0]);
         assert_eq!(ticks.values, [-7.0, -6.0, -5.0, -4.0]);
         assert_eq!(ticks.exponent, 0);
     }

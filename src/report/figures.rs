@@ -2,37 +2,27 @@
 
 use super::Shown;
 use super::axis::{Axis, Interval};
+use super::figure::{Figure, both};
 use super::scene::Scene;
 use super::svg::{Frame, Shape, Svg, Swatch};
 use super::text::significant;
 use crate::job::outcome::Point;
 
-/// Width of every figure, px.
-const WIDTH: f64 = 960.0;
-/// A figure for the page.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Figure {
-    /// What it shows.
-    pub title: String,
-    /// SVG, escaped.
-    pub svg: String,
-    /// How to read it.
-    pub caption: String,
-}
-
 /// All of them, in the order of the page.
 pub fn all(shown: &Shown) -> Vec<Figure> {
     let scene = Scene::new(shown);
-    vec![
-        scene.uncompensated(),
-        scene.residual(),
-        scene.over_time(),
-        scene.fixed_minus_float(),
-    ]
+    both(|width| {
+        vec![
+            scene.uncompensated(width),
+            scene.residual(width),
+            scene.over_time(width),
+            scene.fixed_minus_float(width),
+        ]
+    })
 }
 
 impl Scene<'_> {
-    fn uncompensated(&self) -> Figure {
+    fn uncompensated(&self, width: f64) -> Figure {
         let fit = self.shown.fit;
         let (low, high) = (
             self.thermometer.interval.low,
@@ -57,7 +47,7 @@ impl Scene<'_> {
         let data = self.shown.points.iter().map(|p| p.before_dps);
         let y = rate_axis("rate output", Interval::of(data.chain(ends)).padded(0.05));
         let (rising, falling) = self.directions();
-        let mut svg = Svg::new(WIDTH);
+        let mut svg = Svg::new(width);
         let mut legend = vec![
             ("heating", Swatch::Marker(Shape::Up), rising.to_owned()),
             ("cooling", Swatch::Marker(Shape::Down), falling.to_owned()),
@@ -69,7 +59,7 @@ impl Scene<'_> {
             ("sigma", Swatch::Area, "± 2 sigma of the curve".to_owned()),
         ];
         legend.extend(self.outside_entry());
-        svg.legend(&legend);
+        svg.legend(legend);
         let mut frame = svg.frame(330.0, y.room(), self.thermometer.clone(), y);
         for (from, to) in self.outside() {
             frame.span("outside", from, to);
@@ -80,41 +70,34 @@ impl Scene<'_> {
             ("heating", Shape::Up, true),
             ("cooling", Shape::Down, false),
         ] {
-            let chosen = self.drawn.iter().filter_map(|k| self.shown.points.get(*k));
-            let places: Vec<_> = chosen
-                .filter(|p| p.heating == heating)
-                .map(|p| (p.thermometer, p.before_dps))
-                .collect();
-            frame.markers(class, shape, self.radius, &places);
+            let chosen = self.shown.points.iter().filter(|p| p.heating == heating);
+            let places: Vec<_> = chosen.map(|p| (p.thermometer, p.before_dps)).collect();
+            self.readings(&mut frame, class, shape, &places);
         }
         frame.line("fit", &line);
         svg.add(&frame);
         let title = "Rate output without compensation against the thermometer";
-        Figure {
-            svg: svg.finish(title),
-            title: title.to_owned(),
-            caption: format!(
+        svg.figure(title, format!(
                 "Applied rate subtracted{}. Sigma is what noise leaves of the curve's position, at most \
                  {} deg/s; it is not the scatter of a single reading.{}",
                 self.span_degc(),
                 significant(fit.std_max_dps(), 2),
-                self.thinned
-            ),
-        }
+                self.crowded
+            ))
     }
 
-    fn residual(&self) -> Figure {
+    fn residual(&self, width: f64) -> Figure {
         let heldout = self.shown.fit.heldout_rms_dps;
         let y = rate_axis("residual", self.residual_interval());
-        let mut svg = Svg::new(WIDTH);
-        let mut legend = paths_legend();
+        let mut svg = Svg::new(width);
+        let mut legend = self.paths_legend();
         legend.push((
             "heldout",
             Swatch::Area,
             "± held-out rms of the fit".to_owned(),
         ));
         legend.extend(self.outside_entry());
-        svg.legend(&legend);
+        svg.legend(legend);
         let mut frame = svg.frame(330.0, y.room(), self.thermometer.clone(), y);
         for (from, to) in self.outside() {
             frame.span("outside", from, to);
@@ -124,20 +107,16 @@ impl Scene<'_> {
         self.paths(&mut frame, |p| p.thermometer, 1.0);
         svg.add(&frame);
         let title = "Residual after compensation against the thermometer";
-        Figure {
-            svg: svg.finish(title),
-            title: title.to_owned(),
-            caption: format!(
+        svg.figure(title, format!(
                 "Four paths of the same readings. Where C (+) and Rust (×) lie inside the circle of the \
                  fixed-point model they agree with it; the float line joins readings in order of time. \
                  Band: held-out rms {} deg/s.{}",
                 significant(heldout, 3),
-                self.thinned
-            ),
-        }
+                self.crowded
+            ))
     }
 
-    fn over_time(&self) -> Figure {
+    fn over_time(&self, width: f64) -> Figure {
         let times = || self.shown.points.iter().map(|p| p.time_s);
         let span = Interval::of(times());
         let (unit, seconds) = time_unit(span.high - span.low);
@@ -154,14 +133,14 @@ impl Scene<'_> {
         let after = rate_axis("residual", self.residual_interval());
         let left = before.room().max(after.room());
         let blocks = self.blocks();
-        let mut svg = Svg::new(WIDTH);
+        let mut svg = Svg::new(width);
         let mut legend = vec![("before", Swatch::Line, "not compensated".to_owned())];
-        legend.extend(paths_legend());
+        legend.extend(self.paths_legend());
         if !blocks.is_empty() {
             let text = "held-out blocks, every other one shaded".to_owned();
             legend.push(("block", Swatch::Area, text));
         }
-        svg.legend(&legend);
+        svg.legend(legend);
         let heldout = self.shown.fit.heldout_rms_dps;
         let shade = |frame: &mut Frame| {
             for (from, to) in blocks.iter().step_by(2) {
@@ -171,8 +150,12 @@ impl Scene<'_> {
         let mut upper = svg.frame(120.0, left, time(""), before);
         shade(&mut upper);
         let raw = scaled(self.xy(|p| p.time_s, |p| p.before_dps));
-        upper.line("before", &raw);
-        upper.markers("before-dot", Shape::Circle, 0.4 * self.radius, &raw);
+        if self.has_markers {
+            upper.line("before", &raw);
+            upper.markers("before-dot", Shape::Circle, 0.4 * self.radius, &raw);
+        } else {
+            upper.cloud("before", &raw);
+        }
         svg.add(&upper);
         let mut lower = svg.frame(270.0, left, time("time"), after);
         shade(&mut lower);
@@ -181,10 +164,7 @@ impl Scene<'_> {
         self.paths(&mut lower, |p| p.time_s, seconds);
         svg.add(&lower);
         let title = "Before and after compensation over time";
-        Figure {
-            svg: svg.finish(title),
-            title: title.to_owned(),
-            caption: format!(
+        svg.figure(title, format!(
                 "Above without, below with compensation: mind the different scales, deg/s both.{}{}",
                 if blocks.is_empty() {
                     String::new()
@@ -196,12 +176,11 @@ impl Scene<'_> {
                         significant(heldout, 3)
                     )
                 },
-                self.thinned
-            ),
-        }
+                self.crowded
+            ))
     }
 
-    fn fixed_minus_float(&self) -> Figure {
+    fn fixed_minus_float(&self, width: f64) -> Figure {
         let lsb = self.shown.output_lsb;
         let bound = self.shown.summary.budget.bound_dps / lsb;
         let apart = |p: &Point| (p.fixed_dps - p.float_dps) / lsb;
@@ -212,7 +191,7 @@ impl Scene<'_> {
             quantity: "fixed − float".to_owned(),
             unit: "output LSB".to_owned(),
         };
-        let mut svg = Svg::new(WIDTH);
+        let mut svg = Svg::new(width);
         let mut legend = vec![
             (
                 "fixed",
@@ -229,7 +208,7 @@ impl Scene<'_> {
             ),
         ];
         legend.extend(self.outside_entry());
-        svg.legend(&legend);
+        svg.legend(legend);
         let mut frame = svg.frame(230.0, y.room(), self.thermometer.clone(), y);
         for (from, to) in self.outside() {
             frame.span("outside", from, to);
@@ -237,16 +216,15 @@ impl Scene<'_> {
         frame.level("zero", 0.0);
         frame.level("bound", bound);
         frame.level("bound", -bound);
-        let drawn = self.drawn.iter().filter_map(|k| self.shown.points.get(*k));
-        let places: Vec<_> = drawn.map(|p| (p.thermometer, apart(p))).collect();
-        frame.markers("fixed", Shape::Circle, 0.8 * self.radius, &places);
+        let all = self.shown.points.iter();
+        let places: Vec<_> = all.map(|p| (p.thermometer, apart(p))).collect();
+        self.readings(&mut frame, "fixed", Shape::Circle, &places);
         svg.add(&frame);
         let title = "What fixed point costs: fixed minus float, in LSB of the output";
-        Figure {
-            svg: svg.finish(title),
-            title: title.to_owned(),
-            caption: format!("{}{}", self.bound_sentence(lsb, bound), self.thinned),
-        }
+        svg.figure(
+            title,
+            format!("{}{}", self.bound_sentence(lsb, bound), self.crowded),
+        )
     }
 
     /// Whether the readings stay within the bound, and what it is about.
@@ -280,19 +258,6 @@ impl Scene<'_> {
             significant(largest, 3)
         )
     }
-}
-
-fn paths_legend() -> Vec<(&'static str, Swatch, String)> {
-    vec![
-        ("float", Swatch::Line, "float".to_owned()),
-        ("fixed", Swatch::Marker(Shape::Circle), "fixed".to_owned()),
-        ("c", Swatch::Marker(Shape::Plus), "emitted C".to_owned()),
-        (
-            "rust",
-            Swatch::Marker(Shape::Cross),
-            "emitted Rust".to_owned(),
-        ),
-    ]
 }
 
 fn rate_axis(quantity: &str, interval: Interval) -> Axis {

@@ -1,14 +1,20 @@
 //! The HTML report: one file that needs nothing else, for people.
 //!
 //! [`page`] and [`tables`] turn an outcome into what the template prints, [`figures`] draws it on
-//! what [`scene`] prepares, [`svg`] with [`axis`] is the plot writer under the figures, [`text`]
-//! formats numbers; [`simulation`] is the page of `simulate`, [`closure`] that of `close`, [`capture`] that of `close --capture`, [`design_diff`] what a closure changes in the design, [`selftest`] that of its self-test, [`study`] that of a word-length study. Colours and layout are in `templates/report/`.
+//! what [`scene`] prepares, [`svg`] with [`axis`] and `frame` is the plot writer under the figures, [`figure`] puts legend, drawing and data
+//! together, `density` draws many points, [`text`] formats numbers; [`simulation`] is the page of `simulate`, [`closure`] that of `close`, [`capture`] that of `close --capture`, [`design_diff`] what a closure changes in the design, [`selftest`] that of its self-test, [`study`] that of a word-length study. Colours and layout are in `templates/report/`.
 
+pub mod approx;
 pub mod axis;
 pub mod capture;
 pub mod closure;
+mod density;
 pub mod design_diff;
+pub mod equivalence;
+pub mod figure;
 pub mod figures;
+mod frame;
+mod narrow;
 pub mod page;
 pub mod scene;
 pub mod selftest;
@@ -20,9 +26,9 @@ pub mod tables;
 pub mod text;
 
 use crate::emit::views::Language;
-use crate::error::{InputError, Result};
+use crate::error::Result;
 use crate::job::outcome::Outcome;
-use askama::Template;
+use narrow::rendered;
 pub use shown::Shown;
 
 /// The report as one HTML file.
@@ -48,6 +54,5 @@ pub fn html(outcome: &Outcome) -> Result<String> {
 }
 
 fn render(shown: &Shown) -> Result<String> {
-    let page = page::Page::new(shown).render();
-    page.map_err(|e| InputError::new(format!("the report cannot be rendered: {e}")).into())
+    rendered(&page::Page::new(shown))
 }

@@ -1,7 +1,8 @@
 //! What the template prints: every number as text with its digits, every sentence put together.
 
 use super::Shown;
-use super::figures::{self, Figure};
+use super::figure::Figure;
+use super::figures;
 use super::tables;
 use super::text::{decimals_of, fixed, grouped, percent, significant};
 use crate::job::outcome::Drift;

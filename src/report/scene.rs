@@ -3,20 +3,20 @@
 use super::Shown;
 use super::axis::{Axis, Interval};
 use super::svg::{Frame, Shape, Swatch};
-use super::text::{fixed, grouped};
+use super::text::fixed;
 use crate::job::outcome::Point;
 
-/// Readings up to which each is drawn.
+/// Readings up to which each has a marker.
 const DRAWN: usize = 1500;
 
 /// What the figures have in common.
 pub struct Scene<'a> {
     /// What the report is made from.
     pub shown: &'a Shown<'a>,
-    /// The readings that are drawn.
-    pub drawn: Vec<usize>,
-    /// Said where not all are.
-    pub thinned: String,
+    /// Whether each reading has a marker; where not, all of them are dots, or the number in each place.
+    pub has_markers: bool,
+    /// Said where they have none.
+    pub crowded: &'static str,
     /// Of a marker, px.
     pub radius: f64,
     /// The thermometer's axis.
@@ -30,18 +30,13 @@ impl<'a> Scene<'a> {
     /// Chooses what is drawn.
     pub fn new(shown: &'a Shown<'a>) -> Self {
         let points = shown.points;
-        let drawn = thin(points);
-        let thinned = if drawn.len() < points.len() {
-            format!(
-                " {} of {} readings are drawn: the least and the greatest residual of each {} in a row.",
-                grouped(drawn.len() as u64),
-                grouped(points.len() as u64),
-                stretch(points.len())
-            )
+        let has_markers = points.len() <= DRAWN;
+        let crowded = if has_markers {
+            ""
         } else {
-            String::new()
+            " Where there are too many readings for a dot each, the shade is how many lie there."
         };
-        let radius = match drawn.len() {
+        let radius = match points.len() {
             0..=150 => 6.0,
             151..=500 => 3.2,
             _ => 2.4,
@@ -55,17 +50,25 @@ impl<'a> Scene<'a> {
         };
         Scene {
             shown,
-            drawn,
-            thinned,
+            has_markers,
+            crowded,
             radius,
             thermometer,
         }
     }
 
-    /// The drawn readings as (x, y).
+    /// The readings as (x, y).
     pub fn xy(&self, x: Of, y: Of) -> Vec<(f64, f64)> {
-        let points = self.drawn.iter().filter_map(|k| self.shown.points.get(*k));
-        points.map(|p| (x(p), y(p))).collect()
+        self.shown.points.iter().map(|p| (x(p), y(p))).collect()
+    }
+
+    /// Readings with a marker each, or all of them as a cloud.
+    pub fn readings(&self, frame: &mut Frame, class: &str, shape: Shape, places: &[(f64, f64)]) {
+        if self.has_markers {
+            frame.markers(class, shape, self.radius, places);
+        } else {
+            frame.cloud(class, places);
+        }
     }
 
     /// An interval for what is drawn and some levels.
@@ -114,27 +117,46 @@ impl<'a> Scene<'a> {
         self.interval(&paths, &[heldout, -heldout])
     }
 
-    /// Float as a line, the others as markers: those of C and Rust fit into the circle of fixed.
-    /// The abscissa is divided by `per`.
+    /// Float as a line, the others as markers: those of C and Rust fit into the circle of fixed. Of many readings, those of
+    /// fixed, and of C and Rust where they differ. The abscissa is divided by `per`.
     pub fn paths(&self, frame: &mut Frame, x: Of, per: f64) {
-        let series = |y: Of| -> Vec<(f64, f64)> {
-            let points = self.xy(x, y).into_iter();
-            points.map(|(x, y)| (x / per, y)).collect()
+        let series = |y: Of, is_shown: &dyn Fn(&Point) -> bool| -> Vec<(f64, f64)> {
+            let points = self.shown.points.iter().filter(|p| is_shown(p));
+            points.map(|p| (x(p) / per, y(p))).collect()
         };
         let r = self.radius;
-        let many = self.drawn.len() > 150;
+        let many = self.shown.points.len() > 150;
         let class = |one, thin| if many { thin } else { one };
-        frame.line(class("float", "float many"), &series(|p| p.float_dps));
-        let fixed = series(|p| p.fixed_dps);
-        frame.markers(class("fixed", "fixed many"), Shape::Circle, r, &fixed);
-        frame.markers(
-            class("c", "c many"),
-            Shape::Plus,
-            0.8 * r,
-            &series(|p| p.c_dps.unwrap_or(f64::NAN)),
-        );
-        let rust = series(|p| p.rust_dps.unwrap_or(f64::NAN));
+        if self.has_markers {
+            frame.line(
+                class("float", "float many"),
+                &series(|p| p.float_dps, &|_| true),
+            );
+        }
+        let fixed = series(|p| p.fixed_dps, &|_| true);
+        self.readings(frame, class("fixed", "fixed many"), Shape::Circle, &fixed);
+        let shown = |p: &Point| self.has_markers || p.differs();
+        let c = series(|p| p.c_dps.unwrap_or(f64::NAN), &shown);
+        frame.markers(class("c", "c many"), Shape::Plus, 0.8 * r, &c);
+        let rust = series(|p| p.rust_dps.unwrap_or(f64::NAN), &shown);
         frame.markers(class("rust", "rust many"), Shape::Cross, 0.8 * r, &rust);
+    }
+
+    /// What [`Scene::paths`] draws.
+    pub fn paths_legend(&self) -> Vec<(&'static str, Swatch, String)> {
+        let words = |name: &str| match self.has_markers {
+            true => name.to_owned(),
+            false => format!("{name}, where it differs from fixed"),
+        };
+        let mut out = vec![
+            ("fixed", Swatch::Marker(Shape::Circle), "fixed".to_owned()),
+            ("c", Swatch::Marker(Shape::Plus), words("emitted C")),
+            ("rust", Swatch::Marker(Shape::Cross), words("emitted Rust")),
+        ];
+        if self.has_markers {
+            out.insert(0, ("float", Swatch::Line, "float".to_owned()));
+        }
+        out
     }
 
     /// From when to when each held-out block lasts, s; the border is halfway between readings.
@@ -183,32 +205,4 @@ pub fn quantity(thermometer: &str) -> String {
         "chamber_degc" => "thermometer: chamber temperature".to_owned(),
         other => format!("thermometer: {other}"),
     }
-}
-
-/// Readings in a row of which two are drawn.
-fn stretch(count: usize) -> usize {
-    (2 * count).div_ceil(DRAWN).max(1)
-}
-
-/// The readings that are drawn: all, or the least and the greatest residual of each stretch.
-fn thin(points: &[Point]) -> Vec<usize> {
-    let stretch = stretch(points.len());
-    if stretch <= 2 {
-        return (0..points.len()).collect();
-    }
-    let residual = |k: &usize| points[*k].fixed_dps;
-    let mut drawn = Vec::new();
-    for start in (0..points.len()).step_by(stretch) {
-        let rows = || start..(start + stretch).min(points.len());
-        let least = rows().min_by(|a, b| residual(a).total_cmp(&residual(b)));
-        let greatest = rows().max_by(|a, b| residual(a).total_cmp(&residual(b)));
-        let (Some(least), Some(greatest)) = (least, greatest) else {
-            continue;
-        };
-        drawn.push(least.min(greatest));
-        if least != greatest {
-            drawn.push(least.max(greatest));
-        }
-    }
-    drawn
 }

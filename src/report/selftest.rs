@@ -1,15 +1,13 @@
 //! The page of a self-test.
 
 use super::axis::{Axis, Interval};
-use super::figures::Figure;
+use super::figure::{Figure, SMALL};
+use super::narrow::rendered;
 use super::svg::{Shape, Svg, Swatch};
 use super::text::{percent, significant};
-use crate::error::{InputError, Result};
+use crate::error::Result;
 use crate::selftest::outcome::{EffectScore, Outcome};
 use askama::Template;
-
-/// Width of one of many figures, px.
-const SMALL: f64 = 300.0;
 
 /// The page.
 #[derive(Debug, Template)]
@@ -80,8 +78,7 @@ pub fn html(o: &Outcome) -> Result<String> {
             .collect(),
         provenance: provenance(o),
     };
-    page.render()
-        .map_err(|e| InputError::new(format!("the report cannot be rendered: {e}")).into())
+    rendered(&page)
 }
 
 fn headline(o: &Outcome) -> String {
@@ -170,7 +167,7 @@ fn figure(e: &EffectScore) -> Figure {
         unit: "%".to_owned(),
     };
     let mut svg = Svg::new(SMALL);
-    svg.legend(&[("after dots", Swatch::Marker(Shape::Dot), e.effect.clone())]);
+    svg.legend([("after dots", Swatch::Marker(Shape::Dot), e.effect.clone())]);
     let mut frame = svg
         .frame(150.0, y.room(), x.clone(), y)
         .logarithmic_across(&x);
@@ -189,11 +186,7 @@ fn figure(e: &EffectScore) -> Figure {
             significant(m.times_noise, 2)
         )
     });
-    Figure {
-        svg: svg.finish(&title),
-        title,
-        caption: format!("{}: {least}", e.experiment),
-    }
+    svg.figure(title, format!("{}: {least}", e.experiment))
 }
 
 fn provenance(o: &Outcome) -> Vec<[String; 2]> {

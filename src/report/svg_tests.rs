@@ -16,7 +16,7 @@ fn plot(points: &[(f64, f64)]) -> String {
     let x = Interval::of(points.iter().map(|p| p.0)).padded(0.04);
     let y = Interval::of(points.iter().map(|p| p.1)).padded(0.04);
     let mut svg = Svg::new(900.0);
-    svg.legend(&[("fixed", Swatch::Marker(Shape::Circle), "fixed".to_owned())]);
+    svg.legend([("fixed", Swatch::Marker(Shape::Circle), "fixed".to_owned())]);
     let mut frame = svg.frame(200.0, 70.0, axis(x.low, x.high), axis(y.low, y.high));
     frame.line("float", points);
     for shape in [
@@ -29,7 +29,7 @@ fn plot(points: &[(f64, f64)]) -> String {
         frame.markers("fixed", shape, 4.0, points);
     }
     svg.add(&frame);
-    svg.finish("a plot")
+    svg.figure("a plot", "").html()
 }
 
 #[test]
@@ -135,7 +135,7 @@ fn constant_missing_and_hostile_data_give_a_plot() {
     for points in all {
         let text = plot(points);
         assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
-        assert!(text.starts_with("<svg") && text.ends_with("</svg>"));
+        assert!(text.contains("<svg xmlns") && text.ends_with("</svg>"));
     }
 }
 
@@ -159,12 +159,12 @@ fn a_line_breaks_at_a_missing_value() {
 #[test]
 fn text_is_escaped() {
     let mut svg = Svg::new(300.0);
-    svg.legend(&[("fixed", Swatch::Line, "<script>".to_owned())]);
+    svg.legend([("fixed", Swatch::Line, "<script>".to_owned())]);
     let mut y = axis(0.0, 1.0);
     y.quantity = "<b>\"".to_owned();
     let frame = svg.frame(100.0, 60.0, y.clone(), y);
     svg.add(&frame);
-    let text = svg.finish("\"><script>");
+    let text = svg.figure("\"><script>", "").html();
     assert!(!text.contains("<script>") && !text.contains("<b>"));
     assert!(text.contains("aria-label=\"&quot;&gt;&lt;script&gt;\""));
 }

@@ -104,6 +104,27 @@ pub fn nco_spurs(design: &Design) -> NcoSpurs {
     spurs_of(&oscillator, rate, decimator, quadrature_dps)
 }
 
+/// Every line of the design's sine above the method's floor but the carrier, by frequency: (Hz, dB from the carrier). Empty
+/// where there is no carrier to measure them from.
+pub fn spectrum(design: &Design) -> Vec<(f64, f64)> {
+    let oscillator = Oscillator::new(&design.circuit.nco);
+    let (method, samples) = method(&Word::of(&oscillator));
+    let found = lines(&sine(&oscillator, samples), method);
+    let rate = design.circuit.sample_rate_hz;
+    found.map_or(Vec::new(), |l| {
+        let line = |o: &Line| (o.frequency * rate, level_dbc(o, &l.largest));
+        l.others.iter().map(line).collect()
+    })
+}
+
+/// How a sine is looked at, and how many samples of it.
+fn method(word: &Word) -> (Method, usize) {
+    match word.period_bits() {
+        bits @ 0..=SAMPLE_BITS => (Method::WholePeriod, 1usize << bits),
+        _ => (Method::BlackmanHarris7, 1 << SAMPLE_BITS),
+    }
+}
+
 /// The spurs of any oscillator, such as one with another table.
 pub(super) fn spurs_of(
     oscillator: &Oscillator,
@@ -112,10 +133,7 @@ pub(super) fn spurs_of(
     quadrature_dps: f64,
 ) -> NcoSpurs {
     let word = Word::of(oscillator);
-    let (method, samples) = match word.period_bits() {
-        bits @ 0..=SAMPLE_BITS => (Method::WholePeriod, 1usize << bits),
-        _ => (Method::BlackmanHarris7, 1 << SAMPLE_BITS),
-    };
+    let (method, samples) = method(&word);
     let carrier = word.frequency(0);
     let from_edge = carrier.min(0.5 - carrier) * samples as f64;
     let is_apart =

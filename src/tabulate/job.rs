@@ -24,6 +24,8 @@ pub struct Approximation {
     pub outcome: Outcome,
     /// The form with its program.
     pub settled: Settled,
+    /// What it stands for.
+    pub function: Function,
 }
 
 /// Does what the request asks. `progress` is told the number of codes to run, then of codes that were run.
@@ -108,7 +110,11 @@ pub fn approximate(
             .bound
             .is_none_or(|bound| measured.certified <= bound),
     };
-    Ok(Approximation { outcome, settled })
+    Ok(Approximation {
+        outcome,
+        settled,
+        function,
+    })
 }
 
 fn bounds(m: &Measured) -> ErrorBounds {

@@ -4,13 +4,10 @@ use super::spectrum::spectrum;
 use super::view::{CELLS, Cell, Left, SLOPES, View};
 use crate::capture::candidates::Effect;
 use crate::report::axis::{Axis, Interval};
-use crate::report::closure::view::scatter;
-use crate::report::figures::Figure;
+use crate::report::figure::{DOT, Figure, both};
 use crate::report::svg::{Frame, Shape, Svg, Swatch};
 use crate::report::text::significant;
 
-/// Width of a figure, px.
-pub(super) const WIDTH: f64 = 960.0;
 /// Missing codes that are marked one by one.
 const MARKED: usize = 300;
 /// Rows of a cell below which its mean says nothing.
@@ -18,23 +15,24 @@ const FEW: f64 = 3.0;
 /// Names of the channels.
 pub(super) const NAMES: [&str; 2] = ["drive", "sense"];
 
-const DOT: Swatch = Swatch::Marker(Shape::Dot);
 const BEFORE: &str = "declared model alone";
 const AFTER: &str = "with the steps";
 
 /// In the order of the page.
 pub fn all(view: &View) -> Vec<Figure> {
-    let mut out = vec![
-        over_time(view),
-        spectrum(view),
-        against_code(view),
-        histogram(view),
-    ];
-    let steps = &view.closed.closure.steps;
-    if steps.iter().any(|s| s.effect == Effect::Jitter.id()) {
-        out.push(against_slope(view));
-    }
-    out
+    both(|width| {
+        let mut out = vec![
+            over_time(view, width),
+            spectrum(view, width),
+            against_code(view, width),
+            histogram(view, width),
+        ];
+        let steps = &view.closed.closure.steps;
+        if steps.iter().any(|s| s.effect == Effect::Jitter.id()) {
+            out.push(against_slope(view, width));
+        }
+        out
+    })
 }
 
 /// What is drawn of a channel: class and what is left.
@@ -83,16 +81,8 @@ pub(super) fn stacked(
     }
 }
 
-pub(super) fn figure(svg: Svg, title: &str, caption: String) -> Figure {
-    Figure {
-        svg: svg.finish(title),
-        title: title.to_owned(),
-        caption,
-    }
-}
-
 /// Residual over time, held-out stretches shaded: drive and sense, before and after.
-fn over_time(view: &View) -> Figure {
+fn over_time(view: &View, width: f64) -> Figure {
     let rows = view.closed.capture.rows() as f64;
     let (unit, per_row) = match view.closed.capture.meta.fs_hz {
         Some(fs) if rows / fs < 1.0 => ("ms", 1e3 / fs),
@@ -125,26 +115,24 @@ fn over_time(view: &View) -> Figure {
             axis(Interval::of(values.chain([0.0])).padded(0.07), &name, "LSB")
         })
         .collect();
-    let mut svg = Svg::new(WIDTH);
+    let mut svg = Svg::new(width);
     let mut entries = legend(view, DOT);
     entries.push(("block", Swatch::Area, "held-out rows".to_owned()));
-    svg.legend(&entries);
+    svg.legend(entries);
     stacked(&mut svg, 156.0, &x, &y, |k, mut frame| {
         for (from, to) in view.held_out() {
             frame.span("block", from * per_row, to * per_row);
         }
         frame.level("zero", 0.0);
-        if let (Some((_, class, left)), Some(y)) = (parts.get(k), y.get(k)) {
+        if let Some((_, class, left)) = parts.get(k) {
             let points = left.over_time.iter().map(|p| (p.0 * per_row, p.1));
-            scatter(&mut frame, class, y.interval, &points.collect::<Vec<_>>());
+            frame.cloud(class, &points.collect::<Vec<_>>());
         }
         frame
     });
-    figure(
-        svg,
-        "Residual over time",
-        "Codes less the model. No estimate has seen the held-out rows. Of long captures the least and the greatest residual \
-         of each stretch are drawn. Each frame has its own scale."
+    svg.figure("Residual over time",
+        "Codes less the model. No estimate has seen the held-out rows. Where there are too many rows for a dot each, the \
+         shade is how many lie there. Each frame has its own scale."
             .to_owned(),
     )
 }
@@ -167,7 +155,7 @@ fn means(cells: &[Cell], low: f64, high: f64) -> Vec<(f64, f64, f64)> {
 }
 
 /// Mean residual against the code, with the bend that was fitted and the codes that are missing.
-fn against_code(view: &View) -> Figure {
+fn against_code(view: &View, width: f64) -> Figure {
     let findings = &view.closed.findings;
     let [_, model] = &findings.models;
     let of = |c: usize, left: &Left| means(&left.by_code, -view.reach[c], view.reach[c]);
@@ -207,8 +195,8 @@ fn against_code(view: &View) -> Figure {
         let words = "missing codes".to_owned();
         entries.push(("bound-mark", Swatch::Marker(Shape::Cross), words));
     }
-    let mut svg = Svg::new(WIDTH);
-    svg.legend(&entries);
+    let mut svg = Svg::new(width);
+    svg.legend(entries);
     stacked(&mut svg, 210.0, &x, &y, |c, mut frame| {
         let noise = of(c, &view.after[c]);
         let noise: Vec<_> = noise.iter().map(|p| (p.0, -2.0 * p.2, 2.0 * p.2)).collect();
@@ -242,9 +230,7 @@ fn against_code(view: &View) -> Figure {
         true => String::new(),
         false => format!(" Missing codes: {}.", counts.join(", ")),
     };
-    figure(
-        svg,
-        "Residual against code",
+    svg.figure("Residual against code",
         format!(
             "Mean of the residual in {CELLS} cells of the signal that the model puts in (not of the noisy code, which would bend the \
              mean by itself): the integral nonlinearity where it is the same at all phases. The fitted bend's band counts all that \
@@ -254,7 +240,7 @@ fn against_code(view: &View) -> Figure {
 }
 
 /// Codes counted and expected.
-fn histogram(view: &View) -> Figure {
+fn histogram(view: &View, width: f64) -> Figure {
     let x: Vec<Axis> = (0..2)
         .map(|c: usize| {
             let h = &view.after[c].histogram;
@@ -276,13 +262,13 @@ fn histogram(view: &View) -> Figure {
             )
         })
         .collect();
-    let mut svg = Svg::new(WIDTH);
+    let mut svg = Svg::new(width);
     let mut entries: Vec<(&str, Swatch, String)> = legend(view, Swatch::Line)
         .into_iter()
         .map(|(class, swatch, words)| (class, swatch, format!("expected, {words}")))
         .collect();
     entries.push(("fit dots", DOT, "counted".to_owned()));
-    svg.legend(&entries);
+    svg.legend(entries);
     stacked(&mut svg, 190.0, &x, &y, |c, mut frame| {
         for (class, left) in series(view, c) {
             let h = &left.histogram;
@@ -301,9 +287,7 @@ fn histogram(view: &View) -> Figure {
         frame
     });
     let widths = view.after.each_ref().map(|l| l.histogram.width);
-    figure(
-        svg,
-        "Histogram of the codes",
+    svg.figure("Histogram of the codes",
         format!(
             "Rows per code, over {} (drive) and {} (sense) codes a bar. Expected is what the model's signal with its noise, limits \
              and missing codes makes of the same rows.",
@@ -321,7 +305,7 @@ fn stairs(h: &super::histogram::Histogram, values: &[f64]) -> Vec<(f64, f64)> {
 }
 
 /// Mean square of the residual against slope: jitter's parabola.
-fn against_slope(view: &View) -> Figure {
+fn against_slope(view: &View, width: f64) -> Figure {
     let [_, model] = &view.closed.findings.models;
     let squares = |left: &Left| -> Vec<(f64, f64, f64)> {
         let width = left.steepest / SLOPES as f64;
@@ -354,8 +338,8 @@ fn against_slope(view: &View) -> Figure {
             )
         })
         .collect();
-    let mut svg = Svg::new(WIDTH);
-    svg.legend(&[
+    let mut svg = Svg::new(width);
+    svg.legend([
         ("after dots", DOT, "residual, squared".to_owned()),
         ("bar", Swatch::Line, "two standard errors".to_owned()),
         ("fixed", Swatch::Line, "fitted: noise and jitter".to_owned()),
@@ -363,12 +347,10 @@ fn against_slope(view: &View) -> Figure {
     ]);
     stacked(&mut svg, 190.0, &x, &y, |c, mut frame| {
         let points = squares(&view.after[c]);
-        for (x, value, error) in &points {
-            frame.line(
-                "bar",
-                &[(*x, value - 2.0 * error), (*x, value + 2.0 * error)],
-            );
-        }
+        let bars = points
+            .iter()
+            .map(|(x, value, e)| (*x, value - 2.0 * e, value + 2.0 * e));
+        frame.bars("bar", &bars.collect::<Vec<_>>());
         let steepest = view.after[c].steepest;
         let at = |k: usize| steepest * k as f64 / 60.0;
         let line: Vec<(f64, f64)> = (0..=60).map(|k| (at(k), curve(c, at(k)))).collect();
@@ -387,9 +369,7 @@ fn against_slope(view: &View) -> Figure {
         true => told(drive),
         false => format!("{} (drive) and {} (sense)", told(drive), told(sense)),
     };
-    figure(
-        svg,
-        "Noise against slope",
+    svg.figure("Noise against slope",
         format!(
             "An instant that is uncertain by {amount} makes noise in proportion to the slope, and none at the peaks."
         ),

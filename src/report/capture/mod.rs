@@ -31,7 +31,7 @@ pub fn html(closed: &Closed, name: &str) -> Result<String> {
         emitted: None,
         diff: None,
         controls: None,
-        last: None,
+        last: Err(String::new()),
         provenance: words::provenance(closed),
     };
     page(&closed.closure, name, own)

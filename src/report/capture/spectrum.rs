@@ -1,13 +1,13 @@
 //! The spectrum of a capture's residual, with marks where lines may stand.
 
-use super::figures::{NAMES, WIDTH, axis, figure, legend, series, stacked};
+use super::figures::{NAMES, axis, legend, series, stacked};
 use super::view::{Left, View};
 use crate::capture::candidates::Effect;
 use crate::capture::columns::HARMONICS;
 use crate::capture::tone::fold;
 use crate::capture::{mains, spur};
 use crate::report::axis::{Axis, Interval};
-use crate::report::figures::Figure;
+use crate::report::figure::Figure;
 use crate::report::svg::{Shape, Svg, Swatch};
 
 /// Columns of the figure.
@@ -61,7 +61,7 @@ fn marks(view: &View) -> Vec<(&'static str, Shape, String, Vec<f64>)> {
 }
 
 /// Spectrum of the residual before and after, both channels.
-pub fn spectrum(view: &View) -> Figure {
+pub fn spectrum(view: &View, width: f64) -> Figure {
     let fs = view.closed.capture.meta.fs_hz;
     let unit = if fs.is_some() { "Hz" } else { "per sample" };
     let fs = fs.unwrap_or(1.0);
@@ -93,13 +93,13 @@ pub fn spectrum(view: &View) -> Figure {
         })
         .collect();
     let marks = marks(view);
-    let mut svg = Svg::new(WIDTH);
+    let mut svg = Svg::new(width);
     let mut entries = legend(view, Swatch::Line);
     let shown = marks.iter();
     entries.extend(
         shown.map(|(class, shape, words, _)| (*class, Swatch::Marker(*shape), words.clone())),
     );
-    svg.legend(&entries);
+    svg.legend(entries);
     stacked(&mut svg, 230.0, &x, &y, |c, frame| {
         let mut frame = match x.get(c) {
             Some(x) => frame.logarithmic_across(x),
@@ -118,9 +118,7 @@ pub fn spectrum(view: &View) -> Figure {
         }
         frame
     });
-    figure(
-        svg,
-        "Spectrum of the residual",
+    svg.figure("Spectrum of the residual",
         "Amplitude of a line relative to a sine at full scale, Hann window; the largest bin of each column of the figure. \
          Marks stand above the frequencies of the tone, of its harmonics (folded at half the sample rate), of power lines \
          and of the lines that a step took."

@@ -4,7 +4,6 @@ use super::histogram::Histogram;
 use crate::capture::Closed;
 use crate::capture::columns::{Model, Rows, chunks};
 use crate::capture::input::{Capture, Part};
-use crate::report::closure::view::thin;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
@@ -37,7 +36,7 @@ impl Cell {
 /// What one model leaves of one channel.
 #[derive(Debug, Clone)]
 pub struct Left {
-    /// Row and residual, thinned to what is drawn.
+    /// Row and residual, rows that are left out not among them.
     pub over_time: Vec<(f64, f64)>,
     /// Square of a line's amplitude over that of a full-scale sine, by bin from zero frequency to half the rate.
     pub spectrum: Vec<f64>,
@@ -131,12 +130,11 @@ fn left(capture: &Capture, model: &Model, reach: [f64; 2]) -> [Left; 2] {
         let residual = &residuals[c];
         let mut histogram = std::mem::take(&mut histograms[c]);
         histogram.expect(model, c);
-        let drawn = thin(residual).into_iter();
+        let kept = (0..rows)
+            .zip(residual)
+            .filter(|(i, _)| !capture.is_left_out(*i));
         Left {
-            over_time: drawn
-                .filter(|i| !capture.is_left_out(*i))
-                .filter_map(|i| Some((i as f64, *residual.get(i)?)))
-                .collect(),
+            over_time: kept.map(|(i, r)| (i as f64, *r)).collect(),
             spectrum: std::mem::take(&mut spectra[c]),
             by_code: std::mem::take(&mut by_code[c]),
             by_slope: std::mem::take(&mut by_slope[c]),

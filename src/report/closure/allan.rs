@@ -1,9 +1,22 @@
 //! Allan deviation of a residual: which noise it holds at which averaging time.
 
+use super::figures::series;
+use super::view::View;
+use crate::report::axis::{Axis, Interval};
+use crate::report::figure::{Figure, one};
+use crate::report::svg::{Shape, Svg, Swatch};
+use crate::report::text::significant;
+
 /// Steps of rows that count as one: longer ones cut the record.
 const GAP: f64 = 1.5;
 /// Averaging times per decade.
 const PER_DECADE: f64 = 10.0;
+/// Fewer averaging times make no curve.
+const FEWEST: usize = 4;
+/// Flat Allan deviation of 1/f noise over its bias instability B (IEEE Std 952): sqrt(2 ln 2 / pi).
+const FLAT_PER_INSTABILITY: f64 = 0.664_28;
+/// Decades of the averaging time beside which a curve of the model is no longer drawn below the data.
+const BELOW: f64 = 0.5;
 
 /// Overlapping Allan deviation (IEEE Std 952, annex C): (averaging time in s, deviation in the unit of
 /// the values), from one row up to a quarter of the rows.
@@ -39,6 +52,117 @@ pub fn deviation(time_s: &[f64], values: &[f64], period_s: f64) -> Vec<(f64, f64
         }
     }
     out
+}
+
+/// The figure, both axes logarithmic, with the parts of the noise model and their slopes; where the record has too few
+/// rows without a gap, a sentence that says so.
+///
+/// # Errors
+/// That sentence.
+pub fn figure(view: &View) -> Result<Figure, String> {
+    let c = &view.closed.channels;
+    let period_s = c.period_s();
+    let curves: Vec<(&str, Vec<(f64, f64)>)> = series(view)
+        .into_iter()
+        .map(|(_, class, values)| (class, deviation(&c.time_s, values, period_s)))
+        .collect();
+    if curves.iter().any(|(_, points)| points.len() < FEWEST) {
+        let pieces = sums(&c.time_s, &view.after, period_s);
+        let longest = pieces.iter().map(|p| p.len() - 1).max().unwrap_or(0);
+        return Err(format!(
+            "There is no Allan deviation of this record. It needs rows in a steady step, and the longest stretch without a gap \
+             has {longest} ({} s a row). Sixty rows without a gap are enough to see one decade of averaging times.",
+            significant(period_s, 3)
+        ));
+    }
+    Ok(one(|width| drawn(view, &curves, period_s, width)))
+}
+
+/// Logarithms of what has one.
+fn logs(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let positive = points.iter().filter(|p| p.0 > 0.0 && p.1 > 0.0);
+    positive.map(|p| (p.0.log10(), p.1.log10())).collect()
+}
+
+fn drawn(view: &View, curves: &[(&str, Vec<(f64, f64)>)], period_s: f64, width: f64) -> Figure {
+    let noise = &view.closed.after.fit.noise;
+    let taus: Vec<f64> = curves
+        .first()
+        .map_or(Vec::new(), |c| c.1.iter().map(|p| p.0).collect());
+    let flat = FLAT_PER_INSTABILITY * noise.bias_instability_dps();
+    let parts: [(&str, &dyn Fn(f64) -> f64); 3] = [
+        ("white noise, slope −½", &|t| {
+            noise.white_rms_dps * (period_s / t).sqrt()
+        }),
+        ("1/f noise, level", &|_| flat),
+        ("random walk, slope +½", &|t| {
+            noise.walk_dps_rts * (t / 3.0).sqrt()
+        }),
+    ];
+    let data: Vec<(&str, Vec<(f64, f64)>)> = curves.iter().map(|c| (c.0, logs(&c.1))).collect();
+    let least = data
+        .iter()
+        .flat_map(|d| &d.1)
+        .map(|p| p.1)
+        .fold(f64::INFINITY, f64::min);
+    let parts = parts.map(|(words, of)| {
+        let line: Vec<(f64, f64)> = taus.iter().map(|t| (*t, of(*t))).collect();
+        let mut line = logs(&line);
+        line.retain(|p| p.1 >= least - BELOW);
+        (words, line)
+    });
+    let all = || data.iter().flat_map(|d| &d.1);
+    let axis = |interval: Interval, quantity: &str, unit: &str| Axis {
+        interval: interval.padded(0.04),
+        quantity: quantity.to_owned(),
+        unit: unit.to_owned(),
+    };
+    let x = axis(Interval::of(all().map(|p| p.0)), "averaging time", "s");
+    let up = all().chain(parts.iter().flat_map(|p| &p.1)).map(|p| p.1);
+    let y = axis(
+        Interval::of(up),
+        "Allan deviation",
+        view.closed.closure.unit,
+    );
+    let mut svg = Svg::new(width);
+    let words = |class: &str| match (class, view.has_steps()) {
+        ("before", _) => "declared model alone",
+        (_, true) => "with the steps",
+        _ => "less the declared model",
+    };
+    svg.legend(
+        data.iter()
+            .map(|d| (d.0, Swatch::Line, words(d.0).to_owned())),
+    );
+    svg.legend([(
+        "bound",
+        Swatch::Line,
+        "parts of the fitted noise".to_owned(),
+    )]);
+    let mut frame = svg
+        .frame(300.0, 78.0, x.clone(), y.clone())
+        .logarithmic(&x, &y);
+    for (words, line) in &parts {
+        frame.line("bound", line);
+        if let (Some((at, level)), true) = (line.last(), line.len() > 1) {
+            let share = (at - x.interval.low) / (x.interval.high - x.interval.low);
+            let anchor = if share > 0.6 { "end" } else { "start" };
+            frame.note("slope", (*at, *level), anchor, words);
+        }
+    }
+    for (class, points) in &data {
+        frame.line(class, points);
+        frame.markers(class, Shape::Circle, 2.6, points);
+    }
+    svg.add(&frame);
+    svg.figure(
+        "Allan deviation of the residual",
+        format!(
+            "Overlapping, over pieces without gaps; one row is {} s. White noise falls by the root of the averaging time, 1/f noise \
+             is level, a walk or an effect that is left rises.",
+            significant(period_s, 3)
+        ),
+    )
 }
 
 /// Running sums of each unbroken piece, one more than it has rows.

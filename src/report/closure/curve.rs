@@ -21,40 +21,50 @@ pub struct Abscissa {
     pub remark: String,
 }
 
-/// The first channel over which the contribution is one curve; where none is, the contribution itself.
+/// The first channel over which the contribution is one curve; where none is, the first, over which it is drawn in the
+/// order of time: a loop is then seen as one.
 pub fn abscissa(view: &View, step: &Step, contribution: &Contribution) -> Abscissa {
     let value = &contribution.value_dps;
-    let mut passed: Vec<String> = Vec::new();
-    let not = |passed: &[String]| match passed {
-        [] => String::new(),
-        names => format!(" Over {} it is not one curve.", names.join(" or ")),
-    };
+    let mut passed: Option<Abscissa> = None;
     for (name, axis, values) in candidates(view, step) {
         let order = ascending(&values);
-        if is_curve(value, &order) {
-            return Abscissa {
-                is_band: is_curve(&contribution.std_dps, &order),
-                remark: not(&passed),
-                name,
-                axis,
-                values,
-                order,
-            };
+        let found = Abscissa {
+            is_band: is_curve(&contribution.std_dps, &values, &order),
+            remark: String::new(),
+            name,
+            axis,
+            values,
+            order,
+        };
+        if is_curve(value, &found.values, &found.order) {
+            return found;
         }
-        passed.push(name);
+        passed.get_or_insert(found);
     }
-    let order = ascending(value);
+    let mut first = passed.unwrap_or_else(|| of_time(view));
+    first.order = (0..value.len()).collect();
+    first.is_band = false;
+    first.remark = format!(
+        " The effect is no function of {} alone: the line joins rows in the order of time.",
+        first.name
+    );
+    first
+}
+
+/// The record's time.
+fn of_time(view: &View) -> Abscissa {
+    let (values, unit, _) = view.time();
     Abscissa {
-        name: "itself".to_owned(),
+        name: "time".to_owned(),
         axis: Axis {
-            interval: Interval::of(value.iter().copied()).padded(0.04),
-            quantity: "fitted contribution".to_owned(),
-            unit: view.closed.closure.unit.to_owned(),
+            interval: Interval::of(values.iter().copied()).padded(0.01),
+            quantity: "time".to_owned(),
+            unit: unit.to_owned(),
         },
-        values: value.clone(),
-        is_band: is_curve(&contribution.std_dps, &order),
-        order,
-        remark: not(&passed) + " So the abscissa is the contribution itself.",
+        order: (0..values.len()).collect(),
+        values,
+        is_band: true,
+        remark: String::new(),
     }
 }
 
@@ -76,13 +86,8 @@ fn candidates(view: &View, step: &Step) -> Vec<(String, Axis, Vec<f64>)> {
     }
     for name in &step.channels {
         if name == "time_s" {
-            let (values, unit, _) = view.time();
-            let axis = Axis {
-                interval: Interval::of(values.iter().copied()).padded(0.01),
-                quantity: "time".to_owned(),
-                unit: unit.to_owned(),
-            };
-            out.push(("time".to_owned(), axis, values));
+            let time = of_time(view);
+            out.push((time.name, time.axis, time.values));
         } else if let Some(values) = view.channel(name) {
             out.push((name.clone(), view.channel_axis(name, &values), values));
         }
@@ -96,17 +101,31 @@ fn ascending(values: &[f64]) -> Vec<usize> {
     order
 }
 
-/// Whether values in this order are a curve: steps from one to the next are small beside their
-/// spread (von Neumann's ratio), one jump over the whole range allowed.
-fn is_curve(values: &[f64], order: &[usize]) -> bool {
+/// Share of the abscissae's span within which rows count as of one place.
+const PLACE: f64 = 2e-3;
+
+/// Whether values are a curve over the abscissae, given in their order: steps from one to the next are small beside their
+/// spread (von Neumann's ratio), one jump over the whole range allowed. Where the abscissae keep to a few places, as in
+/// soaks at steps of temperature, the steps within a place are what counts: there the curve may be as steep as it likes.
+fn is_curve(values: &[f64], abscissae: &[f64], order: &[usize]) -> bool {
     let n = order.len().max(1) as f64;
     let mean = order.iter().map(|i| values[*i]).sum::<f64>() / n;
     let spread: f64 = order.iter().map(|i| (values[*i] - mean).powi(2)).sum();
-    let steps: f64 = order
-        .windows(2)
-        .map(|w| (values[w[1]] - values[w[0]]).powi(2))
-        .sum();
-    steps <= (0.02 + 8.0 / n) * spread
+    let span = match (order.first(), order.last()) {
+        (Some(a), Some(b)) => abscissae[*b] - abscissae[*a],
+        _ => 0.0,
+    };
+    let (mut all, mut within, mut pairs) = (0.0, 0.0, 0usize);
+    for w in order.windows(2) {
+        let step = (values[w[1]] - values[w[0]]).powi(2);
+        all += step;
+        if abscissae[w[1]] - abscissae[w[0]] <= PLACE * span {
+            within += step;
+            pairs += 1;
+        }
+    }
+    let allowed = (0.02 + 8.0 / n) * spread;
+    all <= allowed || (2 * pairs >= order.len() && within <= 0.02 * spread)
 }
 
 #[cfg(test)]
@@ -118,12 +137,32 @@ mod tests {
         let x: Vec<f64> = (0..300).map(|i| (f64::from(i) / 25.0).sin()).collect();
         let rows = ascending(&x);
         let of = |f: &dyn Fn(usize) -> f64| -> Vec<f64> { (0..300).map(f).collect() };
-        assert!(is_curve(&of(&|i| x[i].powi(3)), &rows));
-        assert!(is_curve(&of(&|i| f64::from(u8::from(x[i] > 0.3))), &rows));
+        assert!(is_curve(&of(&|i| x[i].powi(3)), &x, &rows));
+        assert!(is_curve(
+            &of(&|i| f64::from(u8::from(x[i] > 0.3))),
+            &x,
+            &rows
+        ));
         let heating = |i: usize| (i as f64 / 25.0).cos();
-        assert!(!is_curve(&of(&heating), &rows));
-        let time: Vec<usize> = (0..300).collect();
-        assert!(is_curve(&of(&heating), &time));
-        assert!(is_curve(&[], &[]));
+        assert!(!is_curve(&of(&heating), &x, &rows));
+        let (time, at): (Vec<usize>, Vec<f64>) = (0..300).map(|i| (i, i as f64)).unzip();
+        assert!(is_curve(&of(&heating), &at, &time));
+        assert!(is_curve(&[], &[], &[]));
+    }
+
+    #[test]
+    fn soaks_at_few_temperatures_are_a_curve_unless_the_ways_differ() {
+        // Three readings at each of 15 temperatures, up and down, the shape changing its sign from one to the next.
+        let degc = |i: usize| 5.0 * ((i / 3) as f64 - 14.0).abs();
+        let x: Vec<f64> = (0..87).map(|i| degc(i) + 1e-3 * (i % 3) as f64).collect();
+        let rows = ascending(&x);
+        let of = |f: &dyn Fn(usize) -> f64| -> Vec<f64> { (0..87).map(f).collect() };
+        let crossing = |i: usize| {
+            let at = (x[i] - 37.5) / 3.7;
+            at / (1.0 + at * at)
+        };
+        assert!(is_curve(&of(&crossing), &x, &rows));
+        let loops = |i: usize| crossing(i) * if i < 42 { 1.0 } else { -1.0 };
+        assert!(!is_curve(&of(&loops), &x, &rows));
     }
 }

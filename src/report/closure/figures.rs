@@ -2,36 +2,37 @@
 //! deviation.
 
 use super::contribution::Contribution;
-use super::view::{DRAWN, View, scatter, thin};
-use super::{allan, curve};
+use super::curve;
+use super::view::View;
 use crate::report::axis::{Axis, Interval};
-use crate::report::figures::Figure;
-use crate::report::svg::{Frame, Shape, Svg, Swatch};
+use crate::report::figure::{DOT, Figure, SMALL, both};
+use crate::report::svg::{Frame, Svg, Swatch};
 use crate::report::text::significant;
 use crate::thermal::channels::range;
 
-/// Width of a figure, px.
-const WIDTH: f64 = 960.0;
-/// Width of one of many, px.
-const SMALL: f64 = 470.0;
 /// Most small figures.
 const CHANNELS: usize = 24;
-
-/// A dot of the legend.
-const DOT: Swatch = Swatch::Marker(Shape::Dot);
+/// Points of a line and its band.
+const DRAWN: usize = 600;
+/// Said of figures with all readings.
+const CROWDED: &str =
+    "Where there are too many readings for a dot each, the shade is how many lie there.";
 
 /// Residuals and steps, in the order of the page.
 pub fn all(view: &View) -> Vec<Figure> {
-    let mut out = vec![over_time(view)];
+    let mut out = both(|width| vec![over_time(view, width)]);
     out.extend(over_channels(view));
-    for (k, contribution) in view.contributions.iter().enumerate() {
-        out.extend(step(view, k, contribution));
-    }
+    let steps = || view.contributions.iter().enumerate();
+    out.extend(both(|width| {
+        steps()
+            .filter_map(|(k, c)| step(view, k, c, width))
+            .collect()
+    }));
     out
 }
 
 /// The residuals that are shown: (name, class, values).
-fn series<'a>(view: &'a View) -> Vec<(&'static str, &'static str, &'a [f64])> {
+pub(super) fn series<'a>(view: &'a View) -> Vec<(&'static str, &'static str, &'a [f64])> {
     if view.has_steps() {
         vec![
             ("before", "before", &view.before[..]),
@@ -70,7 +71,7 @@ fn unlabelled(axis: &Axis) -> Axis {
 }
 
 /// Residual before and after against time, held-out blocks shaded.
-fn over_time(view: &View) -> Figure {
+fn over_time(view: &View, width: f64) -> Figure {
     let (time, unit, per) = view.time();
     let x = Axis {
         interval: Interval::of(time.iter().copied()).padded(0.01),
@@ -84,15 +85,14 @@ fn over_time(view: &View) -> Figure {
         .collect();
     let left = axes.iter().map(Axis::room).fold(0.0, f64::max);
     let floor = 2.0 * view.closed.closure.noise_floor_rms;
-    let mut svg = Svg::new(WIDTH);
+    let mut svg = Svg::new(width);
     let mut entries = legend(view);
     entries.push(("block", Swatch::Area, "held-out rows".to_owned()));
     let words = "two standard deviations of the noise floor".to_owned();
     entries.push(("sigma", Swatch::Area, words));
-    svg.legend(&entries);
+    svg.legend(entries);
     let last = shown.len().saturating_sub(1);
     for (k, ((_, class, values), y)) in shown.iter().zip(axes).enumerate() {
-        let height = y.interval;
         let x = if k == last { x.clone() } else { unlabelled(&x) };
         let mut frame = svg.frame(210.0, left, x, y);
         for (from, to) in view.blocks() {
@@ -100,11 +100,7 @@ fn over_time(view: &View) -> Figure {
         }
         frame.span_between("sigma", -floor, floor);
         frame.level("zero", 0.0);
-        let points: Vec<(f64, f64)> = thin(values)
-            .iter()
-            .map(|i| (time[*i], values[*i]))
-            .collect();
-        scatter(&mut frame, class, height, &points);
+        frame.cloud(class, &pairs(&time, values));
         svg.add(&frame);
     }
     let title = if view.has_steps() {
@@ -117,46 +113,52 @@ fn over_time(view: &View) -> Figure {
     } else {
         ""
     };
-    Figure {
-        svg: svg.finish(title),
-        title: title.to_owned(),
-        caption: format!(
+    svg.figure(
+        title,
+        format!(
             "Output less applied rate and less the model. No estimate has seen the held-out rows. The noise floor is the white \
-             noise from differences of neighbouring rows. Triangles at an edge stand for readings beyond it.{scales}{}",
-            view.thinned()
+             noise from differences of neighbouring rows. Triangles at an edge stand for readings beyond it.{scales} {CROWDED}"
         ),
-    }
+    )
 }
 
-/// Residual against every channel, one small plot each.
+/// Rows with a value, as points.
+fn pairs(x: &[f64], y: &[f64]) -> Vec<(f64, f64)> {
+    let rows = x.iter().copied().zip(y.iter().copied());
+    rows.filter(|(x, y)| x.is_finite() && y.is_finite())
+        .collect()
+}
+
+/// Residual before and after against every channel, one small plot each, a frame for each.
 fn over_channels(view: &View) -> Option<Figure> {
     let (channels, still) = view.channels();
     if channels.is_empty() {
         return None;
     }
     let shown = series(view);
-    let values: Vec<&[f64]> = shown.iter().map(|s| s.2).collect();
-    let y = view.residual_axis("residual", &values);
-    let left = y.room();
-    let mut body = String::from("<div class=\"multiples\">\n");
-    for (name, readings) in channels.iter().take(CHANNELS) {
+    let axes: Vec<Axis> = shown
+        .iter()
+        .map(|(name, _, values)| view.residual_axis(name, &[values]))
+        .collect();
+    let left = axes.iter().map(Axis::room).fold(0.0, f64::max);
+    let last = shown.len().saturating_sub(1);
+    let plot = |(name, readings): &(String, Vec<f64>)| {
         let x = view.channel_axis(name, readings);
         let mut svg = Svg::new(SMALL);
-        let mut frame = svg.frame(190.0, left, x, y.clone());
-        frame.level("zero", 0.0);
-        for (_, class, values) in &shown {
-            let rows = thin(values);
-            let points: Vec<(f64, f64)> = rows.iter().map(|i| (readings[*i], values[*i])).collect();
-            scatter(&mut frame, class, y.interval, &points);
+        svg.legend(legend(view));
+        for (k, ((_, class, values), y)) in shown.iter().zip(&axes).enumerate() {
+            let x = if k == last { x.clone() } else { unlabelled(&x) };
+            let mut frame = svg.frame(130.0, left, x, y.clone());
+            frame.level("zero", 0.0);
+            frame.cloud(class, &pairs(readings, values));
+            svg.add(&frame);
         }
-        svg.add(&frame);
-        body.push_str(&svg.finish(&format!("Residual against {name}")));
-        body.push('\n');
-    }
-    body.push_str("</div>\n");
-    let mut key = Svg::new(WIDTH);
-    key.legend(&legend(view));
-    let mut caption = "One scale for all.".to_owned();
+        svg.figure(format!("Residual against {name}"), "")
+    };
+    let mut caption = match view.has_steps() {
+        true => "Before on one scale in all plots, after on another.".to_owned(),
+        false => "One scale for all.".to_owned(),
+    };
     if !still.is_empty() {
         caption += &format!(" Constant in this record: {}.", still.join(", "));
     }
@@ -164,60 +166,67 @@ fn over_channels(view: &View) -> Option<Figure> {
         let names: Vec<&str> = more.iter().map(|c| c.0.as_str()).collect();
         caption += &format!(" Not drawn: {}.", names.join(", "));
     }
-    caption += &view.thinned();
-    let title = "Residual against every channel";
-    Some(Figure {
-        svg: key.finish(title) + "\n" + &body,
-        title: title.to_owned(),
+    let plots = channels.iter().take(CHANNELS).map(plot).collect();
+    Some(Figure::grid(
+        "Residual against every channel",
         caption,
-    })
+        plots,
+    ))
 }
 
-/// One step: its contribution over the partial residual.
-fn step(view: &View, k: usize, contribution: &Contribution) -> Option<Figure> {
+/// One step over its own channel: the readings less the model and less all other steps, with what was fitted.
+fn step(view: &View, k: usize, contribution: &Contribution, width: f64) -> Option<Figure> {
     let step = view.closed.closure.steps.get(k)?;
     let term = view.closed.after.terms.get(k)?;
     let abscissa = curve::abscissa(view, step, contribution);
+    let (contribution, constant) = &without_constant(contribution);
     let value = &contribution.value_dps;
     let partial: Vec<f64> = view.after.iter().zip(value).map(|(r, v)| r + v).collect();
     let (low, high) = band_within(&partial, contribution);
-    let y = view.residual_axis("partial residual", &[&partial, value, &low, &high]);
+    let y = view.residual_axis("this step alone", &[&partial, value, &low, &high]);
     let shown = y.interval;
     let left = y.room();
-    let mut svg = Svg::new(WIDTH);
-    svg.legend(&[
+    let mut svg = Svg::new(width);
+    let words = "readings, less the declared model and the other steps".to_owned();
+    svg.legend([
+        ("before dots", DOT, words),
+        ("after", Swatch::Line, "fitted shape".to_owned()),
         (
-            "before dots",
-            DOT,
-            "residual with this step put back".to_owned(),
-        ),
-        ("after", Swatch::Line, "fitted contribution".to_owned()),
-        (
-            "sigma",
+            if abscissa.is_band { "sigma" } else { "bar" },
             Swatch::Area,
             "two standard deviations of it".to_owned(),
         ),
     ]);
     let mut frame = svg.frame(280.0, left, abscissa.axis.clone(), y);
     frame.level("zero", 0.0);
-    let points: Vec<(f64, f64)> = thin(&partial)
-        .iter()
-        .map(|i| (abscissa.values[*i], partial[*i]))
-        .collect();
-    scatter(&mut frame, "before", shown, &points);
+    frame.cloud("before", &pairs(&abscissa.values, &partial));
     draw_contribution(&mut frame, &abscissa, contribution, shown);
     svg.add(&frame);
-    let title = format!("Step {}: {} against {}", k + 1, step.effect, abscissa.name);
+    let title = format!("Step {}: {} over {}", k + 1, step.effect, abscissa.name);
     let equation = term.candidate.equation();
-    Some(Figure {
-        svg: svg.finish(&title),
-        title,
-        caption: format!(
-            "{}: {}. The deviation counts coefficients and shape, estimated together with the declared model and all other \
-             steps: it is wide where those could take its place.{}",
-            step.effect, equation, abscissa.remark
-        ),
-    })
+    let caption = format!(
+        "{}: {}. The deviation counts coefficients and shape, estimated together with the declared model and all other \
+         steps: it is wide where those could take its place.{}{constant} {CROWDED}",
+        step.effect, equation, abscissa.remark
+    );
+    Some(svg.figure(title, caption))
+}
+
+/// The contribution less its mean where it is far from 0 throughout, as a gain times a supply voltage is, and a sentence that
+/// says so: the declared model's constant takes the mean up.
+fn without_constant(contribution: &Contribution) -> (Contribution, String) {
+    let mut out = contribution.clone();
+    let (least, greatest) = range(&out.value_dps);
+    let mean = out.value_dps.iter().sum::<f64>() / out.value_dps.len().max(1) as f64;
+    if mean.abs() <= greatest - least {
+        return (out, String::new());
+    }
+    out.value_dps.iter_mut().for_each(|v| *v -= mean);
+    let told = format!(
+        " Its mean, {} deg/s, is taken off here.",
+        significant(mean, 3)
+    );
+    (out, told)
 }
 
 /// The contribution as a line with its band; a bar for each row where the deviation is no curve.
@@ -240,9 +249,7 @@ fn draw_contribution(
     if x.is_band {
         frame.band("sigma", &band);
     } else {
-        for (x, low, high) in &band {
-            frame.line("bar", &[(*x, *low), (*x, *high)]);
-        }
+        frame.bars("bar", &band);
     }
     let line: Vec<(f64, f64)> = rows.iter().map(|i| (x.values[*i], value[*i])).collect();
     frame.line("after", &line);
@@ -268,70 +275,4 @@ fn sparse(rows: &[usize]) -> Vec<usize> {
         out.push(*last);
     }
     out
-}
-
-/// Allan deviation of the residuals, both axes logarithmic.
-pub fn allan_deviation(view: &View) -> Figure {
-    let c = &view.closed.channels;
-    let period_s = c.period_s();
-    let curves: Vec<(&str, Vec<(f64, f64)>)> = series(view)
-        .into_iter()
-        .map(|(_, class, values)| (class, allan::deviation(&c.time_s, values, period_s)))
-        .collect();
-    let floor = view.closed.closure.noise_floor_rms;
-    let logs = |points: &[(f64, f64)]| -> Vec<(f64, f64)> {
-        let positive = points.iter().filter(|p| p.0 > 0.0 && p.1 > 0.0);
-        positive.map(|p| (p.0.log10(), p.1.log10())).collect()
-    };
-    let taus = curves.first().map(|c| c.1.as_slice()).unwrap_or_default();
-    let white: Vec<(f64, f64)> = taus
-        .iter()
-        .map(|p| (p.0, floor * (period_s / p.0).sqrt()))
-        .collect();
-    let drawn: Vec<(&str, Vec<(f64, f64)>)> = curves.iter().map(|c| (c.0, logs(&c.1))).collect();
-    let all = || drawn.iter().flat_map(|d| d.1.iter());
-    let axis = |interval: Interval, quantity: &str, unit: &str| Axis {
-        interval: interval.padded(0.04),
-        quantity: quantity.to_owned(),
-        unit: unit.to_owned(),
-    };
-    let x = axis(Interval::of(all().map(|p| p.0)), "averaging time", "s");
-    let unit = view.closed.closure.unit;
-    let y = axis(
-        Interval::of(all().chain(&logs(&white)).map(|p| p.1)),
-        "Allan deviation",
-        unit,
-    );
-    let mut svg = Svg::new(WIDTH);
-    let words = |class: &str| match (class, view.has_steps()) {
-        ("before", _) => "declared model alone",
-        (_, true) => "with the steps",
-        _ => "less the declared model",
-    };
-    let mut entries: Vec<(&str, Swatch, String)> = drawn
-        .iter()
-        .map(|d| (d.0, Swatch::Line, words(d.0).to_owned()))
-        .collect();
-    entries.push(("bound", Swatch::Line, "white noise of the floor".to_owned()));
-    svg.legend(&entries);
-    let left = y.room();
-    let mut frame = svg
-        .frame(280.0, left, x.clone(), y.clone())
-        .logarithmic(&x, &y);
-    frame.line("bound", &logs(&white));
-    for (class, points) in &drawn {
-        frame.line(class, points);
-        frame.markers(class, Shape::Circle, 2.6, points);
-    }
-    svg.add(&frame);
-    let title = "Allan deviation of the residual";
-    Figure {
-        svg: svg.finish(title),
-        title: title.to_owned(),
-        caption: format!(
-            "Overlapping, over pieces without gaps; one row is {} s. White noise falls by the root of the averaging time, 1/f noise \
-             is level, a walk or an effect that is left rises.",
-            significant(period_s, 3)
-        ),
-    }
 }

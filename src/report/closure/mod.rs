@@ -1,7 +1,7 @@
 //! The page of a closure: verdict, steps, residuals, evidence.
 //!
 //! [`tables`] puts the closure into words, [`figures`] draws on what [`view`] prepares: residuals, and each step's
-//! [`contribution`] against the channel that [`curve`] chooses; [`allan`] is the Allan deviation,
+//! [`contribution`] against the channel that [`curve`] chooses; [`allan`] is the Allan deviation, [`weighed`] what lost and what to measure next,
 //! [`controls`] are those of `--controls` in words.
 
 pub mod allan;
@@ -11,15 +11,17 @@ pub mod curve;
 pub mod figures;
 pub mod tables;
 pub mod view;
+pub mod weighed;
 
 #[cfg(test)]
 mod page_tests;
 
 use super::design_diff::{DesignDiff, Line};
-use super::figures::Figure;
+use super::figure::Figure;
+use super::narrow::rendered;
 use super::page::Equivalent;
 use super::text::grouped;
-use crate::error::{InputError, Result};
+use crate::error::Result;
 use crate::selftest::controls::Controls;
 use crate::thermal::close::Closed;
 use crate::thermal::firmware::emitted::Emitted;
@@ -40,6 +42,10 @@ struct Page {
     /// Model, training rms, held-out rms, largest held-out, held-out rms over the noise floor.
     errors: Vec<[String; 5]>,
     evidence: Vec<Told>,
+    /// The candidates that came nearest.
+    weighed: Option<Figure>,
+    /// What to measure where something is left.
+    measure: Vec<String>,
     /// Code, column, message.
     warnings: Vec<[String; 3]>,
     own: Own,
@@ -62,8 +68,8 @@ pub struct Own {
     pub diff: Option<Changes>,
     /// What names and silence are worth.
     pub controls: Option<controls::Shown>,
-    /// After the evidence.
-    pub last: Option<Figure>,
+    /// After the evidence; in its place a sentence that says why there is none, or nothing.
+    pub last: std::result::Result<Figure, String>,
     /// Name and value.
     pub provenance: Vec<[String; 2]>,
 }
@@ -106,7 +112,10 @@ impl Comparison {
         let (readings, [c, rust]) = (grouped(e.readings), &e.toolchains);
         Comparison {
             lead: format!(
-                "The whole record, {readings} readings, through the emitted C and Rust, built and run here, against the                  model's fixed-point block: the result and the fault of every call, with those for the readings between                  rows where the correction has a memory. Where nothing differs, the firmware's errors above are those of                  the emitted code. Built with {c}; {rust}.",
+                "The whole record, {readings} readings, through the emitted C and Rust, built and run here, against the \
+                 model's fixed-point block: the result and the fault of every call, with those for the readings between \
+                 rows where the correction has a memory. Where nothing differs, the firmware's errors above are those of \
+                 the emitted code. Built with {c}; {rust}.",
             ),
             equivalence: e.functions.iter().map(Equivalent::of).collect(),
             sum: [grouped(e.words_compared), grouped(e.mismatches)],
@@ -148,7 +157,7 @@ pub fn html_beside(closed: &Closed, beside: &Beside<'_>, name: &str) -> Result<S
             lines: diff.lines(),
         }),
         controls: beside.controls.map(controls::Shown::of),
-        last: Some(figures::allan_deviation(&view)),
+        last: allan::figure(&view),
         provenance: tables::provenance(closed),
     };
     page(c, name, own)
@@ -171,6 +180,8 @@ pub fn page(c: &Closure, name: &str, own: Own) -> Result<String> {
         unit: c.unit,
         errors: tables::errors(c),
         evidence: tables::evidence(c),
+        weighed: weighed::figure(c),
+        measure: weighed::measure_next(c),
         warnings: c
             .warnings
             .iter()
@@ -181,6 +192,5 @@ pub fn page(c: &Closure, name: &str, own: Own) -> Result<String> {
             .collect(),
         own,
     };
-    page.render()
-        .map_err(|e| InputError::new(format!("the report cannot be rendered: {e}")).into())
+    rendered(&page)
 }

@@ -58,7 +58,7 @@ fn the_page_shows_the_step_and_needs_nothing_else() {
         "id=\"steps\"",
         "Residual over time, before and after",
         "Residual against every channel",
-        "Step 1: supply_sensitivity against supply_v",
+        "Step 1: supply_sensitivity over supply_v",
         "id=\"evidence\"",
         "Allan deviation of the residual</h3>",
         "id=\"warnings\"",

@@ -3,14 +3,9 @@
 use super::contribution::{self, Contribution};
 use crate::record::columns::unit_of;
 use crate::report::axis::{Axis, Interval};
-use crate::report::svg::{Frame, Shape};
-use crate::report::text::grouped;
 use crate::statistics::stats;
 use crate::thermal::channels::range;
 use crate::thermal::close::Closed;
-
-/// Points of a series up to which each is drawn.
-pub const DRAWN: usize = 600;
 
 /// Robust standard deviations beyond which a single reading does not set an axis.
 const STANDS_OUT: f64 = 8.0;
@@ -139,19 +134,6 @@ impl<'a> View<'a> {
             unit: self.closed.closure.unit.to_owned(),
         }
     }
-
-    /// Said where not all readings are drawn.
-    pub fn thinned(&self) -> String {
-        let rows = self.closed.channels.len();
-        if stretch(rows) <= 2 {
-            return String::new();
-        }
-        format!(
-            " Of {} readings the least and the greatest residual of each {} in a row are drawn.",
-            grouped(rows as u64),
-            stretch(rows)
-        )
-    }
 }
 
 /// Which values an axis has to show: all, but for a few that stand out.
@@ -168,65 +150,9 @@ fn usual(values: &[f64]) -> Vec<bool> {
     }
 }
 
-/// Rows in a row of which two are drawn.
-fn stretch(rows: usize) -> usize {
-    (2 * rows).div_ceil(DRAWN).max(1)
-}
-
-/// The rows that are drawn of a series: all, or the least and the greatest of each stretch.
-pub fn thin(values: &[f64]) -> Vec<usize> {
-    let stretch = stretch(values.len());
-    let rows = (0..values.len()).filter(|i| values[*i].is_finite());
-    if stretch <= 2 {
-        return rows.take(DRAWN).collect();
-    }
-    let rows: Vec<usize> = rows.collect();
-    let mut drawn = Vec::new();
-    for part in rows.chunk_by(|a, b| a / stretch == b / stretch) {
-        let by = |a: &&usize, b: &&usize| values[**a].total_cmp(&values[**b]);
-        let least = part.iter().min_by(by).copied().unwrap_or(0);
-        let greatest = part.iter().max_by(by).copied().unwrap_or(0);
-        drawn.push(least.min(greatest));
-        if least != greatest {
-            drawn.push(least.max(greatest));
-        }
-    }
-    drawn
-}
-
-/// Draws points as dots; what lies above or below the interval as a triangle at its edge.
-pub fn scatter(frame: &mut Frame, class: &str, y: Interval, points: &[(f64, f64)]) {
-    let within = |p: &&(f64, f64)| p.1 >= y.low && p.1 <= y.high;
-    let inside: Vec<(f64, f64)> = points.iter().filter(within).copied().collect();
-    let many = if inside.len() > 200 { " many" } else { "" };
-    frame.markers(&format!("{class} dots{many}"), Shape::Dot, 1.0, &inside);
-    let inset = 0.03 * (y.high - y.low);
-    let edge = |out: &dyn Fn(f64) -> bool, at: f64| -> Vec<(f64, f64)> {
-        let beyond = points.iter().filter(|p| out(p.1));
-        beyond.map(|p| (p.0, at)).collect()
-    };
-    let above = edge(&|v| v > y.high, y.high - inset);
-    frame.markers(class, Shape::Up, 4.0, &above);
-    let below = edge(&|v| v < y.low, y.low + inset);
-    frame.markers(class, Shape::Down, 4.0, &below);
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn thinning_keeps_the_extremes_and_few_points() {
-        let mut values: Vec<f64> = (0..10_000).map(|i| f64::from(i % 7)).collect();
-        values[1234] = 99.0;
-        values[4321] = f64::NAN;
-        let drawn = thin(&values);
-        assert!(drawn.len() <= DRAWN && drawn.len() > DRAWN / 2);
-        assert!(drawn.contains(&1234) && !drawn.contains(&4321));
-        assert!(drawn.windows(2).all(|w| w[0] < w[1]));
-        assert_eq!(thin(&values[..500]).len(), 500);
-        assert!(thin(&[f64::NAN; 3]).is_empty());
-    }
 
     #[test]
     fn single_readings_do_not_set_an_axis_but_structure_does() {

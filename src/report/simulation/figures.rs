@@ -1,7 +1,7 @@
 //! The paper's three figures from a simulated run, and power-on.
 
 use super::super::axis::{Axis, Interval};
-use super::super::figures::Figure;
+use super::super::figure::{Figure, both};
 use super::super::svg::{Frame, Shape, Svg, Swatch};
 use super::super::text::significant;
 use crate::cosim::path::RealRow;
@@ -9,19 +9,20 @@ use crate::cosim::readings::Taken;
 use crate::plant::Device;
 use crate::simulation::outcome::Outcome;
 
-/// Width of every figure, px.
-const WIDTH: f64 = 960.0;
 /// Points of a curve.
 const CURVE: u32 = 160;
 
 /// All of them, in the order of the page.
 pub fn all(outcome: &Outcome) -> Vec<Figure> {
     let tracking = outcome.parts.design.circuit.phase_loop.is_some();
-    let mut figures = vec![drive_mode(outcome, tracking)];
-    figures.push(against_temperature(outcome, tracking));
-    figures.push(bias_against_thermometer(outcome, tracking));
-    figures.push(startup(outcome, tracking));
-    figures
+    both(|width| {
+        vec![
+            drive_mode(outcome, tracking, width),
+            against_temperature(outcome, tracking, width),
+            bias_against_thermometer(outcome, tracking, width),
+            startup(outcome, tracking, width),
+        ]
+    })
 }
 
 fn axis(quantity: &str, unit: &str, values: impl IntoIterator<Item = f64>) -> Axis {
@@ -81,7 +82,7 @@ fn ramps_legend() -> Vec<(&'static str, Swatch, String)> {
 }
 
 /// Fig. 1: amplitude and phase of the drive mode against temperature.
-fn drive_mode(outcome: &Outcome, tracking: bool) -> Figure {
+fn drive_mode(outcome: &Outcome, tracking: bool, width: f64) -> Figure {
     let taken = &outcome.parts.run.taken;
     let device = Device::new(&outcome.parts.design.gyro);
     let hz = device.excitation_hz;
@@ -116,13 +117,13 @@ fn drive_mode(outcome: &Outcome, tracking: bool) -> Figure {
         exacts.iter().map(|p| p.1).chain(taken.iter().map(own)),
     );
     let left = room(&[&y1, &y2]);
-    let mut svg = Svg::new(WIDTH);
+    let mut svg = Svg::new(width);
     let mut legend = ramps_legend();
     legend.extend([
         ("fit", Swatch::Line, "eq. 6 and 7".to_owned()),
         ("bound", Swatch::Line, "eq. 8, linear".to_owned()),
     ]);
-    svg.legend(&legend);
+    svg.legend(legend);
     let mut top = svg.frame(200.0, left, unlabelled(&x), y1);
     top.line("fit", &amplitudes);
     if has_loop {
@@ -140,18 +141,14 @@ fn drive_mode(outcome: &Outcome, tracking: bool) -> Figure {
     } else {
         ""
     };
-    Figure {
-        svg: svg.finish(title),
-        title: title.to_owned(),
-        caption: format!(
+    svg.figure(title, format!(
             "The paper's fig. 1. Markers: the bit-accurate circuit in closed loop, the electronics' phase taken off; \
              the amplitude is 1 over the drive gain that holds it.{tail}"
-        ),
-    }
+        ))
 }
 
 /// Fig. 2: scale factor, bias and thermometer against temperature, both ramps.
-fn against_temperature(outcome: &Outcome, tracking: bool) -> Figure {
+fn against_temperature(outcome: &Outcome, tracking: bool, width: f64) -> Figure {
     let taken = &outcome.parts.run.taken;
     let factors = &outcome.parts.scale_factor;
     let x = chamber(taken);
@@ -174,8 +171,8 @@ fn against_temperature(outcome: &Outcome, tracking: bool) -> Figure {
     let y3 = axis(name, unit, taken.iter().map(thermometer));
     let left = room(&[&y1, &y2, &y3]);
     let place = |t: &Taken, value: f64| (t.moment.temperatures.chamber_degc, value);
-    let mut svg = Svg::new(WIDTH);
-    svg.legend(&ramps_legend());
+    let mut svg = Svg::new(width);
+    svg.legend(ramps_legend());
     if !factors.is_empty() {
         let mut frame = svg.frame(170.0, left, unlabelled(&x), y1);
         frame.level("zero", 0.0);
@@ -196,14 +193,10 @@ fn against_temperature(outcome: &Outcome, tracking: bool) -> Figure {
     ramps(&mut frame, taken, |t| place(t, thermometer(t)));
     svg.add(&frame);
     let title = format!("Scale factor, bias and {name} against temperature, both ramps");
-    Figure {
-        svg: svg.finish(&title),
-        title,
-        caption: format!(
+    svg.figure(title, format!(
             "The paper's fig. 2, by the bit-accurate circuit. The scale factor is from {} deg/s both ways.",
             significant(outcome.parts.design.thermal_run.scale_rate_dps, 3)
-        ),
-    }
+        ))
 }
 
 fn thermometer_name(tracking: bool) -> (&'static str, &'static str) {
@@ -215,7 +208,7 @@ fn thermometer_name(tracking: bool) -> (&'static str, &'static str) {
 }
 
 /// Fig. 3: bias against the thermometer with the fit, and what the compensated chain leaves.
-fn bias_against_thermometer(outcome: &Outcome, tracking: bool) -> Figure {
+fn bias_against_thermometer(outcome: &Outcome, tracking: bool, width: f64) -> Figure {
     let taken = &outcome.parts.run.taken;
     let thermometer = |t: &Taken| {
         if tracking {
@@ -239,13 +232,13 @@ fn bias_against_thermometer(outcome: &Outcome, tracking: bool) -> Figure {
         after.iter().map(|t| t.fixed.rate_dps).chain([0.0]),
     );
     let left = room(&[&y1, &y2]);
-    let mut svg = Svg::new(WIDTH);
+    let mut svg = Svg::new(width);
     let mut legend = ramps_legend();
     if let Some(fit) = fit {
         let text = format!("fitted polynomial, order {}", fit.order);
         legend.push(("fit", Swatch::Line, text));
     }
-    svg.legend(&legend);
+    svg.legend(legend);
     let upper = if after.is_empty() {
         x.clone()
     } else {
@@ -262,17 +255,13 @@ fn bias_against_thermometer(outcome: &Outcome, tracking: bool) -> Figure {
         svg.add(&frame);
     }
     let title = format!("Bias against {name}, and what the compensation leaves");
-    Figure {
-        svg: svg.finish(&title),
-        title,
-        caption: "The paper's fig. 3. Below: the compensated rate of the bit-accurate chain, with the fit's coefficients in \
+    svg.figure(title, "The paper's fig. 3. Below: the compensated rate of the bit-accurate chain, with the fit's coefficients in \
                   their formats."
-            .to_owned(),
-    }
+            .to_owned())
 }
 
 /// Power-on: amplitude, phase and, with a phase loop, frequency over time.
-fn startup(outcome: &Outcome, tracking: bool) -> Figure {
+fn startup(outcome: &Outcome, tracking: bool, width: f64) -> Figure {
     let s = &outcome.parts.startup;
     let whole = s.rows.len();
     // Until everything has settled, and half as long again.
@@ -300,7 +289,7 @@ fn startup(outcome: &Outcome, tracking: bool) -> Figure {
         .collect();
     let left = axes.iter().map(Axis::room).fold(0.0, f64::max);
     let last = all.len() - 1;
-    let mut svg = Svg::new(WIDTH);
+    let mut svg = Svg::new(width);
     for (k, ((_, _, points), y)) in all.iter().zip(axes).enumerate() {
         let x = axis("time since power-on", "ms", points.iter().map(|p| p.0));
         let x = if k == last { x } else { unlabelled(&x) };
@@ -309,13 +298,9 @@ fn startup(outcome: &Outcome, tracking: bool) -> Figure {
         svg.add(&frame);
     }
     let title = "Power-on: from no motion to the settled loops";
-    Figure {
-        svg: svg.finish(title),
-        title: title.to_owned(),
-        caption: format!(
+    svg.figure(title, format!(
             "At {} degC, without noise, bit-accurate, row by row; the amplitude is in percent of where it ends. The slowest time constant of the linearised loops is {} ms.",
             significant(s.chamber_degc, 3),
             significant(1e3 * s.predicted_time_constant_s, 3)
-        ),
-    }
+        ))
 }

@@ -2,9 +2,10 @@
 
 pub mod figures;
 
-use super::figures::Figure;
+use super::figure::Figure;
+use super::narrow::rendered;
 use super::text::{decimals_of, fixed, percent, significant};
-use crate::error::{InputError, Result};
+use crate::error::Result;
 use crate::simulation::outcome::{Drift, Outcome};
 use askama::Template;
 
@@ -80,8 +81,7 @@ pub fn html(outcome: &Outcome) -> Result<String> {
         .map(|(name, value)| [name.to_owned(), value])
         .to_vec(),
     };
-    page.render()
-        .map_err(|e| InputError::new(format!("the report cannot be rendered: {e}")).into())
+    rendered(&page)
 }
 
 fn headline(outcome: &Outcome) -> String {

@@ -1,15 +1,11 @@
 //! The figures of a study's page.
 
 use super::super::axis::{Axis, Interval};
-use super::super::figures::Figure;
+use super::super::figure::{Figure, SMALL};
 use super::super::svg::{Shape, Svg, Swatch};
 use super::super::text::significant;
 use super::name;
 use crate::study::outcome::{Chosen, Point, Study};
-
-/// Width of a wide figure and of one of many, px.
-const WIDTH: f64 = 960.0;
-const SMALL: f64 = 300.0;
 
 /// What a logarithmic axis shows of a value at or below 0.
 const LEAST: f64 = 1e-9;
@@ -23,14 +19,6 @@ fn axis(values: impl IntoIterator<Item = f64>, quantity: &str, unit: &str) -> Ax
         interval: Interval::of(values).padded(0.06),
         quantity: quantity.to_owned(),
         unit: unit.to_owned(),
-    }
-}
-
-fn figure(svg: Svg, title: String, caption: String) -> Figure {
-    Figure {
-        svg: svg.finish(&title),
-        title,
-        caption,
     }
 }
 
@@ -52,7 +40,7 @@ fn hint(p: &Point) -> String {
 }
 
 /// Cost against merit for a target.
-pub(super) fn front(s: &Study, target: &str) -> Figure {
+pub(super) fn front(s: &Study, target: &str, width: f64) -> Figure {
     let at = |p: &Point| Some((log(p.merit), p.price.get(target).copied()?));
     let own: Vec<&Point> = s
         .front
@@ -68,7 +56,7 @@ pub(super) fn front(s: &Study, target: &str) -> Figure {
         "1",
     );
     let y = axis(all().map(|p| p.1), "cost", target);
-    let mut svg = Svg::new(WIDTH);
+    let mut svg = Svg::new(width);
     let room = y.room();
     let mut frame = svg.frame(320.0, room, x.clone(), y).logarithmic_across(&x);
     frame.line("after", &points);
@@ -93,7 +81,7 @@ pub(super) fn front(s: &Study, target: &str) -> Figure {
         }
     }
     svg.add(&frame);
-    svg.legend(&[
+    svg.legend([
         (
             "after dots",
             Swatch::Marker(Shape::Dot),
@@ -106,24 +94,18 @@ pub(super) fn front(s: &Study, target: &str) -> Figure {
         "{} points; to the left finer, to the top dearer. Point at one for its words.",
         points.len()
     );
-    figure(svg, format!("Front for {target}"), caption)
+    svg.figure(format!("Front for {target}"), caption)
 }
 
 /// What each word adds alone, of the given and of the chosen design.
-pub(super) fn budget(s: &Study) -> Figure {
+pub(super) fn budget(s: &Study, width: f64) -> Figure {
     let rms = |l: &crate::study::budget::Line| {
         let noise = l.alone_on.map(|f| f.noise_dps_rthz);
         noise.unwrap_or(LEAST)
     };
     let chosen = s.chosen_budgets.values().next();
     let count = s.budget.lines.len();
-    let names: Vec<(f64, String)> = s
-        .budget
-        .lines
-        .iter()
-        .enumerate()
-        .map(|(k, l)| ((count - k) as f64, l.name.to_owned()))
-        .collect();
+    let names: Vec<String> = s.budget.lines.iter().map(|l| l.name.to_owned()).collect();
     let values = s
         .budget
         .lines
@@ -131,20 +113,9 @@ pub(super) fn budget(s: &Study) -> Figure {
         .chain(chosen.iter().flat_map(|b| &b.lines))
         .map(|l| log(rms(l)));
     let x = axis(values, "noise with this word alone on", "deg/s/√Hz");
-    let y = Axis {
-        interval: Interval {
-            low: 0.0,
-            high: count as f64 + 1.0,
-        },
-        quantity: String::new(),
-        unit: String::new(),
-    };
-    let mut svg = Svg::new(WIDTH);
+    let mut svg = Svg::new(width);
     let left = x.interval.low;
-    let mut frame = svg
-        .frame(26.0 * count as f64, 280.0, x.clone(), y)
-        .logarithmic_across(&x)
-        .named(&names);
+    let mut frame = svg.rows(26.0, &names, x.clone()).logarithmic_across(&x);
     let mut bars = |class: &str, lines: &[crate::study::budget::Line], above: f64| {
         for (k, line) in lines.iter().enumerate() {
             let middle = (count - k) as f64 + above;
@@ -160,19 +131,23 @@ pub(super) fn budget(s: &Study) -> Figure {
             frame.hint(7.0, (end, middle), &said);
         }
     };
-    bars("bar", &s.budget.lines, 0.19);
+    bars("bar-of", &s.budget.lines, 0.19);
     if let Some(chosen) = chosen {
-        bars("bar second", &chosen.lines, -0.19);
+        bars("bar-of second", &chosen.lines, -0.19);
     }
     svg.add(&frame);
-    let mut legend = vec![("bar", Swatch::Area, "as given".to_owned())];
+    let mut legend = vec![("bar-of", Swatch::Area, "as given".to_owned())];
     if let Some(target) = s.chosen_budgets.keys().next() {
-        legend.push(("bar second", Swatch::Area, format!("chosen for {target}")));
+        legend.push((
+            "bar-of second",
+            Swatch::Area,
+            format!("chosen for {target}"),
+        ));
     }
-    svg.legend(&legend);
+    svg.legend(legend);
     let caption =
         "Each word as it is, every other one made fine. What no word resolves is the left end.";
-    figure(svg, "Error budget".to_owned(), caption.to_owned())
+    svg.figure("Error budget".to_owned(), caption.to_owned())
 }
 
 /// Merit and noise against the length of each word.
@@ -244,13 +219,13 @@ pub(super) fn words(s: &Study) -> Vec<Figure> {
             shown(sweep.first_that_hurts),
             shown(sweep.last_that_helps)
         );
-        figure(svg, format!("Merit against {}", sweep.name), caption)
+        svg.figure(format!("Merit against {}", sweep.name), caption)
     };
     s.sweeps.iter().map(of).collect()
 }
 
 /// What a bit less and a bit more of each word does at the chosen point.
-pub(super) fn tornado(s: &Study, chosen: &Chosen) -> Option<Figure> {
+pub(super) fn tornado(s: &Study, chosen: &Chosen, width: f64) -> Option<Figure> {
     let point = s.front.iter().find(|p| Some(p.number) == chosen.point)?;
     let mut names: Vec<&'static str> = chosen.sensitivity.iter().map(|s| s.name).collect();
     names.dedup();
@@ -276,27 +251,12 @@ pub(super) fn tornado(s: &Study, chosen: &Chosen) -> Option<Figure> {
         "merit in parts of the chosen point's",
         "1",
     );
-    let y = Axis {
-        interval: Interval {
-            low: 0.0,
-            high: count as f64 + 1.0,
-        },
-        quantity: String::new(),
-        unit: String::new(),
-    };
-    let labels: Vec<(f64, String)> = names
-        .iter()
-        .enumerate()
-        .map(|(k, n)| ((count - k) as f64, (*n).to_owned()))
-        .collect();
-    let mut svg = Svg::new(WIDTH);
-    let mut frame = svg
-        .frame(24.0 * count as f64, 280.0, x.clone(), y)
-        .logarithmic_across(&x)
-        .named(&labels);
+    let labels: Vec<String> = names.iter().map(|n| (*n).to_owned()).collect();
+    let mut svg = Svg::new(width);
+    let mut frame = svg.rows(24.0, &labels, x.clone()).logarithmic_across(&x);
     for (k, name) in names.iter().enumerate() {
         let middle = (count - k) as f64;
-        for (class, by) in [("bar second", -1), ("bar", 1)] {
+        for (class, by) in [("bar-of second", -1), ("bar-of", 1)] {
             let Some(end) = ratio(name, by) else { continue };
             let offset = 0.17 * f64::from(by);
             let (low, high) = (middle + offset - 0.16, middle + offset + 0.16);
@@ -315,23 +275,22 @@ pub(super) fn tornado(s: &Study, chosen: &Chosen) -> Option<Figure> {
         }
     }
     svg.add(&frame);
-    svg.legend(&[
-        ("bar second", Swatch::Area, "one less".to_owned()),
-        ("bar", Swatch::Area, "one more".to_owned()),
+    svg.legend([
+        ("bar-of second", Swatch::Area, "one less".to_owned()),
+        ("bar-of", Swatch::Area, "one more".to_owned()),
     ]);
     let title = format!(
         "Sensitivity of point {}, chosen for {}",
         point.number, chosen.target
     );
-    Some(figure(
-        svg,
+    Some(svg.figure(
         title,
         "Words whose step there is no design for have no bar.".to_owned(),
     ))
 }
 
 /// Every point as a line across its words, less the given lengths, and its merit.
-pub(super) fn parallel(s: &Study) -> Figure {
+pub(super) fn parallel(s: &Study, width: f64) -> Figure {
     let count = s.parameters.len();
     let lines: Vec<(Vec<(f64, f64)>, &Point)> = s
         .front
@@ -344,11 +303,10 @@ pub(super) fn parallel(s: &Study) -> Figure {
             (s.parameters.iter().enumerate().map(of).collect(), p)
         })
         .collect();
-    let names: Vec<(f64, String)> = s
+    let names: Vec<String> = s
         .parameters
         .iter()
-        .enumerate()
-        .map(|(k, w)| ((count - k) as f64, format!("{} ({})", w.name, w.given)))
+        .map(|w| format!("{} ({})", w.name, w.given))
         .collect();
     let x = axis(
         lines
@@ -358,16 +316,8 @@ pub(super) fn parallel(s: &Study) -> Figure {
         "length less the given one",
         "bits",
     );
-    let y = Axis {
-        interval: Interval {
-            low: 0.5,
-            high: count as f64 + 0.5,
-        },
-        quantity: String::new(),
-        unit: String::new(),
-    };
-    let mut svg = Svg::new(WIDTH);
-    let mut frame = svg.frame(30.0 * count as f64, 300.0, x, y).named(&names);
+    let mut svg = Svg::new(width);
+    let mut frame = svg.rows(30.0, &names, x);
     for (line, point) in &lines {
         let chosen = s.chosen.iter().any(|c| c.point == Some(point.number));
         let class = if chosen {
@@ -379,27 +329,19 @@ pub(super) fn parallel(s: &Study) -> Figure {
         };
         frame.line(class, line);
     }
+    // One for a line: who goes through the page by the keyboard has not to pass each of its places.
     for (line, point) in &lines {
-        for place in line {
-            frame.hint(
-                5.0,
-                *place,
-                &format!(
-                    "point {}, merit {}",
-                    point.number,
-                    significant(point.merit, 3)
-                ),
-            );
+        if let Some(place) = line.last() {
+            frame.hint(5.0, *place, &hint(point));
         }
     }
     svg.add(&frame);
-    svg.legend(&[
+    svg.legend([
         ("after", Swatch::Line, "chosen".to_owned()),
         ("thin", Swatch::Line, "merit of at most 1".to_owned()),
         ("dim", Swatch::Line, "others".to_owned()),
     ]);
-    figure(
-        svg,
+    svg.figure(
         "All points at once".to_owned(),
         "A point is a line from word to word; the number in brackets is the given length."
             .to_owned(),

@@ -2,9 +2,10 @@
 
 mod figures;
 
-use super::figures::Figure;
+use super::figure::{Figure, both, one};
+use super::narrow::rendered;
 use super::text::significant;
-use crate::error::{InputError, Result};
+use crate::error::Result;
 use crate::study::outcome::{Point, Study};
 use askama::Template;
 
@@ -72,18 +73,24 @@ pub fn html(s: &Study) -> Result<String> {
             .collect(),
         required: s.required.iter().map(required).collect(),
         points: all.map(|p| row(p, &targets)).collect(),
-        fronts: targets.iter().map(|t| figures::front(s, t)).collect(),
+        fronts: both(|width| {
+            targets
+                .iter()
+                .map(|t| figures::front(s, t, width))
+                .collect()
+        }),
         targets,
-        budget: figures::budget(s),
+        budget: one(|width| figures::budget(s, width)),
         budget_rows: budget_rows(s),
         words: figures::words(s),
         word_rows: word_rows(s),
-        tornados: s
-            .chosen
-            .iter()
-            .filter_map(|c| figures::tornado(s, c))
-            .collect(),
-        parallel: figures::parallel(s),
+        tornados: both(|width| {
+            let chosen = s.chosen.iter();
+            chosen
+                .filter_map(|c| figures::tornado(s, c, width))
+                .collect()
+        }),
+        parallel: one(|width| figures::parallel(s, width)),
         notes: s.notes.clone(),
         provenance: vec![
             ["command".to_owned(), s.command.clone()],
@@ -105,8 +112,7 @@ pub fn html(s: &Study) -> Result<String> {
             ],
         ],
     };
-    page.render()
-        .map_err(|e| InputError::new(format!("the report cannot be rendered: {e}")).into())
+    rendered(&page)
 }
 
 /// A sentence for each target of which it is known whether a design costs a quarter less.
