@@ -7,6 +7,7 @@ use crate::design::Design;
 use crate::equivalence::overflow;
 use crate::numeric::format::Rounding;
 use crate::spectrum::nco_spurs;
+use crate::text::number;
 use serde::Serialize;
 
 /// A remark.
@@ -87,7 +88,10 @@ fn biased_rounding(node: &NodeCheck, all: &mut Vec<Remark>) {
     };
     let bias = node.budget.as_ref().and_then(|b| b.rate_mean_dps);
     let bias = match bias {
-        Some(dps) => format!(", which makes {dps:.2e} deg/s of the rate's bias"),
+        Some(dps) => format!(
+            ", which makes {dps} deg/s of the rate's bias",
+            dps = number(dps, 3)
+        ),
         None => String::new(),
     };
     all.push(Remark {
@@ -163,9 +167,9 @@ fn spurs(design: &Design, all: &mut Vec<Remark>) {
         code: "spurs_in_band",
         node: "circuit.nco.table_address_bits".to_owned(),
         message: format!(
-            "the oscillator has {} spurs{worst}; with the design's quadrature one is a tone of {tone:.2e} deg/s, more than an LSB of the output",
+            "the oscillator has {} spurs{worst}; with the design's quadrature one is a tone of {tone} deg/s, more than an LSB of the output",
             measured.spurs
-        ),
+        , tone = number(tone, 3)),
         mend: "give the table more address bits and its entries more bits, or take a tuning word that ends in as many \
                zero bits as the phase has below the address"
             .to_owned(),
@@ -195,8 +199,10 @@ fn output(design: &Design, all: &mut Vec<Remark>) {
         code: "output_hides_fit",
         node: "compensation.output".to_owned(),
         message: format!(
-            "an LSB of {} is {lsb:.2e} deg/s, and {what} {size:.2e} deg/s",
-            c.output.format
+            "an LSB of {} is {lsb} deg/s, and {what} {size} deg/s",
+            c.output.format,
+            lsb = number(lsb, 3),
+            size = number(size, 3)
         ),
         mend: format!("give compensation.output {more} more fraction bits"),
     });

@@ -14,6 +14,7 @@ use crate::tabulate::job;
 use crate::tabulate::job::{Asked, Request, Weight};
 use crate::tabulate::outcome::{Alternative, Outcome, Search};
 use crate::tabulate::selection::Reason;
+use crate::text::number;
 use crate::timing::{self, Stopwatch};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -205,8 +206,14 @@ fn print(o: &Outcome, out: &std::path::Path) {
     if let Some(search) = &o.search {
         let mut table = super::table(&["coefficients", "ideal evaluation", "whole evaluation"]);
         for c in &search.compared {
-            let total = c.total_max_abs.map_or("-".into(), |v| format!("{v:.5e}"));
-            table.add_row([c.name.to_owned(), format!("{:.5e}", c.ideal_max_abs), total]);
+            let total = c
+                .total_max_abs
+                .map_or("-".into(), |v| format!("{v}", v = number(v, 6)));
+            table.add_row([
+                c.name.to_owned(),
+                format!("{}", number(c.ideal_max_abs, 6)),
+                total,
+            ]);
         }
         say!("{table}");
         say!("{}", taken(search));
@@ -221,7 +228,7 @@ fn print(o: &Outcome, out: &std::path::Path) {
         f.intermediate.as_deref().unwrap_or("none")
     );
     let lsb = f.output.parse::<Format>().map_or(1.0, Format::lsb);
-    let shown = |v: f64| format!("{v:.5e} ({:.3} LSB)", v / lsb);
+    let shown = |v: f64| format!("{v} ({:.3} LSB)", v / lsb, v = number(v, 6));
     say!(
         "certified error at most {}",
         shown(o.error.certified_max_abs)
@@ -265,7 +272,7 @@ fn alternative(a: &Alternative) -> alternatives::Line<'_> {
     alternatives::Line {
         detail: &a.detail,
         cost: a.cost,
-        errors: vec![format!("{:.4e}", a.certified_max_abs)],
+        errors: vec![format!("{}", number(a.certified_max_abs, 5))],
         undominated: a.undominated,
         chosen: a.chosen,
     }

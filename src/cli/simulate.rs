@@ -9,6 +9,7 @@ use crate::simulation::hunting::Hunting;
 use crate::simulation::outcome::{Both, Outcome};
 use crate::simulation::trace::Wanted;
 use crate::simulation::{self, Course, Request, record_csv};
+use crate::text::number;
 use crate::timing::{self, Stopwatch};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -216,23 +217,23 @@ fn print_sentences(outcome: &Outcome) {
     let s = &outcome.summary;
     let a = &s.float_fixed;
     say!(
-        "{} readings, drive at {}; float and fixed are at most {:.2e} rad, {:.2e} Hz, {:.2e} deg/s (uncompensated) apart",
+        "{} readings, drive at {}; float and fixed are at most {} rad, {} Hz, {} deg/s (uncompensated) apart",
         s.readings,
         s.drive.replace('_', " "),
-        a.phase_rad,
-        a.freq_hz,
-        a.rate_out_dps
+        number(a.phase_rad, 3),
+        number(a.freq_hz, 3),
+        number(a.rate_out_dps, 3)
     );
     if let Some(lock) = &s.lock {
         say!(
-            "phase loop: {}, mean phase within {:.2e} rad of the setpoint, frequency within {:.2e} Hz of the resonance, {:.2} ppm/K",
+            "phase loop: {}, mean phase within {} rad of the setpoint, frequency within {} Hz of the resonance, {:.2} ppm/K",
             if lock.locked {
                 "locked everywhere"
             } else {
                 "not locked everywhere"
             },
-            lock.phase_error_rad,
-            lock.freq_error_hz,
+            number(lock.phase_error_rad, 3),
+            number(lock.freq_error_hz, 3),
             lock.tempco_ppm_per_k
         );
     }

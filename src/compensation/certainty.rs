@@ -8,6 +8,7 @@ use crate::design::{Compensation, Design, Outside};
 use crate::error::{Error, InputError, Result};
 use crate::tabulate::choice;
 use crate::tabulate::describe;
+use crate::text::number;
 use serde::Serialize;
 
 /// Words that are all run; of more, as many evenly spread.
@@ -280,12 +281,12 @@ pub fn sentences(design: &Design, bounds: &Bounds) -> Vec<String> {
         ""
     };
     let mut lines = vec![format!(
-        "bias against the {against}: at most {} (proved{unless}): coefficients {:.3e}, evaluation {:.3e}, \
-         output {:.3e} deg/s",
+        "bias against the {against}: at most {} (proved{unless}): coefficients {}, evaluation {}, \
+         output {} deg/s",
         figure(design, bounds.certified_max_dps),
-        bounds.coefficients_dps,
-        bounds.evaluation_dps,
-        bounds.output_dps
+        number(bounds.coefficients_dps, 3),
+        number(bounds.evaluation_dps, 3),
+        number(bounds.output_dps, 3)
     )];
     if let Some(asked) = design.bound {
         let covered = bounds.certified_max_dps + output_rounding_dps(c);
@@ -296,9 +297,9 @@ pub fn sentences(design: &Design, bounds: &Bounds) -> Vec<String> {
         };
         lines.push(format!(
             "asked: bias and rate within {} deg/s of it at every calibrated input; with the rounding of the rate they are \
-             within {covered:.3e}: {word}",
+             within {covered}: {word}",
             asked.bound_dps
-        ));
+        , covered = number(covered, 3)));
     }
     if let Some(form) = c.form.as_ref() {
         let built = form.build(c.codes(&design.circuit), c.output.format);
@@ -307,8 +308,9 @@ pub fn sentences(design: &Design, bounds: &Bounds) -> Vec<String> {
     }
     if let Some(fitted) = &c.fitted {
         lines.push(format!(
-            "the fit itself: noise {:.3e} deg/s (one standard deviation), held-out rms {:.3e} deg/s",
-            fitted.std_max_dps, fitted.heldout_rms_dps
+            "the fit itself: noise {} deg/s (one standard deviation), held-out rms {} deg/s",
+            number(fitted.std_max_dps, 3),
+            number(fitted.heldout_rms_dps, 3)
         ));
     }
     if let Some((low, high)) = c.flagged_range() {
@@ -319,9 +321,8 @@ pub fn sentences(design: &Design, bounds: &Bounds) -> Vec<String> {
     }
     if let Some(outside) = &bounds.outside {
         lines.push(format!(
-            "outside the calibrated inputs ({}): at most {:.3e} deg/s from the polynomial continued to every input",
-            outside.contract, outside.worst_dps
-        ));
+            "outside the calibrated inputs ({}): at most {} deg/s from the polynomial continued to every input",
+            outside.contract, number(outside.worst_dps, 3)));
     }
     lines
 }
@@ -351,7 +352,8 @@ fn output_rounding_dps(c: &Compensation) -> f64 {
 fn figure(design: &Design, dps: f64) -> String {
     let output = design.compensation.as_ref().map(|c| c.output.format.lsb());
     format!(
-        "{dps:.3e} deg/s ({:.3} output LSB)",
-        dps / output.unwrap_or(1.0)
+        "{dps} deg/s ({:.3} output LSB)",
+        dps / output.unwrap_or(1.0),
+        dps = number(dps, 3)
     )
 }

@@ -9,6 +9,7 @@ use crate::cosim::rest;
 use crate::design::Design;
 use crate::job::calibration::Calibration;
 use crate::record::Warning;
+use crate::text::number;
 use crate::trace_file::Trace;
 use serde::Serialize;
 use std::f64::consts::{PI, TAU};
@@ -213,9 +214,8 @@ impl Outcome {
             && !lock.locked
         {
             failures.push(format!(
-                "the phase loop does not lock everywhere: phase error up to {:.3e} rad, frequency error up to {:.3e} Hz",
-                lock.phase_error_rad, lock.freq_error_hz
-            ));
+                "the phase loop does not lock everywhere: phase error up to {} rad, frequency error up to {} Hz",
+                number(lock.phase_error_rad, 3), number(lock.freq_error_hz, 3)));
         }
         failures
     }

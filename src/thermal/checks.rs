@@ -10,6 +10,7 @@ use crate::record::Warning;
 use crate::statistics::folds::Sample;
 use crate::statistics::stats;
 use crate::statistics::weights::BINS;
+use crate::text::number;
 
 /// A Celsius thermometer that moved by less than this, K, cannot carry a temperature law.
 pub const LEAST_SPAN_K: f64 = 5.0;
@@ -61,7 +62,7 @@ fn g(value: f64) -> String {
         };
         format!("{value:.*}", digits as usize)
     } else {
-        format!("{value:.3e}")
+        format!("{value}", value = number(value, 3))
     }
 }
 

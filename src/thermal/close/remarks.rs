@@ -2,6 +2,7 @@
 
 use super::Told;
 use crate::record::Warning;
+use crate::text::number;
 use crate::thermal::search::LEVEL;
 
 impl Told<'_> {
@@ -10,13 +11,15 @@ impl Told<'_> {
         warnings.extend(self.accidents().or_else(|| self.riddled()));
         if !self.found.within_rounding.is_empty() {
             let each = self.found.within_rounding.iter();
-            let names: Vec<String> = each.map(|(id, rms)| format!("{id} ({rms:.2e})")).collect();
+            let names: Vec<String> = each
+                .map(|(id, rms)| format!("{id} ({rms})", rms = number(*rms, 3)))
+                .collect();
             warnings.push(Warning::general(
                 "within_adc_rounding",
                 format!(
-                    "not named, as the whole contribution (deg/s rms) is below twice the {:.2e} deg/s that the ADC's \
+                    "not named, as the whole contribution (deg/s rms) is below twice the {} deg/s that the ADC's \
                      rounding makes: {}",
-                    self.search.channels.rounding_dps,
+                    number(self.search.channels.rounding_dps, 3),
                     names.join(", ")
                 ),
             ));
@@ -79,12 +82,12 @@ impl Told<'_> {
             "rate_out_dps",
             format!(
                 "{} of {} rows ({} held out) stand out by more than six deviations, whatever the model, alone or a few in a \
-                 row: they are not in the errors; the farthest, at {} s, is off by {:.3e} deg/s",
+                 row: they are not in the errors; the farthest, at {} s, is off by {} deg/s",
                 rows.len(),
                 residual.len(),
                 held,
                 search.channels.time_s[farthest],
-                residual[farthest]
+                number(residual[farthest], 3)
             ),
         ))
     }
