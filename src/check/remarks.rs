@@ -63,17 +63,20 @@ fn idle_bits(node: &NodeCheck, all: &mut Vec<Remark>) {
     {
         Some((integer, fraction)) => match integer.parse::<u32>() {
             Ok(integer) if integer > idle => {
-                format!("Q{}.{fraction} holds every value", integer - idle)
+                format!(
+                    "make it Q{}.{fraction}, which holds every value",
+                    integer - idle
+                )
             }
-            _ => format!("{idle} bits less hold every value"),
+            _ => format!("take {idle} fewer bits, which hold every value"),
         },
-        None => format!("{idle} bits less hold every value"),
+        None => format!("take {idle} fewer bits, which hold every value"),
     };
     all.push(Remark {
         code: "idle_bits",
         node: node.name.clone(),
         message: format!(
-            "the proved range {} to {} leaves {idle} of the upper bits of {} idle",
+            "its raw words go from {} to {} at most (proved), so that {idle} of the upper bits of {} never change",
             node.proved[0], node.proved[1], node.format
         ),
         mend,
@@ -117,7 +120,8 @@ fn dead_band(node: &NodeCheck, budget: &Budget, all: &mut Vec<Remark>) {
     all.push(Remark {
         code: "dead_band",
         node: node.name.clone(),
-        message: "its input moves by less than an LSB from row to row: averaging does not find what is below an LSB"
+        message: "its input moves by less than an LSB from row to row. Every row is rounded the same way then, and an average of rows is \
+                  no finer than an LSB"
             .to_owned(),
         mend: format!("give {} more fraction bits", key(&node.name)),
     });

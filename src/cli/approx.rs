@@ -144,8 +144,8 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         return Ok(());
     }
     Err(Error::Check(format!(
-        "the certified error {:e} is above the bound",
-        made.outcome.error.certified_max_abs
+        "the certified error {} is above the bound",
+        number(made.outcome.error.certified_max_abs, 3)
     )))
 }
 
@@ -248,7 +248,10 @@ fn print(o: &Outcome, out: &std::path::Path) {
         ),
         (None, None) => {}
     }
-    say!("data alone {}", shown(o.error.coefficients_only_max_abs));
+    say!(
+        "without any rounding of steps and output {}",
+        shown(o.error.coefficients_only_max_abs)
+    );
     if let Some(ideal) = o.ideal.as_ref().filter(|i| !i.emitted) {
         say!(
             "the best coefficients alone would have {}{}; they are `ideal` in approx.json, and not emitted, for their \
@@ -278,34 +281,43 @@ fn alternative(a: &Alternative) -> alternatives::Line<'_> {
     }
 }
 
-/// Why the coefficients were taken and what that gains, in a line.
+/// Why the coefficients were taken and what that gains.
 fn taken(search: &Search) -> String {
-    let part = 100.0 * search.rounding_part;
+    let part = match search.rounding_part {
+        part if part < 0.001 => "less than 0.1 %".to_owned(),
+        part if part < 1.0 => format!("{} %", number(100.0 * part, 2)),
+        // A bound of the rounding, beside an error that was found.
+        _ => "all".to_owned(),
+    };
     let why = match search.reason {
-        Reason::RoundingNegligible => {
-            format!(
-                "rounding is {part:.2} % of the error: the coefficients that are best by themselves"
-            )
-        }
-        Reason::RoundingSmall => format!(
-            "rounding is {part:.1} % of the error: the coefficients that are best by themselves, \
-             ahead of the heuristics in this datapath too"
+        Reason::RoundingNegligible => format!(
+            "rounding of steps and output makes at most {part} of the error, so the coefficients decide. Those were taken \
+             whose polynomial is nearest to the function"
         ),
-        Reason::LeastTotal => {
-            format!("rounding is {part:.0} % of the error: the least error of the whole evaluation")
-        }
+        Reason::RoundingSmall => format!(
+            "rounding of steps and output makes at most {part} of the error. The coefficients whose polynomial is nearest \
+             to the function were taken, as with rounding they are ahead of the other choices too"
+        ),
+        Reason::LeastTotal => format!(
+            "rounding of steps and output may make {part} of the error, so the nearest polynomial need not give the nearest \
+             results. Those coefficients were taken whose results, rounding included, have the least error"
+        ),
     };
     let gain = search
         .gain_over_nearest_plane_percent
-        .map_or(String::new(), |g| {
-            format!("; {g:.2} % below the nearest plane's")
-        });
+        .filter(|g| *g >= 0.005);
+    let gain = gain.map_or(String::new(), |g| {
+        format!(
+            ". That is {} % less than with the nearest plane's",
+            number(g, 2)
+        )
+    });
     let best = match search.compared.last() {
-        Some(c) if c.proved => "; proved: nothing better exists",
-        _ if search.proved_best => "; proved: nothing is below the least total error",
+        Some(c) if c.proved => ". It is proved that no others in these formats have less",
+        _ if search.proved_best => ". It is proved that none have less than the least error found",
         _ => "",
     };
-    format!("taken: {why}{gain}{best}")
+    format!("taken: {why}{gain}{best}.")
 }
 
 /// A bar on a terminal for what takes over two seconds.

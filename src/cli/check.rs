@@ -89,11 +89,11 @@ fn print(check: &Check) {
             .map(|[low, high]| format!("{low} to {high}"))
             .collect();
         say!(
-            "{} can {} from operands {}; path {}",
+            "{} can {}: what goes into it ranges over the raw words {}. From there it reaches {}.",
             node.name,
             node.mode,
             operands.join(" and "),
-            node.path.join(" > ")
+            node.path.get(1..).unwrap_or_default().join(" > ")
         );
     }
     if let Some(rms) = check.rate_rms_dps {
@@ -102,7 +102,7 @@ fn print(check: &Check) {
             format!("predicted {v}", v = number(v, 3))
         });
         say!(
-            "rate, fixed less float: {rms} deg/s rms over {} samples ({predicted})",
+            "The rate in fixed point differs from that in floating point by {rms} deg/s rms over {} samples ({predicted}).",
             check.samples,
             rms = number(rms, 3)
         );
@@ -146,11 +146,11 @@ fn print(check: &Check) {
     requirements(check);
     for remark in &check.remarks {
         say!(
-            "{} [{}]: {}; {}",
+            "{}: {}. To mend it, {} [{}]",
             remark.node,
-            remark.code,
             remark.message,
-            remark.mend
+            remark.mend,
+            remark.code
         );
     }
     say!(

@@ -223,7 +223,8 @@ fn print_spurs(e: &Equivalence) {
     };
     let db = |level: Option<f64>| level.map_or("none".to_owned(), |l| format!("{l:.2} dBc"));
     say!(
-        "NCO at {:.3} Hz: worst spur {} (predicted {}), {} in all; with the design's quadrature a tone of {} deg/s",
+        "The NCO at {:.3} Hz has its worst spur at {} (predicted {}), of {} in all. With the design's quadrature the spurs make \
+         a tone of {} deg/s in the rate.",
         s.carrier_hz,
         db(measured.sfdr_dbc.map(|l| -l)),
         db(

@@ -217,7 +217,8 @@ fn print_sentences(outcome: &Outcome) {
     let s = &outcome.summary;
     let a = &s.float_fixed;
     say!(
-        "{} readings, drive at {}; float and fixed are at most {} rad, {} Hz, {} deg/s (uncompensated) apart",
+        "{} readings, drive at {}. The fixed-point chain is at most {} rad, {} Hz and {} deg/s (before compensation) from the \
+         same chain in floating point.",
         s.readings,
         s.drive.replace('_', " "),
         number(a.phase_rad, 3),
@@ -226,7 +227,8 @@ fn print_sentences(outcome: &Outcome) {
     );
     if let Some(lock) = &s.lock {
         say!(
-            "phase loop: {}, mean phase within {} rad of the setpoint, frequency within {} Hz of the resonance, {:.2} ppm/K",
+            "The phase loop is {}. Its mean phase is within {} rad of the setpoint, its frequency within {} Hz of the resonance, \
+             and that frequency moves by {:.2} ppm/K.",
             if lock.locked {
                 "locked everywhere"
             } else {
@@ -240,7 +242,7 @@ fn print_sentences(outcome: &Outcome) {
     let time = |t: Option<f64>| t.map_or("not seen".to_owned(), |t| format!("{:.0} ms", 1e3 * t));
     let up = &s.startup;
     say!(
-        "power-on at {} degC: amplitude within 1 % after {}, phase within 0.1 deg after {}{}",
+        "After power-on at {} degC the amplitude is within 1 % after {}, the phase within 0.1 deg after {}{}.",
         up.chamber_degc,
         time(up.amplitude_s),
         time(up.phase_s),

@@ -281,8 +281,8 @@ pub fn sentences(design: &Design, bounds: &Bounds) -> Vec<String> {
         ""
     };
     let mut lines = vec![format!(
-        "bias against the {against}: at most {} (proved{unless}): coefficients {}, evaluation {}, \
-         output {} deg/s",
+        "The firmware's bias is at most {} from the {against} (proved{unless}). Of this the coefficients' words make {}, the \
+         rounding of the steps {} and that of the output {} deg/s.",
         figure(design, bounds.certified_max_dps),
         number(bounds.coefficients_dps, 3),
         number(bounds.evaluation_dps, 3),
@@ -296,10 +296,11 @@ pub fn sentences(design: &Design, bounds: &Bounds) -> Vec<String> {
             "NOT kept"
         };
         lines.push(format!(
-            "asked: bias and rate within {} deg/s of it at every calibrated input; with the rounding of the rate they are \
-             within {covered}: {word}",
-            asked.bound_dps
-        , covered = number(covered, 3)));
+            "Bias and rate were asked to be within {} deg/s of it at every calibrated input. With the rounding of the rate \
+             they are within {}: {word}.",
+            asked.bound_dps,
+            number(covered, 3)
+        ));
     }
     if let Some(form) = c.form.as_ref() {
         let built = form.build(c.codes(&design.circuit), c.output.format);
@@ -308,7 +309,8 @@ pub fn sentences(design: &Design, bounds: &Bounds) -> Vec<String> {
     }
     if let Some(fitted) = &c.fitted {
         lines.push(format!(
-            "the fit itself: noise {} deg/s (one standard deviation), held-out rms {} deg/s",
+            "The fitted polynomial itself is uncertain by {} deg/s (one standard deviation). Rows that the fit has not seen are \
+             {} deg/s rms from it.",
             number(fitted.std_max_dps, 3),
             number(fitted.heldout_rms_dps, 3)
         ));
@@ -321,8 +323,11 @@ pub fn sentences(design: &Design, bounds: &Bounds) -> Vec<String> {
     }
     if let Some(outside) = &bounds.outside {
         lines.push(format!(
-            "outside the calibrated inputs ({}): at most {} deg/s from the polynomial continued to every input",
-            outside.contract, number(outside.worst_dps, 3)));
+            "Outside the calibrated inputs the contract is {}: there the bias is up to {} deg/s from the polynomial, \
+             continued to every input.",
+            outside.contract,
+            number(outside.worst_dps, 3)
+        ));
     }
     lines
 }
@@ -331,13 +336,13 @@ pub fn sentences(design: &Design, bounds: &Bounds) -> Vec<String> {
 pub fn run_sentence(design: &Design, certainty: &Certainty) -> String {
     let c = certainty;
     format!(
-        "run over {}{} calibrated inputs: at most {}, at input {}{}",
+        "Run over {}{} calibrated inputs, it is at most {} from the polynomial, at input word {}{}.",
         if c.exhaustive { "all " } else { "" },
         c.inputs_checked,
         figure(design, c.exhaustive_max_dps),
         c.at_input_raw,
         if c.saturates {
-            ": a word saturates"
+            "; a word saturates"
         } else {
             ""
         }

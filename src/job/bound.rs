@@ -244,7 +244,7 @@ fn polynomial_within(design: &Design, room: f64) -> Result<Reached> {
         return Ok(Reached::Not(unreached(design, c, room, Some(&finer))?));
     }
     let said = format!(
-        "coefficients {} and accumulator {} for the bound, instead of {} and {}",
+        "coefficients {} and accumulator {}, which keep the bound; {} and {} do not",
         finer.coefficient_format,
         finer.accumulator.format,
         c.coefficient_format,

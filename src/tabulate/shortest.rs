@@ -31,3 +31,19 @@ pub(super) fn fewest<T>(low: u32, most: u32, at: &dyn Fn(u32) -> Option<T>) -> O
         .find_map(|bits| at(bits).map(|found| (bits, found)))
         .or(best)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::fewest;
+
+    #[test]
+    fn the_fewest_bits_are_found_also_a_little_below_a_gap() {
+        let from = |least: u32| move |bits: u32| (bits >= least).then_some(());
+        assert_eq!(fewest(0, 20, &from(7)), Some((7, ())));
+        assert_eq!(fewest(9, 20, &from(7)), Some((9, ())));
+        assert_eq!(fewest(0, 7, &from(7)), None);
+        // 5 bits do, 6 do not, 7 do.
+        let gap = |bits: u32| (bits == 5 || bits >= 7).then_some(());
+        assert_eq!(fewest(0, 20, &gap), Some((5, ())));
+    }
+}

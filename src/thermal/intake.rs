@@ -230,9 +230,9 @@ pub(crate) fn channels_of(
 /// What is said of a thermometer that is read less often than the output.
 fn behind(thermometer: &str, course: &repeated::Course) -> Warning {
     let said = format!(
-        "{thermometer} has a new reading every {:.1} rows and repeats it in between: what the repeated ones are behind by \
+        "{thermometer} has a new reading every {:.1} rows and repeats it in between. What the repeated ones are behind by \
          makes {} deg/s rms of the declared bias. It is taken out before and after (causes are sought along straight lines \
-         between new readings); the firmware's error contains it: read the thermometer as often as the output",
+         between new readings), but the firmware's error contains it. Read the thermometer as often as the output",
         course.rows,
         number(course.artefact_rms_dps, 3)
     );

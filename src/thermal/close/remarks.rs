@@ -17,8 +17,8 @@ impl Told<'_> {
             warnings.push(Warning::general(
                 "within_adc_rounding",
                 format!(
-                    "not named, as the whole contribution (deg/s rms) is below twice the {} deg/s that the ADC's \
-                     rounding makes: {}",
+                    "the ADC's rounding makes {} deg/s rms of its own. These are below twice that (deg/s rms) and are not named: {}. Take \
+                     an ADC with more bits, or more noise before it, to tell them",
                     number(self.search.channels.rounding_dps, 3),
                     names.join(", ")
                 ),
@@ -48,7 +48,8 @@ impl Told<'_> {
             warnings.push(Warning::general(
                 "undecided",
                 format!(
-                    "the record decides nothing between {}: each explains it as well",
+                    "{} explain the record equally well. It does not say which of them it is. Do the experiment that separates them \
+                     (`evidence` names it)",
                     self.found.undecided.join(", ")
                 ),
             ));
@@ -58,8 +59,8 @@ impl Told<'_> {
             warnings.push(Warning::general(
                 "goes_with_temperature",
                 format!(
-                    "the declared bias in temperature may be that of {}: in this record these go with the thermometer; \
-                     `evidence` says which experiment separates them",
+                    "the declared bias in temperature may be that of {}. In this record these go with the thermometer, and nothing \
+                     tells them apart. `evidence` says which experiment does",
                     hidden.join(", ")
                 ),
             ));
@@ -82,7 +83,8 @@ impl Told<'_> {
             "rate_out_dps",
             format!(
                 "{} of {} rows ({} held out) stand out by more than six deviations, whatever the model, alone or a few in a \
-                 row: they are not in the errors; the farthest, at {} s, is off by {} deg/s",
+                 row. They are taken for accidents and are not in the errors. Look at the farthest: at {} s it is off by {} \
+                 deg/s",
                 rows.len(),
                 residual.len(),
                 held,

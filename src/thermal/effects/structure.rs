@@ -267,7 +267,11 @@ impl Candidate for ModeCrossing {
                 c.middle_degc + k * centre,
                 (k * std(0)).abs(),
             ),
-            entry("half_width_k", (k * width).abs(), (k * width * std(1)).abs()),
+            entry(
+                "half_width_k",
+                (k * width).abs(),
+                (k * width * std(1)).abs(),
+            ),
             gain("absorptive_dps", e, 0, 1.0),
         ]
         .into_iter()
