@@ -56,6 +56,34 @@ pub fn shown(text: &str, place: Place) -> String {
     shown
 }
 
+/// What is nothing in any unit that is told.
+const NOTHING: f64 = 1e-18;
+
+/// A number in a sentence: so many significant digits; as a power of ten only below 1e-4 and from 1e7 on, 0 where it is
+/// nothing.
+pub fn number(value: f64, digits: usize) -> String {
+    if !value.is_finite() {
+        return "unknown".to_owned();
+    }
+    if value.abs() < NOTHING {
+        return "0".to_owned();
+    }
+    let digits = digits.max(1);
+    let scientific = format!("{value:.*e}", digits - 1);
+    let (rounded, exponent) = match scientific.split_once('e') {
+        Some((_, exponent)) => (
+            scientific.parse().unwrap_or(value),
+            exponent.parse().unwrap_or(0),
+        ),
+        None => (value, 0i32),
+    };
+    if !(-4..7).contains(&exponent) {
+        return scientific;
+    }
+    let decimals = (digits as i32 - 1 - exponent).max(0) as usize;
+    format!("{rounded:.decimals$}")
+}
+
 /// [`shown`] line by line: of a text that has lines of its own.
 pub fn lines(text: &str, place: Place) -> String {
     let lines: Vec<String> = text.split('\n').map(|line| shown(line, place)).collect();

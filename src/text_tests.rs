@@ -85,3 +85,15 @@ fn what_is_replaced_can_be_read() {
     let long = "a".repeat(2500);
     assert!(shown(&long, Place::Source).ends_with("a{500 more characters}"));
 }
+
+#[test]
+fn a_number_in_a_sentence_has_its_digits_and_no_power_of_ten_where_none_is_needed() {
+    assert_eq!(number(4.709e-52, 3), "0");
+    assert_eq!(number(2374.3, 3), "2370");
+    assert_eq!(number(26_963.2, 4), "26960");
+    assert_eq!(number(1.468e-4, 3), "0.000147");
+    assert_eq!(number(-0.5, 3), "-0.500");
+    assert_eq!(number(9.999, 2), "10");
+    assert_eq!(number(3.864e-10, 2), "3.9e-10");
+    assert_eq!(number(f64::INFINITY, 3), "unknown");
+}

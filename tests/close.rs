@@ -108,7 +108,7 @@ fn the_default_gyro_hides_a_mode_crossing() {
     let (value, _) = answer(&csv).unwrap();
     let step = step(&value, "mode_crossing").expect("the crossing is named");
     // What `thermal_run` plants: 4.5 deg/s at 37.5 degC.
-    let at = step["parameters"]["centre_degc"].as_f64().unwrap();
+    let at = step["parameters"]["center_degc"].as_f64().unwrap();
     assert!((at - 37.5).abs() < 0.5, "{at}");
     let before = value["before"]["heldout_rms"].as_f64().unwrap();
     let after = value["after"]["heldout_rms"].as_f64().unwrap();

@@ -144,6 +144,6 @@ fn rounding_of_an_undithered_adc_is_taken_out_and_not_named() {
     let steps = closure["steps"].as_array().unwrap();
     assert_eq!(steps.len(), 1, "{steps:?}");
     assert_eq!(steps[0]["effect"], "mode_crossing");
-    let centre_degc = steps[0]["parameters"]["centre_degc"].as_f64().unwrap();
-    assert!((centre_degc - 37.5).abs() < 1.0, "{centre_degc}");
+    let center_degc = steps[0]["parameters"]["center_degc"].as_f64().unwrap();
+    assert!((center_degc - 37.5).abs() < 1.0, "{center_degc}");
 }

@@ -81,8 +81,8 @@ impl NodeCheck {
                         let operands: Vec<String> =
                             w.operands.iter().map(i128::to_string).collect();
                         format!(
-                            ", the first at sample {sample}: raw {value} from {}",
-                            operands.join(", ")
+                            ", the first at sample {sample}: the raw word {value}, made of the raw words {}",
+                            operands.join(" and ")
                         )
                     });
                 format!("{} words of the design's own gyro{first}", w.words)

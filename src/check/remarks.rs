@@ -7,6 +7,7 @@ use crate::design::Design;
 use crate::equivalence::overflow;
 use crate::numeric::format::Rounding;
 use crate::spectrum::nco_spurs;
+use crate::text::number;
 use serde::Serialize;
 
 /// A remark.
@@ -62,17 +63,20 @@ fn idle_bits(node: &NodeCheck, all: &mut Vec<Remark>) {
     {
         Some((integer, fraction)) => match integer.parse::<u32>() {
             Ok(integer) if integer > idle => {
-                format!("Q{}.{fraction} holds every value", integer - idle)
+                format!(
+                    "make it Q{}.{fraction}, which holds every value",
+                    integer - idle
+                )
             }
-            _ => format!("{idle} bits less hold every value"),
+            _ => format!("take {idle} fewer bits, which hold every value"),
         },
-        None => format!("{idle} bits less hold every value"),
+        None => format!("take {idle} fewer bits, which hold every value"),
     };
     all.push(Remark {
         code: "idle_bits",
         node: node.name.clone(),
         message: format!(
-            "the proved range {} to {} leaves {idle} of the upper bits of {} idle",
+            "its raw words go from {} to {} at most (proved), so that {idle} of the upper bits of {} never change",
             node.proved[0], node.proved[1], node.format
         ),
         mend,
@@ -87,7 +91,10 @@ fn biased_rounding(node: &NodeCheck, all: &mut Vec<Remark>) {
     };
     let bias = node.budget.as_ref().and_then(|b| b.rate_mean_dps);
     let bias = match bias {
-        Some(dps) => format!(", which makes {dps:.2e} deg/s of the rate's bias"),
+        Some(dps) => format!(
+            ", which makes {dps} deg/s of the rate's bias",
+            dps = number(dps, 3)
+        ),
         None => String::new(),
     };
     all.push(Remark {
@@ -113,7 +120,8 @@ fn dead_band(node: &NodeCheck, budget: &Budget, all: &mut Vec<Remark>) {
     all.push(Remark {
         code: "dead_band",
         node: node.name.clone(),
-        message: "its input moves by less than an LSB from row to row: averaging does not find what is below an LSB"
+        message: "its input moves by less than an LSB from row to row. Every row is rounded the same way then, and an average of rows is \
+                  no finer than an LSB"
             .to_owned(),
         mend: format!("give {} more fraction bits", key(&node.name)),
     });
@@ -163,9 +171,9 @@ fn spurs(design: &Design, all: &mut Vec<Remark>) {
         code: "spurs_in_band",
         node: "circuit.nco.table_address_bits".to_owned(),
         message: format!(
-            "the oscillator has {} spurs{worst}; with the design's quadrature one is a tone of {tone:.2e} deg/s, more than an LSB of the output",
+            "the oscillator has {} spurs{worst}; with the design's quadrature one is a tone of {tone} deg/s, more than an LSB of the output",
             measured.spurs
-        ),
+        , tone = number(tone, 3)),
         mend: "give the table more address bits and its entries more bits, or take a tuning word that ends in as many \
                zero bits as the phase has below the address"
             .to_owned(),
@@ -195,8 +203,10 @@ fn output(design: &Design, all: &mut Vec<Remark>) {
         code: "output_hides_fit",
         node: "compensation.output".to_owned(),
         message: format!(
-            "an LSB of {} is {lsb:.2e} deg/s, and {what} {size:.2e} deg/s",
-            c.output.format
+            "an LSB of {} is {lsb} deg/s, and {what} {size} deg/s",
+            c.output.format,
+            lsb = number(lsb, 3),
+            size = number(size, 3)
         ),
         mend: format!("give compensation.output {more} more fraction bits"),
     });

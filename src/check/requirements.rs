@@ -17,6 +17,7 @@ use crate::study::figures::Figures;
 use crate::study::job::cycles_of_a_processor;
 use crate::study::retune::with_lengths;
 use crate::study::verify::Verifier;
+use crate::text::number;
 use serde::Serialize;
 
 /// A requirement and what was obtained.
@@ -59,11 +60,13 @@ impl Requirement {
         let found = match self.bounds {
             Some([low, high]) if within => {
                 format!(
-                    "{:.3e} was found, and it may be anything from {low:.3e} to {high:.3e}: not shown",
-                    self.obtained
+                    "{} was found, and it may be anything from {low} to {high}: not shown",
+                    number(self.obtained, 3),
+                    low = number(low, 3),
+                    high = number(high, 3)
                 )
             }
-            _ => format!("it is {:.4e}", self.obtained),
+            _ => format!("it is {}", number(self.obtained, 5)),
         };
         let mend = self.mend.as_deref().unwrap_or_default();
         Some(format!(
@@ -128,7 +131,10 @@ fn bandwidth(design: &Design, limit: f64) -> Requirement {
                 other.circuit.decimator.ratio = ratio;
                 let hz = bandwidth_hz(&other);
                 if hz >= limit && limits::check(&other).is_ok() {
-                    return format!("`circuit.decimator.ratio = {ratio}` has {hz:.4e} Hz");
+                    return format!(
+                        "`circuit.decimator.ratio = {ratio}` has {hz} Hz",
+                        hz = number(hz, 5)
+                    );
                 }
             }
             "raise `circuit.sample_rate_hz`: no ratio has so much".to_owned()
@@ -206,16 +212,18 @@ fn mend(
     let name = limit.name.name();
     match (first, best) {
         (Some((word, length, value)), _) => format!(
-            "`{}` of {length} {} makes it {value:.3e}",
+            "`{}` of {length} {} makes it {value}",
             word.key(),
-            word.counts()
+            word.counts(),
+            value = number(value, 3)
         ),
         (None, Some((word, length, value))) => format!(
-            "no word alone mends it, the most does `{}` of {length} {} ({value:.3e}); `gyrogen study --for \"{name}<={:e}\"` \
+            "no word alone mends it, the most does `{}` of {length} {} ({value}); `gyrogen study --for \"{name}<={:e}\"` \
              looks for a design",
             word.key(),
             word.counts(),
-            limit.value
+            limit.value,
+            value = number(value, 3)
         ),
         (None, None) => format!(
             "no word makes it {what} by up to {STEPS} bits; raise the limit, or `gyrogen study` shows what there is"

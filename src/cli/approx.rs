@@ -16,6 +16,7 @@ use crate::tabulate::job;
 use crate::tabulate::job::{Asked, Request, Weight};
 use crate::tabulate::outcome::{Alternative, Outcome, Search};
 use crate::tabulate::selection::Reason;
+use crate::text::number;
 use crate::timing;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -145,8 +146,8 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         return Ok(());
     }
     Err(Error::Check(format!(
-        "the certified error {:e} is above the bound",
-        made.outcome.error.certified_max_abs
+        "the certified error {} is above the bound",
+        number(made.outcome.error.certified_max_abs, 3)
     )))
 }
 
@@ -208,8 +209,14 @@ fn print(o: &Outcome, out: &std::path::Path) {
         let mut table =
             super::terminal::table(&["coefficients", "ideal evaluation", "whole evaluation"]);
         for c in &search.compared {
-            let total = c.total_max_abs.map_or("-".into(), |v| format!("{v:.5e}"));
-            table.add_row([c.name.to_owned(), format!("{:.5e}", c.ideal_max_abs), total]);
+            let total = c
+                .total_max_abs
+                .map_or("-".into(), |v| format!("{v}", v = number(v, 6)));
+            table.add_row([
+                c.name.to_owned(),
+                format!("{}", number(c.ideal_max_abs, 6)),
+                total,
+            ]);
         }
         super::terminal::show(&table);
         say!("{}", taken(search));
@@ -224,7 +231,7 @@ fn print(o: &Outcome, out: &std::path::Path) {
         f.intermediate.as_deref().unwrap_or("none")
     );
     let lsb = f.output.parse::<Format>().map_or(1.0, Format::lsb);
-    let shown = |v: f64| format!("{v:.5e} ({:.3} LSB)", v / lsb);
+    let shown = |v: f64| format!("{v} ({:.3} LSB)", v / lsb, v = number(v, 6));
     say!(
         "certified error at most {}",
         shown(o.error.certified_max_abs)
@@ -244,7 +251,10 @@ fn print(o: &Outcome, out: &std::path::Path) {
         ),
         (None, None) => {}
     }
-    say!("data alone {}", shown(o.error.coefficients_only_max_abs));
+    say!(
+        "without any rounding of steps and output {}",
+        shown(o.error.coefficients_only_max_abs)
+    );
     if let Some(ideal) = o.ideal.as_ref().filter(|i| !i.emitted) {
         say!(
             "the best coefficients alone would have {}{}; they are `ideal` in approx.json, and not emitted, for their \
@@ -268,38 +278,47 @@ fn alternative(a: &Alternative) -> alternatives::Line<'_> {
     alternatives::Line {
         detail: &a.detail,
         cost: a.cost,
-        errors: vec![format!("{:.4e}", a.certified_max_abs)],
+        errors: vec![format!("{}", number(a.certified_max_abs, 5))],
         undominated: a.undominated,
         chosen: a.chosen,
     }
 }
 
-/// Why the coefficients were taken and what that gains, in a line.
+/// Why the coefficients were taken and what that gains.
 fn taken(search: &Search) -> String {
-    let part = 100.0 * search.rounding_part;
+    let part = match search.rounding_part {
+        part if part < 0.001 => "less than 0.1 %".to_owned(),
+        part if part < 1.0 => format!("{} %", number(100.0 * part, 2)),
+        // A bound of the rounding, beside an error that was found.
+        _ => "all".to_owned(),
+    };
     let why = match search.reason {
-        Reason::RoundingNegligible => {
-            format!(
-                "rounding is {part:.2} % of the error: the coefficients that are best by themselves"
-            )
-        }
-        Reason::RoundingSmall => format!(
-            "rounding is {part:.1} % of the error: the coefficients that are best by themselves, \
-             ahead of the heuristics in this datapath too"
+        Reason::RoundingNegligible => format!(
+            "rounding of steps and output makes at most {part} of the error, so the coefficients decide. Those were taken \
+             whose polynomial is nearest to the function"
         ),
-        Reason::LeastTotal => {
-            format!("rounding is {part:.0} % of the error: the least error of the whole evaluation")
-        }
+        Reason::RoundingSmall => format!(
+            "rounding of steps and output makes at most {part} of the error. The coefficients whose polynomial is nearest \
+             to the function were taken, as with rounding they are ahead of the other choices too"
+        ),
+        Reason::LeastTotal => format!(
+            "rounding of steps and output may make {part} of the error, so the nearest polynomial need not give the nearest \
+             results. Those coefficients were taken whose results, rounding included, have the least error"
+        ),
     };
     let gain = search
         .gain_over_nearest_plane_percent
-        .map_or(String::new(), |g| {
-            format!("; {g:.2} % below the nearest plane's")
-        });
+        .filter(|g| *g >= 0.005);
+    let gain = gain.map_or(String::new(), |g| {
+        format!(
+            ". That is {} % less than with the nearest plane's",
+            number(g, 2)
+        )
+    });
     let best = match search.compared.last() {
-        Some(c) if c.proved => "; proved: nothing better exists",
-        _ if search.proved_best => "; proved: nothing is below the least total error",
+        Some(c) if c.proved => ". It is proved that no others in these formats have less",
+        _ if search.proved_best => ". It is proved that none have less than the least error found",
         _ => "",
     };
-    format!("taken: {why}{gain}{best}")
+    format!("taken: {why}{gain}{best}.")
 }

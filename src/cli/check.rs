@@ -7,6 +7,7 @@ use crate::check::outcome::{Check, NodeCheck, Overflows};
 use crate::check::{self, SAMPLES};
 use crate::error::{Error, Result};
 use crate::output::Results;
+use crate::text::number;
 use crate::timing;
 use std::path::PathBuf;
 
@@ -86,20 +87,22 @@ fn print(check: &Check) {
             .map(|[low, high]| format!("{low} to {high}"))
             .collect();
         say!(
-            "{} can {} from operands {}; path {}",
+            "{} can {}: what goes into it ranges over the raw words {}. From there it reaches {}.",
             node.name,
             node.mode,
             operands.join(" and "),
-            node.path.join(" > ")
+            node.path.get(1..).unwrap_or_default().join(" > ")
         );
     }
     if let Some(rms) = check.rate_rms_dps {
         let predicted = check.predicted_rate_rms_dps;
-        let predicted =
-            predicted.map_or("no prediction".to_owned(), |v| format!("predicted {v:.2e}"));
+        let predicted = predicted.map_or("no prediction".to_owned(), |v| {
+            format!("predicted {v}", v = number(v, 3))
+        });
         say!(
-            "rate, fixed less float: {rms:.2e} deg/s rms over {} samples ({predicted})",
-            check.samples
+            "The rate in fixed point differs from that in floating point by {rms} deg/s rms over {} samples ({predicted}).",
+            check.samples,
+            rms = number(rms, 3)
         );
     }
     let mut table = super::terminal::table(&[
@@ -139,11 +142,11 @@ fn print(check: &Check) {
     requirements(check);
     for remark in &check.remarks {
         say!(
-            "{} [{}]: {}; {}",
+            "{}: {}. To mend it, {} [{}]",
             remark.node,
-            remark.code,
             remark.message,
-            remark.mend
+            remark.mend,
+            remark.code
         );
     }
     say!(
@@ -165,13 +168,17 @@ fn requirements(check: &Check) {
     for r in &check.requirements {
         let sign = if r.at_least { ">=" } else { "<=" };
         let between = r.bounds.map_or("-".to_owned(), |[low, high]| {
-            format!("{low:.3e} and {high:.3e}")
+            format!(
+                "{low} and {high}",
+                low = number(low, 3),
+                high = number(high, 3)
+            )
         });
         table.add_row([
             r.name.to_owned(),
             r.target.clone().unwrap_or("-".to_owned()),
             format!("{sign} {:e}", r.limit),
-            format!("{:.4e}", r.obtained),
+            format!("{}", number(r.obtained, 5)),
             between,
             if r.met { "yes" } else { "NO" }.to_owned(),
         ]);
@@ -196,7 +203,7 @@ fn row(n: &NodeCheck) -> Vec<String> {
         Overflows::Certain => format!("CERTAIN ({})", n.mode),
         Overflows::ByDesign => n.mode.to_owned(),
     };
-    let some = |v: Option<f64>| v.map_or("-".to_owned(), |v| format!("{v:.2e}"));
+    let some = |v: Option<f64>| v.map_or("-".to_owned(), |v| format!("{v}", v = number(v, 3)));
     let line = n.budget.as_ref();
     vec![
         n.name.clone(),

@@ -16,6 +16,7 @@ use crate::record::{ThermalRecord, Warning};
 use crate::report::closure::Beside;
 use crate::report::design_diff::DesignDiff;
 use crate::selftest::controls::Controls;
+use crate::text::number;
 use crate::thermal::close;
 use crate::thermal::close::Closed;
 use crate::thermal::firmware::emitted;
@@ -309,8 +310,11 @@ fn write(
 
 fn print(c: &Closure, compared: Option<&Emitted>, controls: Option<&Controls>, out: &Path) {
     if !c.steps.is_empty() {
-        let mut table =
-            super::terminal::table(&["step", "parameters", "held-out rms", "p", "like it"]);
+        // A step that another effect explains as well is told with its rivals; mostly there are none.
+        let rivals = c.steps.iter().any(|s| !s.indistinguishable_from.is_empty());
+        let mut headers = vec!["step", "parameters", "held-out rms", "p"];
+        headers.extend(rivals.then_some("explained as well by"));
+        let mut table = super::terminal::table(&headers);
         for s in &c.steps {
             let parameters: Vec<String> = s
                 .parameters
@@ -320,13 +324,17 @@ fn print(c: &Closure, compared: Option<&Emitted>, controls: Option<&Controls>, o
                     format!("{name} = {}", with_deviation(*v, std))
                 })
                 .collect();
-            table.add_row([
+            let mut row = vec![
                 s.effect.clone(),
                 parameters.join("\n"),
                 format!("{:.5}", s.heldout_rms),
-                format!("{:.1e}", s.p_value),
-                s.indistinguishable_from.join("\n"),
-            ]);
+                match s.p_value < NO_CHANCE {
+                    true => "< 1e-12".to_owned(),
+                    false => number(s.p_value, 2),
+                },
+            ];
+            row.extend(rivals.then(|| s.indistinguishable_from.join("\n")));
+            table.add_row(row);
         }
         super::terminal::show(&table);
     }
@@ -352,6 +360,9 @@ fn print(c: &Closure, compared: Option<&Emitted>, controls: Option<&Controls>, o
     }
     say!("wrote {}", out.display());
 }
+
+/// Below it a chance's digits say nothing: the noise's law is not known so far out.
+const NO_CHANCE: f64 = 1e-12;
 
 /// A number with as many places as its standard deviation has at two digits.
 fn with_deviation(value: f64, std: f64) -> String {

@@ -12,6 +12,7 @@ use crate::equivalence::shrink;
 use crate::error::{Error, Result};
 use crate::output::{Results, name_of};
 use crate::record::capture::CaptureReader;
+use crate::text::number;
 use crate::timing;
 use std::path::{Path, PathBuf};
 
@@ -229,7 +230,8 @@ fn print_spurs(e: &Equivalence) {
     };
     let db = |level: Option<f64>| level.map_or("none".to_owned(), |l| format!("{l:.2} dBc"));
     say!(
-        "NCO at {:.3} Hz: worst spur {} (predicted {}), {} in all; with the design's quadrature a tone of {:.3e} deg/s",
+        "The NCO at {:.3} Hz has its worst spur at {} (predicted {}), of {} in all. With the design's quadrature the spurs make \
+         a tone of {} deg/s in the rate.",
         s.carrier_hz,
         db(measured.sfdr_dbc.map(|l| -l)),
         db(
@@ -239,7 +241,7 @@ fn print_spurs(e: &Equivalence) {
             }
         ),
         measured.spurs,
-        s.quadrature_tone_dps
+        number(s.quadrature_tone_dps, 3)
     );
 }
 
@@ -252,7 +254,7 @@ fn row(n: &NodeReport) -> Vec<String> {
         lsb(n.bound),
         lsb(n.rms_error),
         some(n.predicted_rms),
-        format!("{:.3e} {}", n.lsb, n.unit),
+        format!("{} {}", number(n.lsb, 3), n.unit),
         n.headroom_bits.map_or("-".into(), |b| format!("{b:.2}")),
         n.overflows.to_string(),
         n.flags.join(" "),

@@ -10,6 +10,7 @@ use crate::job;
 use crate::job::bound::Line;
 use crate::job::outcome::{Drift, Outcome};
 use crate::output::Results;
+use crate::text::number;
 use crate::timing;
 use std::path::PathBuf;
 
@@ -197,7 +198,7 @@ fn alternative(line: &Line) -> alternatives::Line<'_> {
         detail: &line.detail,
         cost: line.cost,
         errors: vec![
-            format!("{:.4e}", line.certified_max_dps),
+            format!("{}", number(line.certified_max_dps, 5)),
             format!("{:.3}", line.certified_max_lsb),
         ],
         undominated: line.undominated,

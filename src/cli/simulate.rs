@@ -10,6 +10,7 @@ use crate::simulation::hunting::Hunting;
 use crate::simulation::outcome::{Both, Outcome};
 use crate::simulation::trace::Wanted;
 use crate::simulation::{self, Course, Request, record_csv};
+use crate::text::number;
 use crate::timing;
 use std::path::{Path, PathBuf};
 
@@ -212,30 +213,32 @@ fn print_sentences(outcome: &Outcome) {
     let s = &outcome.summary;
     let a = &s.float_fixed;
     say!(
-        "{} readings, drive at {}; float and fixed are at most {:.2e} rad, {:.2e} Hz, {:.2e} deg/s (uncompensated) apart",
+        "{} readings, drive at {}. The fixed-point chain is at most {} rad, {} Hz and {} deg/s (before compensation) from the \
+         same chain in floating point.",
         s.readings,
         s.drive.replace('_', " "),
-        a.phase_rad,
-        a.freq_hz,
-        a.rate_out_dps
+        number(a.phase_rad, 3),
+        number(a.freq_hz, 3),
+        number(a.rate_out_dps, 3)
     );
     if let Some(lock) = &s.lock {
         say!(
-            "phase loop: {}, mean phase within {:.2e} rad of the setpoint, frequency within {:.2e} Hz of the resonance, {:.2} ppm/K",
+            "The phase loop is {}. Its mean phase is within {} rad of the setpoint, its frequency within {} Hz of the resonance, \
+             and that frequency moves by {:.2} ppm/K.",
             if lock.locked {
                 "locked everywhere"
             } else {
                 "not locked everywhere"
             },
-            lock.phase_error_rad,
-            lock.freq_error_hz,
+            number(lock.phase_error_rad, 3),
+            number(lock.freq_error_hz, 3),
             lock.tempco_ppm_per_k
         );
     }
     let time = |t: Option<f64>| t.map_or("not seen".to_owned(), |t| format!("{:.0} ms", 1e3 * t));
     let up = &s.startup;
     say!(
-        "power-on at {} degC: amplitude within 1 % after {}, phase within 0.1 deg after {}{}",
+        "After power-on at {} degC the amplitude is within 1 % after {}, the phase within 0.1 deg after {}{}.",
         up.chamber_degc,
         time(up.amplitude_s),
         time(up.phase_s),

@@ -11,6 +11,7 @@ use crate::study::journal;
 use crate::study::outcome::{Point, Study};
 use crate::study::progress::{Progress, Step};
 use crate::study::shard::Part;
+use crate::text::number;
 use crate::timing;
 use std::path::PathBuf;
 use std::sync::Mutex;
@@ -189,12 +190,12 @@ fn row(p: &Point, targets: &[String]) -> Vec<String> {
         row.push(format!("{:.1}", 100.0 * part));
     }
     row.extend([
-        format!("{:.2e}", p.bias_error_dps),
-        format!("{:.2e}", p.drift_residual_dps),
-        format!("{:.2e}", p.noise_dps_rthz),
-        format!("{:.2e}", p.arw_deg_rth),
+        format!("{}", number(p.bias_error_dps, 3)),
+        format!("{}", number(p.drift_residual_dps, 3)),
+        format!("{}", number(p.noise_dps_rthz, 3)),
+        format!("{}", number(p.arw_deg_rth, 3)),
         format!("{:.1}", p.scale_factor_ppm),
-        format!("{:.2e}", p.spur_dps),
+        format!("{}", number(p.spur_dps, 3)),
         format!("{:.3}", p.merit),
         p.limited_by.to_owned(),
     ]);

@@ -8,6 +8,7 @@ use crate::design::{Compensation, Design, Outside};
 use crate::error::{Error, InputError, Result};
 use crate::tabulate::choice;
 use crate::tabulate::describe;
+use crate::text::number;
 use serde::Serialize;
 
 /// Words that are all run; of more, as many evenly spread.
@@ -280,12 +281,12 @@ pub fn sentences(design: &Design, bounds: &Bounds) -> Vec<String> {
         ""
     };
     let mut lines = vec![format!(
-        "bias against the {against}: at most {} (proved{unless}): coefficients {:.3e}, evaluation {:.3e}, \
-         output {:.3e} deg/s",
+        "The firmware's bias is at most {} from the {against} (proved{unless}). Of this the coefficients' words make {}, the \
+         rounding of the steps {} and that of the output {} deg/s.",
         figure(design, bounds.certified_max_dps),
-        bounds.coefficients_dps,
-        bounds.evaluation_dps,
-        bounds.output_dps
+        number(bounds.coefficients_dps, 3),
+        number(bounds.evaluation_dps, 3),
+        number(bounds.output_dps, 3)
     )];
     if let Some(asked) = design.bound {
         let covered = bounds.certified_max_dps + output_rounding_dps(c);
@@ -295,9 +296,10 @@ pub fn sentences(design: &Design, bounds: &Bounds) -> Vec<String> {
             "NOT kept"
         };
         lines.push(format!(
-            "asked: bias and rate within {} deg/s of it at every calibrated input; with the rounding of the rate they are \
-             within {covered:.3e}: {word}",
-            asked.bound_dps
+            "Bias and rate were asked to be within {} deg/s of it at every calibrated input. With the rounding of the rate \
+             they are within {}: {word}.",
+            asked.bound_dps,
+            number(covered, 3)
         ));
     }
     if let Some(form) = c.form.as_ref() {
@@ -307,8 +309,10 @@ pub fn sentences(design: &Design, bounds: &Bounds) -> Vec<String> {
     }
     if let Some(fitted) = &c.fitted {
         lines.push(format!(
-            "the fit itself: noise {:.3e} deg/s (one standard deviation), held-out rms {:.3e} deg/s",
-            fitted.std_max_dps, fitted.heldout_rms_dps
+            "The fitted polynomial itself is uncertain by {} deg/s (one standard deviation). Rows that the fit has not seen are \
+             {} deg/s rms from it.",
+            number(fitted.std_max_dps, 3),
+            number(fitted.heldout_rms_dps, 3)
         ));
     }
     if let Some((low, high)) = c.flagged_range() {
@@ -319,8 +323,10 @@ pub fn sentences(design: &Design, bounds: &Bounds) -> Vec<String> {
     }
     if let Some(outside) = &bounds.outside {
         lines.push(format!(
-            "outside the calibrated inputs ({}): at most {:.3e} deg/s from the polynomial continued to every input",
-            outside.contract, outside.worst_dps
+            "Outside the calibrated inputs the contract is {}: there the bias is up to {} deg/s from the polynomial, \
+             continued to every input.",
+            outside.contract,
+            number(outside.worst_dps, 3)
         ));
     }
     lines
@@ -330,13 +336,13 @@ pub fn sentences(design: &Design, bounds: &Bounds) -> Vec<String> {
 pub fn run_sentence(design: &Design, certainty: &Certainty) -> String {
     let c = certainty;
     format!(
-        "run over {}{} calibrated inputs: at most {}, at input {}{}",
+        "Run over {}{} calibrated inputs, it is at most {} from the polynomial, at input word {}{}.",
         if c.exhaustive { "all " } else { "" },
         c.inputs_checked,
         figure(design, c.exhaustive_max_dps),
         c.at_input_raw,
         if c.saturates {
-            ": a word saturates"
+            "; a word saturates"
         } else {
             ""
         }
@@ -351,7 +357,8 @@ fn output_rounding_dps(c: &Compensation) -> f64 {
 fn figure(design: &Design, dps: f64) -> String {
     let output = design.compensation.as_ref().map(|c| c.output.format.lsb());
     format!(
-        "{dps:.3e} deg/s ({:.3} output LSB)",
-        dps / output.unwrap_or(1.0)
+        "{dps} deg/s ({:.3} output LSB)",
+        dps / output.unwrap_or(1.0),
+        dps = number(dps, 3)
     )
 }

@@ -3,6 +3,7 @@
 use super::curve::name;
 use super::plan::{Plan, Term};
 use super::run::Correction;
+use crate::text::number;
 
 /// The plan and its words, one line each: how it is called, its inputs, its terms, its bound.
 pub fn facts(correction: &Correction) -> Vec<String> {
@@ -10,8 +11,10 @@ pub fn facts(correction: &Correction) -> Vec<String> {
     let mut facts = vec![
         called(plan),
         format!(
-            "rate {} deg/s in and out, sum of the terms on 2^-{} deg/s, for a noise of {:.3e} deg/s rms",
-            formats.rate, formats.sum_fraction_bits, formats.noise_dps
+            "rate {} deg/s in and out, sum of the terms on 2^-{} deg/s, for a noise of {} deg/s rms",
+            formats.rate,
+            formats.sum_fraction_bits,
+            number(formats.noise_dps, 3)
         ),
     ];
     let inputs = plan.inputs.iter().zip(&formats.inputs);
@@ -30,9 +33,8 @@ pub fn facts(correction: &Correction) -> Vec<String> {
         false => "",
     };
     facts.push(format!(
-        "at most {:.2e} deg/s from these terms in real numbers (analysis), where no word saturates{relay}",
-        correction.bound_dps()
-    ));
+        "at most {} deg/s from these terms in real numbers (analysis), where no word saturates{relay}",
+        number(correction.bound_dps(), 3)));
     facts
 }
 

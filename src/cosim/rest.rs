@@ -6,6 +6,7 @@ use crate::design::Design;
 use crate::error::{InputError, Result};
 use crate::numeric::format::pow2;
 use crate::plant::Gyroscope;
+use crate::text::number;
 use std::f64::consts::TAU;
 
 /// The steady state of the closed loop.
@@ -184,9 +185,8 @@ pub fn settling_rows(design: &Design) -> Result<usize> {
         let constant_s = l.slowest_s();
         if constant_s > 10.0 {
             return Err(InputError::new(format!(
-                "circuit.{name} takes {constant_s:.0} s to settle, or never does: its loop gains are {:.3e} (proportional) and {:.3e}/s (integral)",
-                l.proportional, l.integral_per_s
-            ))
+                "circuit.{name} takes {constant_s:.0} s to settle, or never does: its loop gains are {} (proportional) and {}/s (integral)",
+                number(l.proportional, 3), number(l.integral_per_s, 3)))
             .help("both gains have to be positive; raise `integral`, or lower its shift")
             .into());
         }

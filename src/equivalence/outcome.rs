@@ -148,12 +148,12 @@ impl FirstOverflow {
     pub fn sentence(&self) -> String {
         let operands: Vec<String> = self.operands.iter().map(i128::to_string).collect();
         let mut text = format!(
-            "overflow at sample {} in {}: raw value {} does not fit {} (operands {})",
+            "overflow at sample {} in {}: the raw word {} does not fit {} (it was made of the raw words {})",
             self.sample,
             self.node,
             self.value,
             self.format,
-            operands.join(", ")
+            operands.join(" and ")
         );
         match &self.repair {
             Some(r) => text += &format!("; smallest repair: {} from {} to {}", r.key, r.from, r.to),

@@ -17,6 +17,7 @@ use crate::design::{BiasBound, Compensation, CompensationInput, Design, limits};
 use crate::error::{InputError, Result};
 use crate::numeric::format::Format;
 use crate::tabulate::choice;
+use crate::text::number;
 use crate::thermal::BaselineFit;
 use serde::Serialize;
 
@@ -185,8 +186,8 @@ fn refuse_coarse_words(design: &Design, fit: &BaselineFit, asked: BiasBound) -> 
         };
         return Err(InputError::new(format!(
             "compensation.bound_dps = {bound} cannot be kept: half a step of the thermometer's word moves the bias by \
-             {half_step:.3e} deg/s"
-        ))
+             {half_step} deg/s"
+        , half_step = number(half_step, 3)))
         .help(help)
         .into());
     }
@@ -201,9 +202,9 @@ fn refuse_coarse_words(design: &Design, fit: &BaselineFit, asked: BiasBound) -> 
         .find(|f| rounding / format.lsb() * (-f64::from(*f)).exp2() < bound)
         .unwrap_or(WIDEST_BITS);
     Err(InputError::new(format!(
-        "compensation.bound_dps = {bound} cannot be kept: rounding bias and rate to {format} costs {rounding:.3e} deg/s, \
+        "compensation.bound_dps = {bound} cannot be kept: rounding bias and rate to {format} costs {rounding} deg/s, \
          whatever the coefficients"
-    ))
+    , rounding = number(rounding, 3)))
     .help(format!(
         "give `compensation.output` at least {needed} fraction bits, or a wider bound"
     ))
@@ -243,7 +244,7 @@ fn polynomial_within(design: &Design, room: f64) -> Result<Reached> {
         return Ok(Reached::Not(unreached(design, c, room, Some(&finer))?));
     }
     let said = format!(
-        "coefficients {} and accumulator {} for the bound, instead of {} and {}",
+        "coefficients {} and accumulator {}, which keep the bound; {} and {} do not",
         finer.coefficient_format,
         finer.accumulator.format,
         c.coefficient_format,
@@ -331,9 +332,12 @@ fn unreached(
     let has = bounds_of(design, c)?.map_or(f64::INFINITY, |b| b.certified_max_dps);
     let bound = design.bound.map_or(f64::NAN, |b| b.bound_dps);
     let message = format!(
-        "compensation.bound_dps = {bound} is not kept: coefficients {} and accumulator {} leave {has:.3e} deg/s, where the \
-         rounding of the rate leaves room for {room:.3e}",
-        c.coefficient_format, c.accumulator.format
+        "compensation.bound_dps = {bound} is not kept: coefficients {} and accumulator {} leave {has} deg/s, where the \
+         rounding of the rate leaves room for {room}",
+        c.coefficient_format,
+        c.accumulator.format,
+        has = number(has, 3),
+        room = number(room, 3)
     );
     Ok(InputError::new(message).help(match finer {
         Some(f) => format!(

@@ -8,6 +8,7 @@ use crate::design::{
 use crate::error::{InputError, Result};
 use crate::numeric::format::{Format, Overflow, Quantizer, Rounding};
 use crate::record::ThermalRecord;
+use crate::text::number;
 use crate::thermal::BaselineFit;
 
 /// Bits of a chosen coefficient and of a chosen output.
@@ -190,7 +191,8 @@ fn tuning_word(design: &Design, fit: &BaselineFit) -> (CompensationInput, Vec<St
     };
     let said = vec![format!(
         "input tuning_word: the phase loop holds the phase, the frequency is the thermometer; a step is \
-         {step_hz:.3e} Hz"
+         {step_hz} Hz",
+        step_hz = number(step_hz, 3)
     )];
     (CompensationInput::TuningWord(input), said)
 }

@@ -97,7 +97,11 @@ impl OwnRun {
         if (nco_hz / drive_hz - 1.0).abs() > 1e-3 {
             warnings.push(warning(
                 "excitation_off_resonance",
-                format!("the NCO runs at {nco_hz:.3} Hz, the gyro resonates at {drive_hz} Hz"),
+                format!(
+                    "the NCO runs at {nco_hz:.3} Hz, but the gyro resonates at {drive_hz} Hz. It is driven beside its \
+                     resonance, so that its amplitude is small and its phase off. Set the NCO's tuning word to the \
+                     resonance, or use a phase loop"
+                ),
             ));
         }
         let nominal = nominal_full_scale_dps(design);

@@ -35,9 +35,9 @@ impl std::fmt::Display for Overflowed {
             .collect();
         write!(
             f,
-            ": raw value {} does not fit (operands {}",
+            ": the raw word {} does not fit (it was made of the raw words {}",
             self.value,
-            operands.join(", ")
+            operands.join(" and ")
         )?;
         if let (Some(shift @ 1..), Some(first)) = (self.coefficient_shift, self.operands[0]) {
             let raw = first >> shift;

@@ -10,6 +10,7 @@ use super::thermal::ThermalRecord;
 use super::warning::Warning;
 use super::{scale, timing};
 use crate::statistics::stats;
+use crate::text::number;
 use std::f64::consts::{PI, TAU};
 
 /// Adds a warning for each column whose values are unlikely.
@@ -194,10 +195,12 @@ fn at_rest(c: &Column<'_>) -> Option<Warning> {
     if by_lsb || (NO_NOISE_DPS_RTHZ..QUIETEST_DPS_RTHZ).contains(&density) {
         let why = match (by_lsb, lsb) {
             (true, Some(step)) => format!(
-                "moves in steps of {step:.4e}, which is a gyro's LSB in rad/s and not in deg/s"
+                "moves in steps of {step}, which is a gyro's LSB in rad/s and not in deg/s",
+                step = number(step, 5)
             ),
             _ => format!(
-                "has a noise of {noise_dps:.2e} deg/s at rows {period_s} s apart, less than any gyro in silicon"
+                "has a noise of {noise_dps} deg/s at rows {period_s} s apart, less than any gyro in silicon",
+                noise_dps = number(noise_dps, 3)
             ),
         };
         return c.warn(

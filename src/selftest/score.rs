@@ -5,6 +5,7 @@ use super::scene::Scene;
 use super::statistics;
 use super::trial::{Colour, Mark};
 use super::{Case, Request, SIZES};
+use crate::text::number;
 use std::collections::BTreeMap;
 
 /// The size that has to be found, in half of the records at least.
@@ -152,9 +153,9 @@ pub(super) fn failures(effects: &[EffectScore], alarms: &FalseAlarms) -> Vec<Str
     let chance = statistics::binomial_at_least(alarms.alarms, alarms.records, PROMISED);
     if chance < CHANCE {
         out.push(format!(
-            "{} of {} records without an effect get a name: more than the promised 1 in 100 (probability {chance:.1e})",
+            "{} of {} records without an effect get a name: more than the promised 1 in 100 (probability {chance})",
             alarms.alarms, alarms.records
-        ));
+        , chance = number(chance, 2)));
     }
     out
 }

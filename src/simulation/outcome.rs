@@ -9,6 +9,7 @@ use crate::cosim::rest;
 use crate::design::Design;
 use crate::job::calibration::Calibration;
 use crate::record::Warning;
+use crate::text::number;
 use crate::trace_file::Trace;
 use serde::Serialize;
 use std::f64::consts::{PI, TAU};
@@ -213,9 +214,8 @@ impl Outcome {
             && !lock.locked
         {
             failures.push(format!(
-                "the phase loop does not lock everywhere: phase error up to {:.3e} rad, frequency error up to {:.3e} Hz",
-                lock.phase_error_rad, lock.freq_error_hz
-            ));
+                "the phase loop does not lock everywhere: its phase is up to {} rad off, its frequency up to {} Hz",
+                number(lock.phase_error_rad, 3), number(lock.freq_error_hz, 3)));
         }
         failures
     }
@@ -328,7 +328,8 @@ fn warnings(parts: &Parts) -> Vec<Warning> {
         warnings.push(Warning::general(
             "drive_adc_full",
             format!(
-                "the drive's amplitude is {largest:.0} LSB, the ADC ends at {adc:.0}: it clips"
+                "the drive's amplitude is {largest:.0} LSB, and the ADC ends at {adc:.0}. The drive's codes clip, and what follows \
+                 them is not the gyro's. Give the ADC more bits or a wider range"
             ),
         ));
     }
@@ -337,7 +338,11 @@ fn warnings(parts: &Parts) -> Vec<Warning> {
     if (hz / drive_hz - 1.0).abs() > 1e-3 {
         warnings.push(Warning::general(
             "excitation_off_resonance",
-            format!("the NCO runs at {hz:.3} Hz, the gyro resonates at {drive_hz} Hz"),
+            format!(
+                "the NCO runs at {hz:.3} Hz, but the gyro resonates at {drive_hz} Hz. It is driven beside its resonance, so \
+                 that its amplitude is small and its phase off. Set the NCO's tuning word to the resonance, or use a phase \
+                 loop"
+            ),
         ));
     }
     if let Some((_, calibration)) = &parts.calibrated {

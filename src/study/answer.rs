@@ -14,6 +14,7 @@ use crate::cost::{self, Cost};
 use crate::design::word::Word;
 use crate::design::{Design, LimitName, Limits};
 use crate::parallel::in_parallel;
+use crate::text::number;
 use std::collections::BTreeMap;
 
 /// The answers.
@@ -356,8 +357,10 @@ fn why_not(work: &Reporting, required: &[Required], objective: usize) -> String 
                 (None, _) => String::new(),
             };
             format!(
-                "{} cannot be met: {:.3e} is required, {:.3e} the best{word}",
-                r.name, r.limit, r.best
+                "{} cannot be met: {} is required, {} the best{word}",
+                r.name,
+                number(r.limit, 3),
+                number(r.best, 3)
             )
         })
         .collect();

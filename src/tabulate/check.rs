@@ -10,6 +10,7 @@ use crate::approx::real::{Domain, Expression};
 use crate::approx::reference::Function;
 use crate::error::{InputError, Result};
 use crate::numeric::format::{Format, pow2};
+use crate::text::number;
 
 /// The widest input and output: their codes are exact doubles.
 const WIDEST_BITS: u32 = 48;
@@ -225,7 +226,7 @@ fn readable(value: f64) -> String {
     match value.abs() {
         v if v < 1e-7 => "0".to_owned(),
         v if (1e-3..1e7).contains(&v) => format!("{value:.6}"),
-        _ => format!("{value:.4e}"),
+        _ => format!("{value}", value = number(value, 5)),
     }
 }
 

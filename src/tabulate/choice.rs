@@ -1,13 +1,15 @@
 //! Forms that meet a bound, and the cheapest of them.
 
-use super::coefficients;
+use super::coefficients::Degree;
 use super::describe;
 use super::outcome::Alternative;
 use super::priced;
-use super::request::Request;
+use super::request::{Request, Weight};
+use super::shortest::{fewest, polynomial_bits};
 use crate::approx::form::generate;
 use crate::approx::form::generate::{MOST_BIPARTITE_CODES, MOST_SEGMENTS};
 use crate::approx::form::measure::{Effort, Measured, Reference, measure};
+use crate::approx::form::polynomial;
 use crate::approx::form::polynomial::Monomials;
 use crate::approx::form::split::{Spacing, Split, Symmetry};
 use crate::approx::form::table::Kind;
@@ -25,9 +27,17 @@ const QUICK_SAMPLE: u128 = 1 << 12;
 /// Codes of a first look at a candidate.
 const FIRST_LOOK: u128 = 2000;
 /// The highest degree of a polynomial that is looked for.
-const HIGHEST_DEGREE: usize = 12;
-/// Fraction bits of entries beyond the output's.
-const GUARD_BITS: [u32; 4] = [1, 2, 3, 6];
+pub(super) const HIGHEST_DEGREE: usize = 12;
+/// Most fraction bits of entries beyond the output's.
+pub(super) const GUARD_BITS: u32 = 6;
+/// The same for bipartite tables, in the order of trial.
+const BIPARTITE_GUARD_BITS: [u32; 2] = [1, 3];
+/// Fraction bits fewer than those of the bound with which the search for the shortest words begins.
+const FAR_BELOW: f64 = 6.0;
+/// Finer coefficients that are tried besides the shortest: they may do with shorter steps.
+const FINER: usize = 2;
+/// More fraction bits than any word has.
+const WIDEST_BITS: u32 = 64;
 /// Pairs of sizes that are tried for a bipartite table.
 const PAIRS: usize = 12;
 
@@ -143,26 +153,13 @@ pub fn candidates(
     wanted: Wanted,
 ) -> Result<Vec<Candidate>> {
     let mut found = Vec::new();
-    let search = Search {
-        function,
-        codes,
-        output: request.output,
-        fraction_bits: request.coefficients.first().map(|f| f.fraction_bits),
-        symmetry: generate::symmetry(function, codes),
-        target: request.target,
-        bound,
-    };
+    let search = Search::new(function, codes, request, bound);
     if wanted.polynomial {
         found.extend(polynomials(&search, request));
     }
     if wanted.table {
-        let kinds = match request.degree {
-            Some(0) => vec![Kind::Plain],
-            Some(1) => vec![Kind::Linear],
-            Some(_) => vec![Kind::Quadratic],
-            None => vec![Kind::Plain, Kind::Linear, Kind::Quadratic],
-        };
-        found.extend(kinds.into_iter().filter_map(|kind| search.table(kind)));
+        let kinds = kinds(request.degree).into_iter();
+        found.extend(kinds.filter_map(|kind| search.table(kind)));
         if request.degree.is_none_or(|d| d == 0) {
             found.extend(search.bipartite());
         }
@@ -176,6 +173,16 @@ pub fn candidates(
         }
     }
     Ok(found)
+}
+
+/// The kinds of tables that a degree means.
+pub(super) fn kinds(degree: Option<usize>) -> Vec<Kind> {
+    match degree {
+        Some(0) => vec![Kind::Plain],
+        Some(1) => vec![Kind::Linear],
+        Some(_) => vec![Kind::Quadratic],
+        None => vec![Kind::Plain, Kind::Linear, Kind::Quadratic],
+    }
 }
 
 /// The cheapest on the target.
@@ -208,68 +215,134 @@ fn polynomials(search: &Search, request: &Request) -> Vec<Candidate> {
         None => 0..=HIGHEST_DEGREE,
     };
     let smallest = |kind: Monomials| {
-        degrees.clone().find_map(|degree| {
-            if kind != Monomials::All && degree % 2 != usize::from(kind == Monomials::Odd) {
-                return None;
-            }
-            let form = coefficients::polynomial_within(
-                search.function,
-                search.codes,
-                request,
-                kind,
-                degree,
-                search.bound,
-            )?;
-            Candidate::within(form, search.function, search.target, search.bound)
+        let degrees = degrees.clone().filter(|d| has_degree(kind, *d));
+        { degrees }.find_map(|degree| {
+            let degree = Degree::new(search.function, request, kind, degree)?;
+            search.polynomial(&degree, request)
         })
     };
     kinds.into_iter().filter_map(smallest).collect()
 }
 
+/// Odd and even polynomials have a highest order of their kind.
+pub(super) fn has_degree(kind: Monomials, degree: usize) -> bool {
+    kind == Monomials::All || degree % 2 == usize::from(kind == Monomials::Odd)
+}
+
 /// What all searches have in common.
-struct Search<'a> {
+pub(super) struct Search<'a> {
     function: &'a Function,
     codes: Codes,
     output: Format,
     fraction_bits: Option<u32>,
-    symmetry: Option<Symmetry>,
+    pub(super) symmetry: Option<Symmetry>,
     target: Target,
     bound: f64,
 }
 
-impl Search<'_> {
-    fn guards(&self) -> Vec<u32> {
-        match self.fraction_bits {
-            Some(bits) => vec![bits],
-            None => GUARD_BITS.map(|g| self.output.fraction_bits + g).to_vec(),
+impl<'a> Search<'a> {
+    pub(super) fn new(function: &'a Function, codes: Codes, request: &Request, bound: f64) -> Self {
+        Search {
+            function,
+            codes,
+            output: request.output,
+            fraction_bits: request.coefficients.first().map(|f| f.fraction_bits),
+            symmetry: generate::symmetry(function, codes),
+            target: request.target,
+            bound,
         }
     }
 
+    /// Most fraction bits of coefficients or entries, so many beyond the output's if none are given.
+    pub(super) fn most(&self, beyond: u32) -> u32 {
+        self.fraction_bits
+            .unwrap_or(self.output.fraction_bits + beyond)
+    }
+
+    /// Where to begin to look for fraction bits: with fewer, half an LSB is far above the bound.
+    fn least(&self) -> u32 {
+        let bits = (-self.bound.log2()).ceil() - FAR_BELOW;
+        bits.clamp(0.0, f64::from(WIDEST_BITS)) as u32
+    }
+
+    /// `finest` with the fewest fraction bits, of those below `most`, that keep to the bound.
+    fn shortest(
+        &self,
+        finest: Candidate,
+        most: u32,
+        make: &dyn Fn(u32) -> Option<Form>,
+    ) -> Candidate {
+        if self.fraction_bits.is_some() {
+            return finest;
+        }
+        let at = |bits: u32| self.meets(make(bits));
+        fewest(self.least(), most, &at).map_or(finest, |(_, candidate)| candidate)
+    }
+
+    /// The polynomial of a degree with the shortest words: of the shortest coefficients and some finer ones, each with the
+    /// shortest steps, the cheapest; of equals the one with fewer bits.
+    fn polynomial(&self, degree: &Degree, request: &Request) -> Option<Candidate> {
+        let room = match request.weight {
+            Weight::Absolute => self.bound - 0.5 * self.output.lsb(),
+            // Errors are in parts of the function there.
+            Weight::Relative => f64::INFINITY,
+        };
+        if degree.least_error() >= room {
+            return None;
+        }
+        let at = |bits: u32| {
+            let ideal = degree.within(bits, room)?;
+            let form = degree.evaluation(self.codes, ideal)?;
+            self.meets(Some(Form::Polynomial(Box::new(form))))
+        };
+        let most = degree.most_fraction_bits();
+        let finest = at(most)?;
+        let mut found = match self.fraction_bits {
+            Some(_) => vec![finest],
+            None => {
+                let (bits, one) = fewest(self.least(), most, &at).unwrap_or((most, finest));
+                let finer = (bits + 1..=most).take(FINER).filter_map(at);
+                [one].into_iter().chain(finer).collect()
+            }
+        };
+        if request.intermediate.is_none() {
+            found = found.into_iter().map(|c| self.short_steps(c)).collect();
+        }
+        { found.into_iter() }.min_by_key(|c| (c.cost.price(), polynomial_bits(&c.settled.form)))
+    }
+
+    /// The same polynomial with steps rounded to as few fraction bits as keep to the bound.
+    fn short_steps(&self, finest: Candidate) -> Candidate {
+        let Form::Polynomial(p) = &finest.settled.form else {
+            return finest;
+        };
+        let p = p.as_ref();
+        let at = |bits: u32| {
+            let form = polynomial::rounded_to(p, bits as i32)?;
+            self.meets(Some(Form::Polynomial(Box::new(form))))
+        };
+        let widest = p.formats.intermediate.fraction_bits.max(0) as u32;
+        let shorter = fewest(self.least(), widest, &at);
+        shorter.map_or_else(|| finest.clone(), |(_, candidate)| candidate)
+    }
+
     /// Logarithm of the number of codes, up to which segments can grow.
-    fn width(&self) -> u32 {
+    pub(super) fn width(&self) -> u32 {
         128 - (self.codes.count() - 1).leading_zeros()
     }
 
-    fn meets(&self, form: Option<Form>) -> Option<Candidate> {
+    pub(super) fn meets(&self, form: Option<Form>) -> Option<Candidate> {
         Candidate::within(form?, self.function, self.target, self.bound)
     }
 
     /// The longest segments that meet the bound, with the fewest fraction bits that do: errors grow with
     /// the segments' length.
-    fn longest(
-        &self,
-        make: &dyn Fn(Split, u32) -> Option<Form>,
-        guards: &[u32],
-    ) -> Option<Candidate> {
-        let (most, fewer) = guards.split_last()?;
-        let best = self.longest_with(make, *most)?;
-        let Some(split) = best.settled.form.split() else {
+    fn longest(&self, make: &dyn Fn(Split, u32) -> Option<Form>, most: u32) -> Option<Candidate> {
+        let best = self.longest_with(make, most)?;
+        let Some(split) = best.settled.form.split().cloned() else {
             return Some(best);
         };
-        let smaller = fewer
-            .iter()
-            .find_map(|guard| self.meets(make(split.clone(), *guard)));
-        Some(smaller.unwrap_or(best))
+        Some(self.shortest(best, most, &|bits| make(split.clone(), bits)))
     }
 
     fn longest_with(
@@ -298,21 +371,21 @@ impl Search<'_> {
     }
 
     fn table(&self, kind: Kind) -> Option<Candidate> {
-        let guards = match (kind, self.fraction_bits) {
-            (Kind::Plain, None) => vec![self.output.fraction_bits],
-            _ => self.guards(),
+        let most = match kind {
+            Kind::Plain => self.most(0),
+            _ => self.most(GUARD_BITS),
         };
         let make = |split: Split, fraction_bits| {
             generate::table(self.function, split, kind, self.output, fraction_bits)
         };
-        self.longest(&make, &guards)
+        self.longest(&make, most)
     }
 
     fn uniform(&self, degree: usize) -> Option<Candidate> {
         let make = |split: Split, fraction_bits| {
             generate::piecewise(self.function, split, degree, self.output, fraction_bits)
         };
-        self.longest(&make, &self.guards())
+        self.longest(&make, self.most(GUARD_BITS))
     }
 
     /// The code from which power-of-two segments go outward: 0 if that is the middle of a symmetry or an end of
@@ -337,14 +410,13 @@ impl Search<'_> {
             let spacing = Spacing::PowerOfTwo { steps };
             let split = Split::new(self.codes, symmetry, spacing);
             let (f, output) = (self.function, self.output);
-            self.meets(generate::piecewise(f, split, degree, output, fraction_bits))
+            generate::piecewise(f, split, degree, output, fraction_bits)
         };
-        let guards = self.guards();
-        let (most, fewer) = guards.split_last()?;
+        let most = self.most(GUARD_BITS);
         let possible = (1..=4u32).filter(|steps| self.width() >= 1 << steps);
-        let (steps, best) = { possible }.find_map(|k| with(k, *most).map(|c| (k, c)))?;
-        let smaller = fewer.iter().find_map(|guard| with(steps, *guard));
-        Some(smaller.unwrap_or(best))
+        let meets = |k: u32| self.meets(with(k, most)).map(|c| (k, c));
+        let (steps, best) = { possible }.find_map(meets)?;
+        Some(self.shortest(best, most, &|bits| with(steps, bits)))
     }
 
     /// The smallest pair of tables that meets the bound.
@@ -361,37 +433,29 @@ impl Search<'_> {
             }
         }
         sizes.sort_unstable();
+        let with = |k: usize, fraction_bits: u32| {
+            let (_, middle, low) = sizes[k];
+            let (f, symmetry, output) = (self.function, self.symmetry, self.output);
+            let sizes = (middle, low);
+            generate::bipartite(f, self.codes, symmetry, sizes, output, fraction_bits)
+        };
         // A bound near half an LSB is out of reach, and small pairs are far from it: bisect first.
-        self.guards()
-            .into_iter()
-            .step_by(2)
-            .find_map(|fraction_bits| {
-                let at = |k: usize| {
-                    let (_, middle, low) = sizes[k];
-                    let sizes = (middle, low);
-                    let (f, symmetry) = (self.function, self.symmetry);
-                    let form = generate::bipartite(
-                        f,
-                        self.codes,
-                        symmetry,
-                        sizes,
-                        self.output,
-                        fraction_bits,
-                    );
-                    self.meets(form)
-                };
-                let (mut low, mut high) = (0, sizes.len());
-                let mut best = None;
-                while low < high {
-                    let k = (low + high) / 2;
-                    match at(k) {
-                        Some(candidate) => (best, high) = (Some(candidate), k),
-                        None => low = k + 1,
-                    }
+        BIPARTITE_GUARD_BITS.into_iter().find_map(|beyond| {
+            let most = self.most(beyond);
+            let at = |k: usize| self.meets(with(k, most)).map(|c| (k, c));
+            let (mut low, mut high) = (0, sizes.len());
+            let mut best = None;
+            while low < high {
+                let k = (low + high) / 2;
+                match at(k) {
+                    Some(found) => (best, high) = (Some(found), k),
+                    None => low = k + 1,
                 }
-                // Not quite monotone: look a little below.
-                let start = high.saturating_sub(PAIRS);
-                (start..high).find_map(at).or(best)
-            })
+            }
+            // Not quite monotone: look a little below.
+            let start = high.saturating_sub(PAIRS);
+            let (k, finest) = (start..high).find_map(at).or(best)?;
+            Some(self.shortest(finest, most, &|bits| with(k, bits)))
+        })
     }
 }

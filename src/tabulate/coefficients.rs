@@ -18,8 +18,8 @@ use crate::numeric::cast::Target as Quantised;
 use crate::numeric::format::Format;
 use crate::numeric::trace::ir::Interval;
 
-/// Fraction bits beyond the output's that are tried for coefficients.
-const GUARD_BITS: [u32; 4] = [0, 2, 4, 8];
+/// Most fraction bits of coefficients beyond the output's.
+const GUARD_BITS: u32 = 8;
 
 /// Fraction bits that the search's intermediate does without.
 const SPARE_BITS: i32 = 4;
@@ -64,7 +64,8 @@ fn spread(raw: &[i128], kind: Monomials, degree: usize) -> Vec<i128> {
     all
 }
 
-/// The best coefficients in the format for the whole evaluation.
+/// The best coefficients in the format for the whole evaluation. Without a format of the request's own for them, steps
+/// are rounded to `fraction_bits` if that is given, else to so many that nothing is lost.
 ///
 /// # Errors
 /// A coefficient that the format does not hold; a basis that cannot follow the function.
@@ -75,6 +76,7 @@ pub fn choose(
     kind: Monomials,
     degree: usize,
     coefficients: CoefficientFormats,
+    fraction_bits: Option<i32>,
 ) -> Result<Chosen> {
     let basis = basis(kind, degree)?;
     let each = coefficients.each(kind, degree).into_iter();
@@ -102,8 +104,9 @@ pub fn choose(
     let mut formats = first.formats;
     if request.intermediate.is_none() {
         // Words a little shorter than the widest, for coefficients a little larger.
-        let spare = SPARE_BITS.min(formats.intermediate.fraction_bits.max(0));
-        formats.intermediate.fraction_bits -= spare;
+        let widest = formats.intermediate.fraction_bits;
+        let spared = widest - SPARE_BITS.min(widest.max(0));
+        formats.intermediate.fraction_bits = fraction_bits.map_or(spared, |f| f.min(spared));
     }
     let pattern = Polynomial::new(formats, kind, rounded)?;
     let settled = Form::Polynomial(Box::new(pattern)).settle()?;
@@ -248,65 +251,90 @@ fn shown(judged: &Judged) -> Compared {
     }
 }
 
-/// Coefficients whose ideal error leaves some of `room`, in the request's format or in the shortest that does.
-/// `None` if there are none.
-pub fn within(
-    function: &Function,
-    request: &Request,
-    kind: Monomials,
-    degree: usize,
-    room: f64,
-) -> Option<(Format, Vec<i128>)> {
-    let basis = basis(kind, degree).ok()?;
-    let (low, high) = function.domain();
-    let samples = Samples::new(function, &basis, low, high, weight(request)).ok()?;
-    let best_real = minimax::minimax(&samples).ok()?;
-    if best_real.error >= room {
-        return None;
-    }
-    let tried: Vec<u32> = match request.coefficients.first() {
-        Some(format) => vec![format.fraction_bits],
-        None => GUARD_BITS
-            .map(|g| request.output.fraction_bits + g)
-            .to_vec(),
-    };
-    tried.into_iter().find_map(|fraction_bits| {
-        let format = match request.coefficients.first() {
-            Some(format) => CoefficientFormat::from(*format),
-            None => CoefficientFormat::unlimited(fraction_bits as i32),
-        };
-        let problem = Problem::new(&samples, &best_real, &[format]).ok()?;
-        let best = problem.best(Budget { nodes: 200_000 }).ok()?;
-        if best.error >= room {
-            return None;
-        }
-        let range = best
-            .raw
-            .iter()
-            .map(|raw| Interval::point(*raw))
-            .reduce(Interval::join)?;
-        let integer_bits = (range.bits() as i32 - fraction_bits as i32).max(1) as u32;
-        let given = request.coefficients.first().copied();
-        let format = given.unwrap_or(Format::q(integer_bits, fraction_bits));
-        (format.bits() <= 64).then(|| (format, spread(&best.raw, kind, degree)))
-    })
+/// Best coefficients under ideal evaluation on so many fraction bits.
+#[derive(Debug, Clone)]
+pub struct Ideal {
+    /// With the integer bits that they need, or as given.
+    pub format: Format,
+    /// From order 0 to the degree.
+    pub raw: Vec<i128>,
+    /// Under ideal evaluation.
+    pub error: f64,
 }
 
-/// A polynomial for a bound: the best coefficients under ideal evaluation, in the format that is given or
-/// in the shortest that meets the bound.
-pub(super) fn polynomial_within(
-    function: &Function,
-    codes: Codes,
-    request: &Request,
+/// Polynomials of one degree, for any number of fraction bits of their coefficients.
+pub struct Degree<'a> {
+    request: &'a Request,
     kind: Monomials,
     degree: usize,
-    bound: f64,
-) -> Option<Form> {
-    let room = bound - 0.5 * request.output.lsb();
-    let (format, raw) = within(function, request, kind, degree, room)?;
-    Some(Form::Polynomial(Box::new(
-        compiled(codes, request, kind, format.into(), raw).ok()?,
-    )))
+    samples: Samples<'a>,
+    best_real: minimax::Minimax,
+}
+
+impl<'a> Degree<'a> {
+    /// `None` if such a polynomial cannot follow the function.
+    pub fn new(
+        function: &'a Function,
+        request: &'a Request,
+        kind: Monomials,
+        degree: usize,
+    ) -> Option<Self> {
+        let basis = basis(kind, degree).ok()?;
+        let (low, high) = function.domain();
+        let samples = Samples::new(function, &basis, low, high, weight(request)).ok()?;
+        let best_real = minimax::minimax(&samples).ok()?;
+        Some(Degree {
+            request,
+            kind,
+            degree,
+            samples,
+            best_real,
+        })
+    }
+
+    /// What real coefficients leave.
+    pub fn least_error(&self) -> f64 {
+        self.best_real.error
+    }
+
+    /// The finest coefficients that are tried.
+    pub fn most_fraction_bits(&self) -> u32 {
+        let given = self.request.coefficients.first();
+        given.map_or(self.request.output.fraction_bits + GUARD_BITS, |format| {
+            format.fraction_bits
+        })
+    }
+
+    /// The best coefficients on so many fraction bits, in the request's format if it has one.
+    pub fn on(&self, fraction_bits: u32) -> Option<Ideal> {
+        let given = self.request.coefficients.first().copied();
+        let format = match given {
+            Some(format) => CoefficientFormat::from(format),
+            None => CoefficientFormat::unlimited(fraction_bits as i32),
+        };
+        let problem = Problem::new(&self.samples, &self.best_real, &[format]).ok()?;
+        let best = problem.best(Budget { nodes: 200_000 }).ok()?;
+        let points = best.raw.iter().map(|raw| Interval::point(*raw));
+        let range = points.reduce(Interval::join)?;
+        let integer_bits = (range.bits() as i32 - fraction_bits as i32).max(1) as u32;
+        let format = given.unwrap_or(Format::q(integer_bits, fraction_bits));
+        (format.bits() <= 64).then(|| Ideal {
+            format,
+            raw: spread(&best.raw, self.kind, self.degree),
+            error: best.error,
+        })
+    }
+
+    /// The same, but only what leaves some of `room`.
+    pub fn within(&self, fraction_bits: u32, room: f64) -> Option<Ideal> {
+        self.on(fraction_bits).filter(|ideal| ideal.error < room)
+    }
+
+    /// Its evaluation in the request's formats.
+    pub(super) fn evaluation(&self, codes: Codes, ideal: Ideal) -> Option<Polynomial> {
+        let format = ideal.format.into();
+        compiled(codes, self.request, self.kind, format, ideal.raw).ok()
+    }
 }
 
 /// The evaluation in the request's formats.

@@ -125,7 +125,7 @@ fn a_proved_least_error_is_that_of_trying_everything_nearby() {
             let (low, high) = ((a / lsb).ceil() as i128, (b / lsb).floor() as i128);
             let codes = codes(request.input, low, high.min(request.input.max_raw()));
             let format = Format::q(3, own);
-            let chosen = choose(&f, codes, &request, kind, degree, format.into()).unwrap();
+            let chosen = choose(&f, codes, &request, kind, degree, format.into(), None).unwrap();
             let formats = Formats {
                 intermediate: Target::signed(62, chosen.form.formats.intermediate.fraction_bits),
                 ..chosen.form.formats

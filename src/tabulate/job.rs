@@ -1,12 +1,13 @@
 //! The job of `gyrogen approx`: from a request to a form, its proved error and its bundles.
 
 use super::check;
-use super::choice::{self, Candidate, Wanted};
+use super::choice::{self, Candidate};
 use super::coefficients::{self, Chosen};
 use super::describe;
 use super::ideal;
 use super::outcome::{ErrorBounds, Outcome};
 use super::priced;
+use super::refused;
 pub use super::request::{Asked, EXHAUSTIVE_CODES, MOST_CODES, Request, Weight};
 use crate::approx::form::coefficient_formats::CoefficientFormats;
 use crate::approx::form::measure::{Effort, Measured, SAMPLE, measure};
@@ -14,7 +15,7 @@ use crate::approx::form::polynomial::Monomials;
 use crate::approx::form::{Codes, Form, Settled, overflow};
 use crate::approx::reference::Function;
 use crate::digest::sha256;
-use crate::error::{Error, InputError, Result};
+use crate::error::Result;
 use crate::numeric::format::Format;
 
 /// The result: what is reported, and what is emitted.
@@ -139,19 +140,15 @@ fn choose(request: &Request, function: &Function, codes: Codes) -> Result<Choice
         (request.degree, request.form, request.bound)
     {
         let kind = request.monomials.unwrap_or_default();
-        let (form, search) = polynomial_as_asked(function, codes, request, kind, degree)?;
+        let (form, search) = polynomial_as_asked(function, codes, request, kind, degree, None)?;
         return Ok((form, Some(search), None));
     }
-    let wanted = Wanted {
-        polynomial: matches!(request.form, Asked::Polynomial | Asked::Auto),
-        table: matches!(request.form, Asked::Table | Asked::Auto),
-        piecewise: matches!(request.form, Asked::Piecewise | Asked::Auto),
-    };
+    let wanted = refused::wanted(request.form);
     // A degree alone for segments: as many as keep the error within one LSB.
     let bound = request.bound.unwrap_or(request.output.lsb());
     let candidates = choice::candidates(function, codes, request, bound, wanted)?;
     let Some(chosen) = choice::cheapest(&candidates) else {
-        return Err(unmet(request, bound));
+        return Err(refused::unmet(function, codes, request, bound, wanted));
     };
     let mut form = candidates[chosen].settled.form.clone();
     let mut search = None;
@@ -161,7 +158,9 @@ fn choose(request: &Request, function: &Function, codes: Codes) -> Result<Choice
             coefficients: p.formats.coefficients.each(p.monomials, degree),
             ..request.clone()
         };
-        let (better, found) = polynomial_as_asked(function, codes, &asked, p.monomials, degree)?;
+        let steps = Some(p.formats.intermediate.fraction_bits);
+        let (better, found) =
+            polynomial_as_asked(function, codes, &asked, p.monomials, degree, steps)?;
         // The search is for the least error: the same degree, the same formats.
         (form, search) = (better, Some(found));
     }
@@ -169,36 +168,21 @@ fn choose(request: &Request, function: &Function, codes: Codes) -> Result<Choice
     Ok((form, search, listed))
 }
 
-fn unmet(request: &Request, bound: f64) -> Error {
-    let half = request.output.lsb() / 2.0;
-    let help = if bound <= half {
-        format!(
-            "rounding to {} alone costs half an LSB, {half:e}: give the output more fraction bits",
-            request.output
-        )
-    } else {
-        "give a wider bound, or output, coefficients or degree more room".into()
-    };
-    InputError::new(format!(
-        "no form of the kind that was asked for has a certified error of at most {bound:e}"
-    ))
-    .help(help)
-    .into()
-}
-
-/// The polynomial of the request, with the best coefficients that the search finds.
+/// The polynomial of the request, with the best coefficients that the search finds. `steps`: fraction bits that its steps
+/// are rounded to if the request has no format for them.
 fn polynomial_as_asked(
     function: &Function,
     codes: Codes,
     request: &Request,
     kind: Monomials,
     degree: usize,
+    steps: Option<i32>,
 ) -> Result<(Form, super::outcome::Search)> {
     let formats = match request.coefficients.as_slice() {
         [] => Format::q(2, request.output.fraction_bits).into(),
         some => CoefficientFormats::new(some, kind, degree)?,
     };
-    let chosen = coefficients::choose(function, codes, request, kind, degree, formats)?;
+    let chosen = coefficients::choose(function, codes, request, kind, degree, formats, steps)?;
     let Chosen { form, search } = chosen;
     Ok((Form::Polynomial(Box::new(form)), search))
 }

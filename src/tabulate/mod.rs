@@ -12,5 +12,7 @@ pub mod ideal;
 pub mod job;
 pub mod outcome;
 pub mod priced;
+mod refused;
 pub mod request;
 pub mod selection;
+mod shortest;

@@ -14,6 +14,7 @@ use crate::design::Design;
 use crate::record::Warning;
 use crate::statistics::reml;
 use crate::statistics::stats;
+use crate::text::number;
 use std::collections::BTreeMap;
 
 /// An error below this share of the record's white noise is not spoken of.
@@ -55,9 +56,9 @@ impl Undithered {
     pub fn warning(&self, design: &Design) -> Warning {
         let done = match &self.removed {
             Some((_, rms_dps)) => format!(
-                "The circuit's own blocks tell it row by row: {rms_dps:.3e} deg/s rms are taken off before and after; the \
+                "The circuit's own blocks tell it row by row: {rms_dps} deg/s rms are taken off before and after; the \
                  firmware's error contains it"
-            ),
+            , rms_dps = number(*rms_dps, 3)),
             None => "The record does not tell it row by row: no step is named whose whole contribution is below twice \
                      of it"
                 .to_owned(),
@@ -66,13 +67,13 @@ impl Undithered {
             "adc_not_dithered",
             format!(
                 "the noise before the ADC of {} bits, {:.2} LSB, does not dither it: at the {:.0} phases that the \
-                 oscillator samples, its rounding adds up to an error of {:.3e} deg/s rms (predicted), which turns with \
+                 oscillator samples, its rounding adds up to an error of {} deg/s rms (predicted), which turns with \
                  temperature. {done}. Add noise of half an \
                  LSB before the ADC, take more bits, or a tuning word that does not repeat",
                 design.circuit.adc.format.bits(),
                 self.noise_lsb,
                 self.phases,
-                self.predicted_dps,
+                number(self.predicted_dps, 3)
             ),
         )
     }

@@ -10,6 +10,7 @@ use crate::record::Warning;
 use crate::statistics::folds::Sample;
 use crate::statistics::stats;
 use crate::statistics::weights::BINS;
+use crate::text::number;
 
 /// A Celsius thermometer that moved by less than this, K, cannot carry a temperature law.
 pub const LEAST_SPAN_K: f64 = 5.0;
@@ -61,7 +62,7 @@ fn g(value: f64) -> String {
         };
         format!("{value:.*}", digits as usize)
     } else {
-        format!("{value:.3e}")
+        format!("{value}", value = number(value, 3))
     }
 }
 
@@ -75,7 +76,7 @@ fn span(c: &Checked<'_>) -> Option<Warning> {
             "thermometer_constant",
             &fit.thermometer,
             format!(
-                "{} is {} {unit} in every row: only a constant bias can be fitted",
+                "{} is {} {unit} in every row. Only a constant bias can be fitted. Record over a range of temperatures",
                 fit.thermometer,
                 g(low)
             ),
@@ -89,8 +90,8 @@ fn span(c: &Checked<'_>) -> Option<Warning> {
             "thermometer_range_small",
             &fit.thermometer,
             format!(
-                "{} moves by {} {unit} only ({} to {}; its noise is {} {unit} rms): too little \
-                 for a law in temperature; record a wider range",
+                "{} moves by {} {unit} only ({} to {}; its noise is {} {unit} rms). That is too little \
+                 for a law in temperature. Record a wider range",
                 fit.thermometer,
                 g(span),
                 g(low),
@@ -115,9 +116,9 @@ fn few_points(c: &Checked<'_>) -> Option<Warning> {
         Warning::general(
             "few_points",
             format!(
-                "{rows} rows in {places} of {BINS} parts of the thermometer's range for {terms} \
-                 coefficients: the held-out error is the figure to trust, and a lower order or \
-                 more temperatures are advised"
+                "{terms} coefficients are fitted to {rows} rows, which lie in {places} of {BINS} parts of the thermometer's \
+                 range. The fit follows these rows better than new ones: trust the held-out error. Take a lower order, \
+                 or record more temperatures"
             ),
         )
     })
@@ -147,8 +148,8 @@ fn resolution(c: &Checked<'_>) -> Option<Warning> {
             "thermometer_resolution_coarse",
             &fit.thermometer,
             format!(
-                "{} comes in steps of {} {} ({} values over the range): where the bias is \
-                 steepest that makes an error of {} deg/s rms, against a noise of {} deg/s",
+                "{} comes in steps of {} {} ({} values over the range). Where the bias is steepest, that makes an error of {} \
+                 deg/s rms, beside a noise of {} deg/s. Read the thermometer with more bits, or average it",
                 fit.thermometer,
                 g(step),
                 fit.unit,
@@ -179,8 +180,8 @@ fn direction(c: &Checked<'_>) -> Option<Warning> {
         "one_direction",
         &c.fit.thermometer,
         format!(
-            "the record has {is} and hardly any {lacks}: a thermal lag, a warm-up and a drift in \
-             time cannot be told from the polynomial; record both directions"
+            "the record has {is} and hardly any {lacks}. A thermal lag, a warm-up or a drift in time looks like a part of \
+             the polynomial then, and is fitted as one. Record both directions"
         ),
     ))
 }
@@ -199,8 +200,8 @@ fn coverage(c: &Checked<'_>) -> Option<Warning> {
             "coverage_gap",
             &c.fit.thermometer,
             format!(
-                "no row has {} between {} and {} {} ({:.0} % of the range): there the bias is \
-                 interpolated, not measured",
+                "no row has {} between {} and {} {} ({:.0} % of the range). There the bias is interpolated, not measured. \
+                 Record rows in this gap",
                 c.fit.thermometer,
                 g(at),
                 g(at + gap),
@@ -234,8 +235,8 @@ fn extrapolation(c: &Checked<'_>) -> Option<Warning> {
             "extrapolation",
             &fit.thermometer,
             format!(
-                "at {} {} (a tenth of the range beyond what was measured) the polynomial of order \
-                 {} has moved by {} deg/s with a standard deviation of {}: limit the input to {} \
+                "at {} {}, a tenth of the range beyond what was measured, the polynomial of order {} has moved by {} deg/s, \
+                 known to {} deg/s (one standard deviation). It says nothing of the gyro there. Limit the input to {} \
                  .. {} {}",
                 g(t),
                 fit.unit,
@@ -254,8 +255,8 @@ fn extrapolation(c: &Checked<'_>) -> Option<Warning> {
 fn loop_warning(c: &Checked<'_>) -> Option<Warning> {
     let l = c.sweep_loop?;
     let seen = format!(
-        "at one reading of {} the error differs by {} deg/s rms between rising and falling \
-         sweeps (noise with the residuals' memory would make {}; {} places compared)",
+        "at the same reading of {} the error differs by {} deg/s rms between rising and falling sweeps (slow noise alone \
+         would make {}; {} places compared)",
         c.fit.thermometer,
         g(l.rms_dps),
         g(l.noise_dps),
@@ -266,8 +267,8 @@ fn loop_warning(c: &Checked<'_>) -> Option<Warning> {
             "heating_cooling_loop",
             &c.fit.thermometer,
             format!(
-                "{seen}: no function of the thermometer can follow that; a lag, a gradient or a \
-                 drift in time can"
+                "{seen}. No function of the thermometer can follow that, but a lag, a gradient or a drift in time can. \
+                 `gyrogen close` looks for them"
             ),
         ))
     } else if l.rms_dps > c.fit.noise_floor_rms_dps.max(l.noise_dps) {
@@ -275,8 +276,8 @@ fn loop_warning(c: &Checked<'_>) -> Option<Warning> {
             "loop_or_slow_noise",
             &c.fit.thermometer,
             format!(
-                "{seen}: more than a single reading's noise, but the residuals wander so slowly \
-                 that one record cannot tell a loop from noise; repeat the cycle"
+                "{seen}. That is more than a single reading's noise, but the residuals wander so slowly that one record \
+                 cannot tell a loop from noise. Repeat the cycle"
             ),
         ))
     } else {
@@ -294,8 +295,8 @@ fn dwells(c: &Checked<'_>) -> Option<Warning> {
         Warning::general(
             "dwell_dominates",
             format!(
-                "{:.0} % of the rows lie at few temperatures; they were given {:.0} % of the \
-                 weight, so that the rest of the range counts",
+                "{:.0} % of the rows lie at few temperatures. They were given {:.0} % of the weight, so that the rest of the \
+                 range counts. Shorter dwells would say as much",
                 100.0 * share,
                 100.0 * left / weights.iter().sum::<f64>().max(f64::MIN_POSITIVE)
             ),

@@ -13,6 +13,7 @@ use crate::record::columns::THERMOMETERS;
 use crate::record::{ThermalRecord, Warning, condensed};
 use crate::statistics::stats;
 use crate::statistics::weights;
+use crate::text::number;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
@@ -229,10 +230,11 @@ pub(crate) fn channels_of(
 /// What is said of a thermometer that is read less often than the output.
 fn behind(thermometer: &str, course: &repeated::Course) -> Warning {
     let said = format!(
-        "{thermometer} has a new reading every {:.1} rows and repeats it in between: what the repeated ones are behind by \
-         makes {:.3e} deg/s rms of the declared bias. It is taken out before and after (causes are sought along straight lines \
-         between new readings); the firmware's error contains it: read the thermometer as often as the output",
-        course.rows, course.artefact_rms_dps
+        "{thermometer} has a new reading every {:.1} rows and repeats it in between. What the repeated ones are behind by \
+         makes {} deg/s rms of the declared bias. It is taken out before and after (causes are sought along straight lines \
+         between new readings), but the firmware's error contains it. Read the thermometer as often as the output",
+        course.rows,
+        number(course.artefact_rms_dps, 3)
     );
     Warning::on("thermometer_repeats", thermometer, said)
 }
@@ -241,15 +243,19 @@ fn behind(thermometer: &str, course: &repeated::Course) -> Warning {
 fn rounding(design: &Design, thermometer: &str, course: &Course) -> Warning {
     let of_circuit = match quantised::predicted(design, thermometer) {
         Some(step) if quantised::LIKE.contains(&(course.step / step)) => {
-            format!(", as the design's circuit predicts ({step:.3e})")
+            format!(
+                ", as the design's circuit predicts ({step})",
+                step = number(step, 3)
+            )
         }
         _ => String::new(),
     };
     let said = format!(
-        "{thermometer} is read in steps of {:.3e}{of_circuit}: their rounding makes {:.3e} deg/s rms of the declared \
+        "{thermometer} is read in steps of {}{of_circuit}: their rounding makes {} deg/s rms of the declared \
          bias. It is taken out before and after (causes are sought along the course between the steps); the \
          firmware's error contains it: read the thermometer with more bits",
-        course.step, course.artefact_rms_dps
+        number(course.step, 3),
+        number(course.artefact_rms_dps, 3)
     );
     Warning::on("thermometer_quantised", thermometer, said)
 }

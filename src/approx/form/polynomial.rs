@@ -275,6 +275,19 @@ fn intermediate_with(
     (format.bits() <= 64).then_some((settled.bits, format, bound))
 }
 
+/// The same polynomial with steps that are rounded to so many fraction bits, and the integer bits that its words need.
+/// `None` if that takes over 64 bits.
+pub fn rounded_to(polynomial: &Polynomial, fraction_bits: i32) -> Option<Polynomial> {
+    let with = |intermediate| Formats {
+        intermediate,
+        ..polynomial.formats
+    };
+    let (kind, raw) = (polynomial.monomials, &polynomial.coefficients);
+    let wide = with(Target::signed(127, fraction_bits));
+    let (_, format, _) = intermediate_with(wide, kind, raw)?;
+    Polynomial::new(with(Target::from(format)), kind, raw.clone()).ok()
+}
+
 /// The same polynomial formats with only as many integer bits in the intermediate as these coefficients
 /// need: the same results.
 pub fn trimmed(formats: Formats, monomials: Monomials, coefficients: &[i128]) -> Formats {

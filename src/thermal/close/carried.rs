@@ -5,6 +5,7 @@ use crate::correction::{Formats, Plan, Term};
 use crate::design::Design;
 use crate::record::{ThermalRecord, Warning};
 use crate::statistics::stats;
+use crate::text::number;
 use crate::thermal::firmware;
 
 /// A held-out error that is so many times another one is more: that of firmware beside the model's, or the declared one's.
@@ -76,8 +77,11 @@ impl Told<'_> {
             && with > MORE * without
         {
             let said = format!(
-                "the steps' coefficients cancel each other: in firmware's words they leave {with:.3e} deg/s of \
-                 held-out rows, the declared model alone {without:.3e}; do the separating experiment"
+                "the steps' coefficients cancel each other, and rounded to firmware's words they do so no more: they leave {with} \
+                 deg/s rms of held-out rows, the declared model alone {without}. No firmware is written. Do the \
+                 experiment that separates the steps (`evidence` names it)",
+                with = number(with, 3),
+                without = number(without, 3)
             );
             warnings.push(Warning::general("no_firmware", said));
             return None;

@@ -1,6 +1,7 @@
 //! What became of every effect of the catalogue, and why.
 
 use super::Told;
+use crate::text::number;
 use crate::thermal::effects::{Candidate, Missing, tone};
 use crate::thermal::search::LEVEL;
 use crate::thermal::search::judge::Judged;
@@ -76,9 +77,10 @@ impl Told<'_> {
         }
         if let Some((_, rms_dps)) = self.found.within_rounding.iter().find(|r| r.0 == *id) {
             let remark = format!(
-                "its whole contribution, {rms_dps:.2e} deg/s rms, is below twice the {:.2e} deg/s that the ADC's \
+                "its whole contribution, {rms_dps} deg/s rms, is below twice the {} deg/s that the ADC's \
                  rounding makes",
-                self.search.channels.rounding_dps
+                number(self.search.channels.rounding_dps, 3),
+                rms_dps = number(*rms_dps, 3)
             );
             return (Fate::Rejected, remark);
         }

@@ -2,6 +2,7 @@
 
 use super::Told;
 use crate::record::Warning;
+use crate::text::number;
 use crate::thermal::search::LEVEL;
 
 impl Told<'_> {
@@ -10,13 +11,15 @@ impl Told<'_> {
         warnings.extend(self.accidents().or_else(|| self.riddled()));
         if !self.found.within_rounding.is_empty() {
             let each = self.found.within_rounding.iter();
-            let names: Vec<String> = each.map(|(id, rms)| format!("{id} ({rms:.2e})")).collect();
+            let names: Vec<String> = each
+                .map(|(id, rms)| format!("{id} ({rms})", rms = number(*rms, 3)))
+                .collect();
             warnings.push(Warning::general(
                 "within_adc_rounding",
                 format!(
-                    "not named, as the whole contribution (deg/s rms) is below twice the {:.2e} deg/s that the ADC's \
-                     rounding makes: {}",
-                    self.search.channels.rounding_dps,
+                    "the ADC's rounding makes {} deg/s rms of its own. These are below twice that (deg/s rms) and are not named: {}. Take \
+                     an ADC with more bits, or more noise before it, to tell them",
+                    number(self.search.channels.rounding_dps, 3),
                     names.join(", ")
                 ),
             ));
@@ -45,7 +48,8 @@ impl Told<'_> {
             warnings.push(Warning::general(
                 "undecided",
                 format!(
-                    "the record decides nothing between {}: each explains it as well",
+                    "{} explain the record equally well. It does not say which of them it is. Do the experiment that separates them \
+                     (`evidence` names it)",
                     self.found.undecided.join(", ")
                 ),
             ));
@@ -55,8 +59,8 @@ impl Told<'_> {
             warnings.push(Warning::general(
                 "goes_with_temperature",
                 format!(
-                    "the declared bias in temperature may be that of {}: in this record these go with the thermometer; \
-                     `evidence` says which experiment separates them",
+                    "the declared bias in temperature may be that of {}. In this record these go with the thermometer, and nothing \
+                     tells them apart. `evidence` says which experiment does",
                     hidden.join(", ")
                 ),
             ));
@@ -79,12 +83,13 @@ impl Told<'_> {
             "rate_out_dps",
             format!(
                 "{} of {} rows ({} held out) stand out by more than six deviations, whatever the model, alone or a few in a \
-                 row: they are not in the errors; the farthest, at {} s, is off by {:.3e} deg/s",
+                 row. They are taken for accidents and are not in the errors. Look at the farthest: at {} s it is off by {} \
+                 deg/s",
                 rows.len(),
                 residual.len(),
                 held,
                 search.channels.time_s[farthest],
-                residual[farthest]
+                number(residual[farthest], 3)
             ),
         ))
     }

@@ -133,11 +133,11 @@ const MODE_CROSSING: Sheet = Sheet {
                where the crossing is blurred (several modes, a gradient over the die), x = (T - T_c) / width",
     parameters: &[
         Parameter {
-            name: "centre_degc",
+            name: "center_degc",
             plausible: (-40.0, 125.0),
         },
         Parameter {
-            name: "width_k",
+            name: "half_width_k",
             plausible: (0.3, 15.0),
         },
         Parameter {
@@ -263,11 +263,15 @@ impl Candidate for ModeCrossing {
         let (centre, width) = crossing(c, &e.point);
         let mut out: Reported = [
             entry(
-                "centre_degc",
+                "center_degc",
                 c.middle_degc + k * centre,
                 (k * std(0)).abs(),
             ),
-            entry("width_k", (k * width).abs(), (k * width * std(1)).abs()),
+            entry(
+                "half_width_k",
+                (k * width).abs(),
+                (k * width * std(1)).abs(),
+            ),
             gain("absorptive_dps", e, 0, 1.0),
         ]
         .into_iter()
@@ -339,7 +343,7 @@ mod tests {
             let estimate = &search.estimates(&model)[0];
             assert_eq!(estimate.point.form, k.saturating_sub(1));
             let reported = found.terms[0].candidate.report(&c, estimate);
-            for (name, value) in [("centre_degc", 30.0), ("width_k", 4.0)] {
+            for (name, value) in [("center_degc", 30.0), ("half_width_k", 4.0)] {
                 let (found, std) = reported[name];
                 assert!((found - value).abs() < 4.0 * std, "{k} {reported:?}");
             }
