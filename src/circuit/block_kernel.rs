@@ -56,10 +56,14 @@ impl Instructions {
         }
     }
 
-    /// The fastest that this processor has.
-    pub fn best() -> Self {
+    /// The fastest that this processor has; `idle`: the product is not quantised, and then the blocks as
+    /// they are written are faster than a kernel without SIMD.
+    pub fn best(idle: bool) -> Self {
         let there = Instructions::ALL.into_iter().rev().find(|i| i.are_there());
-        there.unwrap_or(Instructions::Plain)
+        match there {
+            Some(Instructions::Portable) if idle => Instructions::Plain,
+            there => there.unwrap_or(Instructions::Plain),
+        }
     }
 }
 

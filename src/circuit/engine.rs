@@ -104,7 +104,7 @@ fn is_flagged(design: &Design) -> bool {
 
 /// The engine of a design, with the fastest instructions that the processor has.
 pub fn engine(design: &Design, kind: ArithmeticKind) -> Box<dyn Engine> {
-    engine_with(design, kind, Instructions::best())
+    by_stages(design, kind, None)
 }
 
 /// The engine of a design, with these instructions where a kernel applies and the processor has
@@ -113,6 +113,14 @@ pub fn engine_with(
     design: &Design,
     kind: ArithmeticKind,
     instructions: Instructions,
+) -> Box<dyn Engine> {
+    by_stages(design, kind, Some(instructions))
+}
+
+fn by_stages(
+    design: &Design,
+    kind: ArithmeticKind,
+    instructions: Option<Instructions>,
 ) -> Box<dyn Engine> {
     match design.circuit.decimator.stages {
         1 => with_stages::<1>(design, kind, instructions),
@@ -163,7 +171,7 @@ pub fn lane_bits<const N: usize>(chain: &Chain<N>, program: &Program) -> LaneBit
 fn with_stages<const N: usize>(
     design: &Design,
     kind: ArithmeticKind,
-    instructions: Instructions,
+    instructions: Option<Instructions>,
 ) -> Box<dyn Engine> {
     let mut chain = Chain::<N>::new(design);
     let float_scale = FloatScale::new(design);
@@ -173,6 +181,7 @@ fn with_stages<const N: usize>(
     let bits = lane_bits(&chain, &chain.trace());
     let narrow = bits.fast <= 64 && bits.residue <= 64;
     let idle = chain.mixers.iter().all(|m| m.product.is_idle());
+    let instructions = instructions.unwrap_or_else(|| Instructions::best(idle));
     let kernel = narrow
         .then(|| BlockKernel::new(&chain, instructions))
         .flatten();
