@@ -142,8 +142,10 @@ fn a_users_own_design_is_not_taken_for_an_earlier_result() {
         error.to_string().contains("no result of an earlier run"),
         "{error}"
     );
-    // Beside a summary it is one, whichever command wrote it.
+    // Beside the command's own result it is one; beside another's it belongs to that.
     fs::write(top.path().join("closure.json"), "{}").unwrap();
+    assert!(Results::claim(top.path(), &planned, &[]).is_err());
+    fs::write(top.path().join("summary.json"), "{}").unwrap();
     assert!(Results::claim(top.path(), &planned, &[]).is_ok());
 }
 

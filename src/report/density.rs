@@ -3,7 +3,7 @@
 //! Dots that cover one another hide how many there are, and the extremes of every stretch alone make two clouds of white
 //! noise. The number in each cell is what an eye would see of dots of a fine pen.
 
-use super::svg::number;
+use super::marks::number;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 

@@ -1,7 +1,7 @@
 //! A figure of a page: drawn once for wide pages and once for narrow ones, with its legend, its data as CSV and its
 //! figures in numbers for those who cannot see it.
 
-use super::svg::{Shape, Swatch, path};
+use super::marks::{Shape, Swatch, path};
 use super::text::{escape, significant};
 use std::fmt::Write as _;
 

@@ -3,7 +3,7 @@
 use super::axis::{Axis, Interval, Ticks, decades};
 use super::density;
 use super::figure::Series;
-use super::svg::{Shape, number, path, text};
+use super::marks::{Shape, number, path, text};
 use super::text::escape;
 use std::fmt::Write as _;
 

@@ -2,7 +2,7 @@
 //!
 //! [`page`] and [`tables`] turn an outcome into what the template prints, [`figures`] draws it on
 //! what [`scene`] prepares, [`svg`] with [`axis`] and `frame` is the plot writer under the figures, [`figure`] puts legend, drawing and data
-//! together, `density` draws many points, [`text`] formats numbers; [`simulation`] is the page of `simulate`, [`closure`] that of `close`, [`capture`] that of `close --capture`, [`design_diff`] what a closure changes in the design, [`selftest`] that of its self-test, [`study`] that of a word-length study. Colours and layout are in `templates/report/`.
+//! together, `density` draws many points, [`text`] formats numbers; [`simulation`] is the page of `simulate`, [`closure`] that of `close`, [`capture`] that of `close --capture`, [`design_diff`] what a closure changes in the design, [`equivalence`] that of `equiv`, [`approx`] that of `approx`, [`selftest`] that of its self-test, [`study`] that of a word-length study. Colours and layout are in `templates/report/`.
 
 pub mod approx;
 pub mod axis;
@@ -14,6 +14,7 @@ pub mod equivalence;
 pub mod figure;
 pub mod figures;
 mod frame;
+mod marks;
 mod narrow;
 pub mod page;
 pub mod scene;

@@ -109,7 +109,7 @@ fn the_page_shows_a_bend_and_a_pickup_and_is_the_same_twice() {
     ] {
         assert!(page.contains(what), "{what}");
     }
-    assert!(!page.contains("Noise against slope") && !page.contains("missing codes</text>"));
+    assert!(!page.contains("Noise against slope") && !page.contains("missing codes</li>"));
     // Codes, fit and page anew.
     assert_eq!(page, html(&make(), "made<up>.csv").unwrap());
     // The curve is the planted bend, within its band, at the ends of the drive.
@@ -141,7 +141,7 @@ fn jitter_and_missing_codes_have_their_marks() {
     assert_eq!(steps(&missing), ["adc_missing_codes"]);
     let page = html(&missing, "m.csv").unwrap();
     assert_sound(&page, &missing);
-    assert!(page.contains("missing codes</text>"));
+    assert!(page.contains("missing codes</li>"));
 }
 
 #[test]

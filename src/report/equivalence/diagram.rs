@@ -3,7 +3,8 @@
 use crate::check::proved::Proved;
 use crate::design::Design;
 use crate::report::figure::{Figure, Series};
-use crate::report::svg::{Svg, number, path, text};
+use crate::report::marks::{number, path, text};
+use crate::report::svg::Svg;
 use crate::report::text::{fixed, minus};
 use std::fmt::Write as _;
 
