@@ -2,7 +2,8 @@
 //! have to notice. What the compiler makes the same instructions of is no damage.
 //!
 //! `cargo test --release --test mutants -- --ignored --nocapture` takes ten bundles and lists what survives;
-//! `GYROGEN_MUTANTS` says how many of each bundle (150).
+//! `GYROGEN_MUTANTS` says how many of each bundle (150), `GYROGEN_MUTANTS_OF` takes those with this in their name.
+//! With esbmc, a model checker of C, on the PATH (or named by `GYROGEN_ESBMC`), those are told that are proved equal.
 
 mod mutation;
 mod oracle;
@@ -119,20 +120,22 @@ fn fates(bundle: &Bundle, mutants: &[Mutant]) -> Vec<Fate> {
 fn told(name: &str, bundle: &Bundle, most: usize) -> (usize, usize) {
     let mutants = chosen(bundle, most);
     let fates = fates(bundle, &mutants);
-    let count = |fate| fates.iter().filter(|f| **f == fate).count();
-    let (killed, same, alive) = (count(Fate::Killed), count(Fate::Same), count(Fate::Alive));
+    let count = |is: &dyn Fn(&Fate) -> bool| fates.iter().filter(|f| is(f)).count();
+    let killed = count(&|f| *f == Fate::Killed);
+    let alive = count(&|f| matches!(f, Fate::Alive(_)));
     println!(
-        "{name}: {} mutants, {killed} killed, {same} the same, {alive} alive",
-        mutants.len()
+        "{name}: {} mutants, {killed} killed, {} in exhausted functions, {} the same instructions, {} proved equal, \
+         {alive} alive",
+        mutants.len(),
+        count(&|f| *f == Fate::Exhausted),
+        count(&|f| *f == Fate::SameInstructions),
+        count(&|f| *f == Fate::Proved),
     );
-    for (mutant, _) in mutants
-        .iter()
-        .zip(&fates)
-        .filter(|(_, f)| **f == Fate::Alive)
-    {
+    for (mutant, fate) in mutants.iter().zip(&fates) {
+        let Fate::Alive(answer) = fate else { continue };
         let (before, after) = (mutant.before.trim(), mutant.after.trim());
         println!(
-            "  {}:{}: {before}\n    -> {after}",
+            "  {}:{}: {before}\n    -> {after}\n    {answer:?}",
             mutant.file,
             mutant.line + 1
         );
@@ -225,8 +228,10 @@ fn damage_to_ten_firmwares_is_noticed() {
         ));
         seed += 1;
     }
+    let wanted = std::env::var("GYROGEN_MUTANTS_OF").unwrap_or_default();
     let outcomes = bundles
         .iter()
+        .filter(|(name, _)| name.contains(&wanted))
         .map(|(name, bundle)| told(name, bundle, most));
     let (killed, alive) = outcomes.fold((0, 0), |(k, a), (killed, alive)| (k + killed, a + alive));
     let share = 100.0 * killed as f64 / (killed + alive) as f64;

@@ -290,6 +290,28 @@ fn make_and_cmake_check_all_parts() {
 }
 
 #[test]
+fn coefficients_that_no_record_gave_are_noted() {
+    let top = tempfile::tempdir().expect("a folder");
+    design(false, top.path());
+    for (part, is_noted) in [("all", true), ("chain", true), ("conversion", false)] {
+        let arguments = [
+            "emit",
+            "design.toml",
+            "--part",
+            part,
+            "--lang",
+            "c",
+            "--out",
+            part,
+        ];
+        let output = gyrogen(&arguments, top.path());
+        assert!(output.status.success(), "{}", said(&output));
+        let notes = said(&output).contains("not fitted to a record");
+        assert_eq!(notes, is_noted, "{part}: {}", said(&output));
+    }
+}
+
+#[test]
 fn what_does_not_go_together_is_refused() {
     let top = tempfile::tempdir().expect("a folder");
     let refused = |text: &str, rule: &str| {

@@ -86,6 +86,54 @@ fn a_bundle_holds_on_other_processors_and_damage_is_found_there() {
     }
 }
 
+const CORRECTED: &str = r#"
+name = "gyro"
+[correction]
+period_s = 0.2
+full_scale_dps = 500.0
+noise_dps = 2e-3
+inputs = [{ column = "phase_rad", offset = -1.8, scale = 0.4 }]
+terms = [
+    { kind = "product", gain_dps = 97.2, factors = [[0, 1]] },
+    { kind = "lag", gain_dps = 4.0, input = 0, tau_s = 1.0 },
+]
+"#;
+
+#[test]
+fn all_parts_hold_on_other_processors_and_damage_is_found_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let [design, bundle] = ["design.toml", "all"].map(|name| {
+        let path = folder.path().join(name);
+        path.to_str().expect("a name").to_owned()
+    });
+    std::fs::write(&design, CORRECTED).unwrap();
+    let part = ["emit", &design, "--part", "all", "--lang", "c"];
+    let made = gyrogen(&[&part[..], &["--out", &bundle]].concat(), None);
+    assert!(made.status.success(), "{}", told(&made));
+    let source = folder.path().join("all/correction/gyro_correction.c");
+    let whole = std::fs::read_to_string(&source).unwrap();
+    let damaged = whole.replacen(" - ", " + ", 1);
+    assert_ne!(damaged, whole);
+    for (target, tools, _) in TARGETS {
+        if !is_there(tools) {
+            println!("{target}: not on this machine");
+            continue;
+        }
+        let arguments = ["verify", &bundle, "--target", target];
+        let run = gyrogen(&arguments, None);
+        assert!(run.status.success(), "{target}: {}", told(&run));
+        let table = String::from_utf8_lossy(&run.stdout);
+        for part in ["chain/chain", "correction/correct", "all parts together"] {
+            assert!(table.contains(part), "{target}: {table}");
+        }
+        std::fs::write(&source, &damaged).unwrap();
+        let run = gyrogen(&arguments, None);
+        assert_eq!(run.status.code(), Some(1), "{target}");
+        assert!(told(&run).contains("correct"), "{}", told(&run));
+        std::fs::write(&source, &whole).unwrap();
+    }
+}
+
 #[test]
 fn what_is_missing_is_said_with_what_to_install() {
     let folder = tempfile::tempdir().unwrap();

@@ -105,7 +105,8 @@ fn remarks(design: &Design, part: Part, asked: bool) -> Vec<String> {
         ),
         _ => {}
     }
-    let unfitted = |c: &&Compensation| compensates && c.fitted.is_none();
+    let has_bias = compensates || part == Part::All;
+    let unfitted = |c: &&Compensation| has_bias && c.fitted.is_none();
     if design.compensation.as_ref().filter(unfitted).is_some() {
         let whose = match design.compensation_is_own {
             true => "those that the design states",

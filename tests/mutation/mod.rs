@@ -1,5 +1,8 @@
 //! Damages emitted C one token at a time, and asks the bundle's own harness whether it notices.
 
+mod prover;
+
+use prover::{Answer, Prover};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -17,14 +20,18 @@ pub struct Mutant {
 }
 
 /// What became of a mutant.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Fate {
     /// The harness, or the compiler, noticed.
     Killed,
-    /// The compiler makes the same instructions of it, or it is in a function of which every input was run, or a
-    /// limit where it makes no difference whether it is reached or passed.
-    Same,
-    Alive,
+    /// It is in a function of which every input was run.
+    Exhausted,
+    /// The compiler makes the same instructions of it.
+    SameInstructions,
+    /// The model checker proves that it computes the same.
+    Proved,
+    /// With words at which it differs, where the model checker finds some.
+    Alive(Answer),
 }
 
 /// Every mutant of a source: operators, constants by one, comparisons, shifts, entries of tables, lost
@@ -138,83 +145,6 @@ fn numbers(code: &str) -> Vec<(usize, usize)> {
     all
 }
 
-/// A limit is moved that, by the range that is proved and printed beside it, never acts: both lines limit alike.
-fn is_beyond_the_proved_range(mutant: &Mutant) -> bool {
-    let number = |text: &str| -> Option<i128> {
-        let digits: String = text
-            .chars()
-            .filter(|c| c.is_ascii_digit() || *c == '-')
-            .collect();
-        digits.parse().ok()
-    };
-    let parts = |line: &str| -> Option<(String, i128, i128, i128, i128)> {
-        let (before, arguments) = line.split_once("_clamp_")?;
-        let (width, arguments) = arguments.split_once('(')?;
-        let (arguments, comment) = arguments.split_once(");")?;
-        let mut limits = arguments.rsplitn(3, ", ");
-        let constant = |text: &str| {
-            let (sign, inner) = (text.starts_with("(-"), text.split("_C(").nth(1)?);
-            number(inner).map(|v| if sign { -v } else { v })
-        };
-        let (high, low) = (constant(limits.next()?)?, constant(limits.next()?)?);
-        let range = comment
-            .trim()
-            .trim_end_matches("*/")
-            .rsplit(['*', ';'])
-            .next()?;
-        let (from, to) = range.split_once("..")?;
-        let head = format!("{before}{width}{}", limits.next()?);
-        Some((head, low, high, number(from.trim())?, number(to.trim())?))
-    };
-    let (Some(was), Some(is)) = (parts(&mutant.before), parts(&mutant.after)) else {
-        return false;
-    };
-    let (from, to) = (was.3, was.4);
-    // A limit within the range's end acts; one beyond it does not.
-    let same = |a: i128, b: i128, acts: bool| a == b || !acts;
-    was.0 == is.0
-        && same(was.1, is.1, was.1.max(is.1) >= from)
-        && same(was.2, is.2, was.2.min(is.2) <= to)
-}
-
-/// An even rounding constant, one more, on a product with an even constant: the sum's last bit decides nothing.
-fn is_even(mutant: &Mutant, text: &str) -> bool {
-    let constants = |line: &str| -> Vec<u64> {
-        let parts = line.split("INT64_C(").chain(line.split("INT32_C("));
-        let number = |part: &str| part.split(')').next().and_then(|n| n.parse().ok());
-        parts.filter_map(number).collect()
-    };
-    let is_biased = mutant.before.trim().contains(" biased");
-    let (before, after) = (constants(&mutant.before), constants(&mutant.after));
-    let one_more = before
-        .iter()
-        .zip(&after)
-        .any(|(a, b)| a % 2 == 0 && *b == a + 1);
-    // The summand: `x + C` or `add(x, C)`.
-    let sum = mutant.before.split('=').nth(1).unwrap_or("").trim();
-    let summand = match sum.split_once("_add(") {
-        Some((_, arguments)) => arguments.split(',').next(),
-        None => sum.split(" + ").next(),
-    };
-    let made = format!(" {} = ", summand.unwrap_or(""));
-    let before_it: Vec<&str> = text.lines().take(mutant.line).collect();
-    let line = before_it.iter().rev().find(|line| line.contains(&made));
-    is_biased
-        && one_more
-        && line.is_some_and(|line| {
-            let is_product = line.contains(" * ") || line.contains("_mul(");
-            is_product && constants(line).iter().any(|c| *c > 0 && c % 2 == 0)
-        })
-}
-
-/// `(a < low) ? low : a` and `(a <= low) ? low : a` are the same, and so above.
-fn is_limit(mutant: &Mutant) -> bool {
-    let [before, after] = [&mutant.before, &mutant.after].map(|line| line.trim().to_owned());
-    before.starts_with("return (a < low) ? low : ((a > high) ? high : a);")
-        && (after.contains("(a <= low) ? low : ((a > high)")
-            || after.contains("(a < low) ? low : ((a >= high)"))
-}
-
 /// A bundle ready for mutants.
 pub struct Bundle {
     pub folder: PathBuf,
@@ -224,6 +154,7 @@ pub struct Bundle {
     checks: Vec<Vec<String>>,
     /// Functions of which the harness runs every input.
     exhausted: Vec<String>,
+    prover: Option<Prover>,
 }
 
 impl Bundle {
@@ -254,6 +185,7 @@ impl Bundle {
         let exhausted = exhausted.map(|f| f["name"].as_str().expect("a name").to_owned());
         let bundle = Bundle {
             exhausted: exhausted.collect(),
+            prover: Prover::find(),
             folder,
             prefix,
             build,
@@ -362,8 +294,8 @@ impl Bundle {
                 }
             })
             .collect();
-        let path = place.join(&mutant.file);
-        std::fs::write(&path, damaged.join("\n") + "\n").expect("written");
+        let damaged_text = damaged.join("\n") + "\n";
+        std::fs::write(place.join(&mutant.file), &damaged_text).expect("written");
         let is_header = mutant.file.ends_with(".h");
         let main = format!("{}.c", self.prefix);
         // All that a damaged header goes into is compiled with it: copies beside it.
@@ -405,37 +337,28 @@ impl Bundle {
         {
             return Fate::Killed;
         }
-        if self.is_exhausted(mutant, &text)
-            || is_limit(mutant)
-            || is_beyond_the_proved_range(mutant)
-            || is_even(mutant, &text)
-            || self.is_guard_of_the_only_input(mutant)
-        {
-            return Fate::Same;
+        if self.is_exhausted(mutant, &text) {
+            return Fate::Exhausted;
         }
         let original = self.source(name);
         if self.instructions(&original, &[]) == self.instructions(&source, &[place]) {
-            return Fate::Same;
+            return Fate::SameInstructions;
         }
-        Fate::Alive
+        match self.proved(mutant, &damaged_text, place) {
+            Answer::Equal => Fate::Proved,
+            answer => Fate::Alive(answer),
+        }
     }
 
-    /// The limit of the only input of a function without a state is off by one. The functions differ at most at the
-    /// ends of the range and beside them, and there they have just been compared.
-    fn is_guard_of_the_only_input(&self, mutant: &Mutant) -> bool {
-        let name = mutant.before.trim().split(' ').nth(2).unwrap_or("");
-        let Some(input) = name.strip_suffix("_in_range") else {
-            return false;
+    /// What the model checker says of the mutant.
+    fn proved(&self, mutant: &Mutant, damaged: &str, place: &Path) -> Answer {
+        let Some(prover) = &self.prover else {
+            return Answer::Unknown;
         };
-        let vectors = std::fs::read_dir(self.folder.join("vectors")).expect("vectors");
-        let heads = vectors.filter_map(|entry| {
-            let text = std::fs::read_to_string(entry.expect("a file").path()).expect("vectors");
-            text.lines().next().map(str::to_owned)
-        });
-        // Input, output, fault.
-        let is_its = |head: &String| head.split(',').next() == Some(input);
-        let mut heads = heads.filter(is_its).peekable();
-        heads.peek().is_some() && heads.all(|head| head.split(',').count() == 3)
+        let question = place.join("question");
+        std::fs::create_dir_all(&question).expect("a folder");
+        let file = (mutant.file.as_str(), mutant.line);
+        prover.compare(&question, &self.folder, &self.prefix, file, damaged)
     }
 
     /// The mutant is in a function of which every input has just been run.
