@@ -31,7 +31,15 @@ impl Block {
 }
 
 /// Title, beginnings of names of its words, what feeds it, place.
-const BLOCKS: [(&str, &[&str], &str, (usize, usize)); 7] = [
+type Outline = (
+    &'static str,
+    &'static [&'static str],
+    &'static str,
+    (usize, usize),
+);
+
+/// The blocks but the ADC, in the order of the chain.
+const BLOCKS: [Outline; 7] = [
     ("oscillator (NCO)", &["circuit.nco."], "", (1, 1)),
     (
         "demodulator",
