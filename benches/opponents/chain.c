@@ -10,6 +10,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <time.h>
 #define T_CODE int16_t
 #define R 64
@@ -84,7 +85,7 @@ int main(int argc,char**argv){
   double g=1; for(int i=0;i<16;i++){ t.atan[i]=(int32_t)llrint(atan(ldexp(1,-i))/(2*M_PI)*4294967296.0); g*=sqrt(1+ldexp(1,-2*i)); }
   t.k=(int32_t)lrint(65536/g);
   uint32_t word=(uint32_t)strtoul(argv[2],0,10); long n=atol(argv[3]); int runs=atoi(argv[4]);
-  int16_t*d=malloc(2*(size_t)n),*s=malloc(2*(size_t)n); int64_t*rows=calloc(7*(size_t)(n/R),8);
+  int16_t*d=malloc(2*(size_t)n),*s=malloc(2*(size_t)n); int64_t*rows=malloc(8*7*(size_t)(n/R)+8); memset(rows,1,8*7*(size_t)(n/R));
   uint32_t x=0x12345678,ph=0,m=0;
   for(long i=0;i<n;i++){ ph+=33555666; m+=77777; int si=t.table[ph>>22],co=t.table[((ph>>22)+256)&1023],mm=t.table[m>>22];
     x=x*1664525+1013904223; int n1=(int)(x>>24)-128; x=x*1664525+1013904223; int n2=(int)(x>>24)-128;
