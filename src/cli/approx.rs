@@ -206,14 +206,8 @@ fn print(o: &Outcome, out: &std::path::Path) {
     if let Some(search) = &o.search {
         let mut table = super::table(&["coefficients", "ideal evaluation", "whole evaluation"]);
         for c in &search.compared {
-            let total = c
-                .total_max_abs
-                .map_or("-".into(), |v| format!("{v}", v = number(v, 6)));
-            table.add_row([
-                c.name.to_owned(),
-                format!("{}", number(c.ideal_max_abs, 6)),
-                total,
-            ]);
+            let total = c.total_max_abs.map_or("-".into(), |v| number(v, 6));
+            table.add_row([c.name.to_owned(), number(c.ideal_max_abs, 6), total]);
         }
         say!("{table}");
         say!("{}", taken(search));
@@ -275,7 +269,7 @@ fn alternative(a: &Alternative) -> alternatives::Line<'_> {
     alternatives::Line {
         detail: &a.detail,
         cost: a.cost,
-        errors: vec![format!("{}", number(a.certified_max_abs, 5))],
+        errors: vec![number(a.certified_max_abs, 5)],
         undominated: a.undominated,
         chosen: a.chosen,
     }

@@ -202,7 +202,7 @@ fn alternative(line: &Line) -> alternatives::Line<'_> {
         detail: &line.detail,
         cost: line.cost,
         errors: vec![
-            format!("{}", number(line.certified_max_dps, 5)),
+            number(line.certified_max_dps, 5),
             format!("{:.3}", line.certified_max_lsb),
         ],
         undominated: line.undominated,
