@@ -209,14 +209,8 @@ fn print(o: &Outcome, out: &std::path::Path) {
         let mut table =
             super::terminal::table(&["coefficients", "ideal evaluation", "whole evaluation"]);
         for c in &search.compared {
-            let total = c
-                .total_max_abs
-                .map_or("-".into(), |v| format!("{v}", v = number(v, 6)));
-            table.add_row([
-                c.name.to_owned(),
-                format!("{}", number(c.ideal_max_abs, 6)),
-                total,
-            ]);
+            let total = c.total_max_abs.map_or("-".into(), |v| number(v, 6));
+            table.add_row([c.name.to_owned(), number(c.ideal_max_abs, 6), total]);
         }
         super::terminal::show(&table);
         say!("{}", taken(search));
@@ -278,7 +272,7 @@ fn alternative(a: &Alternative) -> alternatives::Line<'_> {
     alternatives::Line {
         detail: &a.detail,
         cost: a.cost,
-        errors: vec![format!("{}", number(a.certified_max_abs, 5))],
+        errors: vec![number(a.certified_max_abs, 5)],
         undominated: a.undominated,
         chosen: a.chosen,
     }

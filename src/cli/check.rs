@@ -178,7 +178,7 @@ fn requirements(check: &Check) {
             r.name.to_owned(),
             r.target.clone().unwrap_or("-".to_owned()),
             format!("{sign} {:e}", r.limit),
-            format!("{}", number(r.obtained, 5)),
+            number(r.obtained, 5),
             between,
             if r.met { "yes" } else { "NO" }.to_owned(),
         ]);
@@ -203,7 +203,7 @@ fn row(n: &NodeCheck) -> Vec<String> {
         Overflows::Certain => format!("CERTAIN ({})", n.mode),
         Overflows::ByDesign => n.mode.to_owned(),
     };
-    let some = |v: Option<f64>| v.map_or("-".to_owned(), |v| format!("{v}", v = number(v, 3)));
+    let some = |v: Option<f64>| v.map_or("-".to_owned(), |v| number(v, 3));
     let line = n.budget.as_ref();
     vec![
         n.name.clone(),

@@ -149,8 +149,7 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
     super::terminal::numbers(&mut table, 1..);
     super::terminal::show(&table);
     say!(
-        "fit: order {} in {}, {}; held-out rms {:.4} deg/s (noise floor {:.4})",
-        s.fit.order,
+        "fit in {}: {}. Rows that the fit has not seen are {:.4} deg/s rms from it, where noise alone makes {:.4}.",
         s.fit.thermometer,
         s.fit.reason,
         s.fit.heldout_rms_dps,
@@ -160,8 +159,8 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
         say!("chosen: {chosen}");
     }
     say!(
-        "budget of the compensation: bias and rate within {:.5} deg/s of the fitted polynomial (bound); \
-         calibration and fit {:.4} deg/s (estimate)",
+        "budget of the compensation: its words keep bias and rate within {:.5} deg/s of the fitted polynomial (bound). \
+         Calibration and fit add about {:.4} deg/s (estimate).",
         s.budget.bound_dps,
         s.budget.estimate_dps
     );
@@ -198,7 +197,7 @@ fn alternative(line: &Line) -> alternatives::Line<'_> {
         detail: &line.detail,
         cost: line.cost,
         errors: vec![
-            format!("{}", number(line.certified_max_dps, 5)),
+            number(line.certified_max_dps, 5),
             format!("{:.3}", line.certified_max_lsb),
         ],
         undominated: line.undominated,

@@ -190,12 +190,12 @@ fn row(p: &Point, targets: &[String]) -> Vec<String> {
         row.push(format!("{:.1}", 100.0 * part));
     }
     row.extend([
-        format!("{}", number(p.bias_error_dps, 3)),
-        format!("{}", number(p.drift_residual_dps, 3)),
-        format!("{}", number(p.noise_dps_rthz, 3)),
-        format!("{}", number(p.arw_deg_rth, 3)),
+        number(p.bias_error_dps, 3),
+        number(p.drift_residual_dps, 3),
+        number(p.noise_dps_rthz, 3),
+        number(p.arw_deg_rth, 3),
         format!("{:.1}", p.scale_factor_ppm),
-        format!("{}", number(p.spur_dps, 3)),
+        number(p.spur_dps, 3),
         format!("{:.3}", p.merit),
         p.limited_by.to_owned(),
     ]);

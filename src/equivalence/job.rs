@@ -152,7 +152,9 @@ impl Beside {
         let emitted = [emitted(Language::C)?, emitted(Language::Rust)?];
         let mut notes = Vec::new();
         let loops = hunting(design).unwrap_or_else(|error| {
-            notes.push(format!("loops are not measured: {error}"));
+            notes.push(format!(
+                "the loops' limit cycles are not measured, as the run without noise stops: {error}"
+            ));
             Vec::new()
         });
         Ok(Beside {
@@ -293,13 +295,14 @@ fn notes(design: &Design, seen: &Seen, predictions: &[predicted::Prediction]) ->
     let mut notes = Vec::new();
     for (flag, meaning) in predicted::FLAGS {
         if predictions.iter().any(|p| p.flags.contains(&flag)) {
-            notes.push(format!("{flag}: {meaning}"));
+            notes.push(format!("{meaning} [{flag}]"));
         }
     }
     if seen.cut_rows > 0 {
         notes.push(format!(
-            "on {} rows the drive phase lies so near half a turn that fixed and float stand on both sides of \
-             the cut: what is computed from the phase (bias, rate) then differs as the design says it must",
+            "on {} rows the drive phase lies so near half a turn that fixed and float stand on both sides of the cut. What is \
+             computed from the phase (bias, rate) differs there as the design says it must. Turn the phase's zero away \
+             from the operating point if that is not wanted",
             seen.cut_rows
         ));
     }
@@ -309,8 +312,8 @@ fn notes(design: &Design, seen: &Seen, predictions: &[predicted::Prediction]) ->
         .is_some_and(|c| !c.input.is_of_chain());
     if by_channel {
         notes.push(
-            "the compensation's input is a word of its own, not the chain's phase: it is no node of the chain, and \
-             is compared with emitted code only"
+            "the compensation's input is a word of its own, not the chain's phase. It is no node of the chain, and is compared \
+             with emitted code only"
                 .into(),
         );
     }

@@ -156,9 +156,14 @@ impl FirstOverflow {
             operands.join(" and ")
         );
         match &self.repair {
-            Some(r) => text += &format!("; smallest repair: {} from {} to {}", r.key, r.from, r.to),
+            Some(r) => {
+                text += &format!(
+                    ". The smallest change that mends it: {} from {} to {}",
+                    r.key, r.from, r.to
+                )
+            }
             None => {
-                text += "; no wider format within 64 bits a word and 127 an intermediate holds it"
+                text += ". No wider format within 64 bits a word and 127 an intermediate holds it"
             }
         }
         text

@@ -44,11 +44,11 @@ pub struct Prediction {
 pub const FLAGS: [(&str, &str); 12] = [
     (
         "coherent_nco",
-        "the oscillator visits few phases again and again: its table errors are lines, not noise, and roundings may repeat; a figure beside this flag takes the table's errors as they are, and the roundings as noise",
+        "the oscillator visits few phases again and again, so that its table errors are lines, not noise, and roundings may repeat. The predicted figure takes the table's errors as they are, and the roundings as noise",
     ),
     (
         "near_coherent_nco",
-        "the phases drift slowly over few clusters, or the run is short: its table errors are slow waves, not noise, and roundings may repeat; figures as with coherent_nco",
+        "the oscillator's phases drift slowly over few clusters, or the run is short, so that its table errors are slow waves, not noise. The predicted figure is made as with coherent_nco",
     ),
     (
         "few_words",
@@ -69,20 +69,23 @@ pub const FLAGS: [(&str, &str); 12] = [
     ("closed_loop", "the phase loop feeds the error back"),
     (
         "open_loop_integral",
-        "an integral of the error: it grows with time",
+        "this node adds its error up from row to row, so that it grows with time. Its rms has no prediction",
     ),
     (
         "other_form",
-        "the bias is a table or another form that stands for the polynomial; the theory is that of Horner's steps",
+        "the bias is a table or another form that stands for the polynomial. It has no prediction, as the theory is that of Horner's steps",
     ),
-    ("overflow", "this node or one before it has overflowed"),
+    (
+        "overflow",
+        "this node or one before it has overflowed. Its error says nothing of rounding",
+    ),
     (
         "phase_cut",
-        "fixed and float phase lie on both sides of the cut at half a turn on some rows",
+        "on some rows the phase is near half a turn, fixed on one side of the cut and float on the other. The error there is a whole turn",
     ),
     (
         "few_rows",
-        "fewer than 1000 words: the observed figure itself is uncertain",
+        "the node has fewer than 1000 words, so that the observed rms is itself uncertain. Take more samples",
     ),
 ];
 

@@ -128,15 +128,15 @@ pub fn fill(design: &mut Design, fit: &BaselineFit, record: &ThermalRecord) -> R
         overflow: Overflow::Saturate,
     };
     said.push(format!(
-        "coefficients {coefficient}: the largest is {largest:.4} deg/s, the rest of {WORD_BITS} bits \
-         are fraction"
+        "coefficients {coefficient}: the integer bits hold the largest, {largest:.4} deg/s, and the rest of {WORD_BITS} bits are \
+         fraction"
     ));
     said.push(format!(
         "accumulator {accumulator}: holds all terms at once, {sum:.4} deg/s"
     ));
     said.push(format!(
-        "output {output}: rates up to {greatest:.4} deg/s, with a factor of four to spare; one LSB is at \
-         most a 64th of the noise floor"
+        "output {output}: it holds four times the largest rate, {greatest:.4} deg/s, and its LSB is at most a 64th of the \
+         noise floor"
     ));
     design.compensation = Some(compensation);
     Ok(said)
@@ -218,7 +218,7 @@ fn channel(
     let half_range = (fit.half_span / lsb).max(1.0);
     let scale_bits = (half_range.log2().ceil() as u32).clamp(1, 64);
     let said = vec![format!(
-        "input {format} of {}: one LSB moves the bias by {:.6} deg/s, the noise floor is {floor:.6} deg/s",
+        "input {format} of {}: one LSB moves the bias by {:.6} deg/s, far below the noise floor of {floor:.6} deg/s",
         fit.thermometer,
         slope * lsb
     )];

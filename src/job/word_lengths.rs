@@ -129,12 +129,12 @@ impl WordLengths {
         let whose = match self.covers {
             Covers::CircuitAndCompensation => "word lengths of circuit and compensation",
             Covers::Compensation => {
-                "word lengths of the compensation, the only part that a record passes,"
+                "word lengths of the compensation (a record passes no other part)"
             }
         };
         let mut text = format!(
-            "{limiting}: fit {} deg/s (held-out rms), {whose} {} deg/s rms, {} at most (fixed less float, measured \
-             over {} readings)",
+            "{limiting}: fit {} deg/s (held-out rms), {whose} {} deg/s rms, {} at most (fixed point less floating point, over \
+             {} readings)",
             shown(fit_dps, 3),
             shown(self.rms_dps, 2),
             shown(self.max_dps, 2),
@@ -143,14 +143,16 @@ impl WordLengths {
         match &self.largest {
             Some(w) => {
                 text += &format!(
-                    "; the largest of them is {} ({}): with {} alone, {} deg/s are left",
+                    ". The largest part is that of {} ({}): with {} instead, {} deg/s are left",
                     w.key,
                     w.from,
                     w.to,
                     shown(w.left_rms_dps, 2)
                 );
             }
-            None if !self.widened.is_empty() => text += "; no word alone does a notable part of it",
+            None if !self.widened.is_empty() => {
+                text += ". No word alone makes a notable part of it"
+            }
             None => {}
         }
         text += &format!(

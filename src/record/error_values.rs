@@ -111,8 +111,8 @@ fn told(name: &str, marked: &[(f64, usize)], measured: usize, kept: usize) -> Wa
         "error_values",
         name,
         format!(
-            "{} of {measured} cells of {name} hold {}, which lie out of reach of the readings before and after them: error \
-             values, no readings. They count as not measured (line {}{more}){doubtful}",
+            "{} of {measured} cells of {name} hold {}, out of reach of the readings before and after them. These are \
+             error values, not readings. They count as not measured (line {}{more}){doubtful}",
             marked.len(),
             values_of(marked.iter().map(|c| c.0), unit_of(name)),
             lines.join(", ")

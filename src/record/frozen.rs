@@ -23,8 +23,8 @@ pub(super) fn check(record: &ThermalRecord, warnings: &mut Vec<Warning>) {
                     "frozen_channel",
                     name,
                     format!(
-                        "{name} is {low} {} in every row: a frozen channel? Nothing can be \
-                         learnt from it",
+                        "{name} is {low} {} in every row. Nothing can be learnt from it, and the channel may be frozen. Check \
+                         its sensor, or leave the column out",
                         unit_of(name)
                     ),
                 ));

@@ -19,8 +19,8 @@ pub(super) fn check(record: &ThermalRecord) -> Option<Warning> {
             "time_is_calendar_time",
             "time_s",
             format!(
-                "time_s starts at {first:.0} s: calendar time? It is to count from the record's \
-                 start (warm-up effects need that)"
+                "time_s starts at {first:.0} s, which looks like calendar time. Warm-up effects need the time since the record's \
+                 start. Subtract the first row's time"
             ),
         ));
     }

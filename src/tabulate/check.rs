@@ -226,7 +226,7 @@ fn readable(value: f64) -> String {
     match value.abs() {
         v if v < 1e-7 => "0".to_owned(),
         v if (1e-3..1e7).contains(&v) => format!("{value:.6}"),
-        _ => format!("{value}", value = number(value, 5)),
+        _ => number(value, 5),
     }
 }
 

@@ -11,7 +11,7 @@ pub(super) fn polynomial_bits(form: &Form) -> u32 {
     let degree = p.coefficients.len().saturating_sub(1);
     let each = p.formats.coefficients.each(p.monomials, degree);
     let coefficients: u32 = each.iter().map(|f| f.bits()).sum();
-    coefficients + p.formats.intermediate.bits as u32
+    coefficients + p.formats.intermediate.bits
 }
 
 /// The fewest bits from `low` up to below `most` for which `at` has something, and what it has. More bits are better, if

@@ -62,7 +62,7 @@ fn g(value: f64) -> String {
         };
         format!("{value:.*}", digits as usize)
     } else {
-        format!("{value}", value = number(value, 3))
+        number(value, 3)
     }
 }
 

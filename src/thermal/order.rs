@@ -95,9 +95,9 @@ pub fn choose(sample: &Sample, wanted: FitOrder, most: usize, blocks: &[Range<us
         FitOrder::Auto | FitOrder::ByRecord => (
             smallest,
             format!(
-                "order {smallest} is the smallest whose held-out error is within one standard \
-                 error of the least (order {best_order}, {best_rms:.4} deg/s rms, {limit:.4} \
-                 with the standard error)"
+                "order {smallest} is the smallest that may be as good as the best: order {best_order} has the least \
+                 held-out error, {best_rms:.4} deg/s rms, which is known to within one standard error, {limit:.4}, and \
+                 order {smallest} is below that"
             ),
         ),
     };
