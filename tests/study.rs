@@ -425,7 +425,7 @@ fn an_overflow_is_said_first_and_a_wrong_word_in_its_place() {
     assert_eq!(done.status.code(), Some(1));
     let said = String::from_utf8_lossy(&done.stderr).into_owned();
     assert!(
-        said.contains("overflow") && said.contains("smallest repair"),
+        said.contains("overflow") && said.contains("smallest change that mends it"),
         "{said}"
     );
     let path = folder.path().join("wrong.toml");

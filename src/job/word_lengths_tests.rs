@@ -42,7 +42,7 @@ fn a_short_product_is_named_with_what_it_does() {
         sentence.starts_with("The fit limits the result: fit "),
         "{sentence}"
     );
-    assert!(sentence.contains("the largest of them is circuit.demodulator.product (Q2.10)"));
+    assert!(sentence.contains("The largest part is that of circuit.demodulator.product (Q2.10)"));
     assert!(sentence.contains("The compensation alone is within 0.00031 deg/s"));
     let clause = words.clause(fit);
     assert!(
