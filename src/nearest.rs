@@ -53,7 +53,7 @@ mod tests {
 
     #[test]
     fn a_beginning_names_the_word_if_it_is_of_one_alone() {
-        let known = ["bias_dps", "drift_dps", "chamber_degc", "chamber_k"];
+        let known = ["bias_dps", "drift_dps", "chamber_degc", "chamber_kelvin"];
         assert_eq!(nearest("bias", &known), Some("bias_dps"));
         assert_eq!(nearest("chamber", &known), None);
         assert_eq!(nearest("dr", &known), None);

@@ -110,7 +110,7 @@ fn idle_bits_and_a_coarse_output_are_named() {
     let product = ("idle_bits", "circuit.demodulator.product drive_q");
     assert!(codes(&c).contains(&product), "{:?}", codes(&c));
     let remark = c.remarks.iter().find(|r| r.node == product.1).unwrap();
-    assert_eq!(remark.mend, "Q1.20 holds every value");
+    assert_eq!(remark.mend, "make it Q1.20, which holds every value");
     assert!(
         codes(&c).contains(&("output_hides_fit", "compensation.output")),
         "{:?}",
