@@ -194,7 +194,7 @@ fn capture(samples: usize) -> (Vec<i32>, Vec<i32>) {
         let (si, co, m) = (entry(phase, 0), entry(phase, 256), entry(slow, 0));
         let (first, second) = (noise(), noise());
         let drive = ((26000 * si) >> 15) + first;
-        let sense = ((((m * 3000) >> 15) + 9000) * co >> 15) + ((2000 * si) >> 15) + second;
+        let sense = (((((m * 3000) >> 15) + 9000) * co) >> 15) + ((2000 * si) >> 15) + second;
         (drive.clamp(-32768, 32767), sense.clamp(-32768, 32767))
     };
     (0..samples).map(one).unzip()

@@ -152,8 +152,6 @@ fn a_polynomial_for_a_bound_is_the_bias_and_its_damage_is_caught() {
     let at = folder.path();
     let summary = run("bound_dps = 0.01\nform = \"auto\"", at);
     check(&summary, 0.01);
-    let certified = &summary["certainty"]["bounds"]["certified_max_dps"];
-    assert!(certified.as_f64().expect("a number") < 0.001);
     good(
         &["emit", "out/design.toml", "--lang", "c", "--out", "c"],
         at,
