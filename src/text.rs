@@ -56,8 +56,8 @@ pub fn shown(text: &str, place: Place) -> String {
     shown
 }
 
-/// What is nothing in any unit that is told.
-const NOTHING: f64 = 1e-18;
+/// A number nearer to 0 is told as 0, in whatever unit (convention: nothing that is told here is so small).
+const TOLD_AS_ZERO_BELOW: f64 = 1e-18;
 
 /// A number in a sentence: so many significant digits; as a power of ten only below 1e-4 and from 1e7 on, 0 where it is
 /// nothing.
@@ -65,7 +65,7 @@ pub fn number(value: f64, digits: usize) -> String {
     if !value.is_finite() {
         return "unknown".to_owned();
     }
-    if value.abs() < NOTHING {
+    if value.abs() < TOLD_AS_ZERO_BELOW {
         return "0".to_owned();
     }
     let digits = digits.max(1);

@@ -52,8 +52,8 @@ pub(super) fn front(s: &Study, target: &str, width: f64) -> Figure {
     let all = || points.iter().chain(&given);
     let x = axis(
         all().map(|p| p.0),
-        "merit: the largest figure in parts of its limit",
-        "1",
+        "merit: the largest figure",
+        "of its limit",
     );
     let y = axis(all().map(|p| p.1), "cost", target);
     let mut svg = Svg::new(width);
