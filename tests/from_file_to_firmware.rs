@@ -212,7 +212,7 @@ fn a_simulated_run_and_its_own_record_say_why_their_orders_differ() {
     let own = of(&["run", "--out", "own"]);
     let again = of(&["run", "--record", "own/record.csv", "--out", "again"]);
     assert!(
-        own.contains(": order 2 ") && own.contains("by held-out error it would be order 3"),
+        own.contains(": order 2,") && own.contains("by held-out error it would be order 3"),
         "{own}"
     );
     assert!(
@@ -220,7 +220,7 @@ fn a_simulated_run_and_its_own_record_say_why_their_orders_differ() {
         "{own}"
     );
     assert!(
-        again.contains(": order 3 ") && again.contains("the simulated run of a design takes 2"),
+        again.contains(": order 3,") && again.contains("the simulated run of a design takes 2"),
         "{again}"
     );
     let floor = |line: &str| line.rsplit_once("noise alone makes ").map(|l| l.1.to_owned());
