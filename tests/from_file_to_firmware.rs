@@ -220,7 +220,7 @@ fn a_simulated_run_and_its_own_record_say_why_their_orders_differ() {
         "{own}"
     );
     assert!(
-        again.contains(": order 3,") && again.contains("the simulated run of a design takes 2"),
+        again.contains(": order 3 ") && again.contains("the simulated run of a design takes 2"),
         "{again}"
     );
     let floor = |line: &str| line.rsplit_once("noise alone makes ").map(|l| l.1.to_owned());
