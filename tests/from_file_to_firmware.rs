@@ -223,6 +223,9 @@ fn a_simulated_run_and_its_own_record_say_why_their_orders_differ() {
         again.contains(": order 3 ") && again.contains("the simulated run of a design takes 2"),
         "{again}"
     );
-    let floor = |line: &str| line.rsplit_once("noise alone makes ").map(|l| l.1.to_owned());
+    let floor = |line: &str| {
+        line.rsplit_once("noise alone makes ")
+            .map(|l| l.1.to_owned())
+    };
     assert_eq!(floor(&own), floor(&again));
 }
