@@ -84,6 +84,43 @@ pub fn number(value: f64, digits: usize) -> String {
     format!("{rounded:.decimals$}")
 }
 
+/// A bound in a sentence: [`number`], rounded away from 0, so that what is printed is never below what was proved.
+pub fn at_most(value: f64, digits: usize) -> String {
+    number(away_from_zero(value, digits), digits)
+}
+
+/// The nearest number of so many significant digits that is not nearer to 0 than `value`.
+pub fn away_from_zero(value: f64, digits: usize) -> f64 {
+    let decimals = digits.max(1) - 1;
+    let scientific = format!("{:.decimals$e}", value.abs());
+    let read = |text: &str| text.parse::<f64>().unwrap_or(value.abs());
+    if !value.is_finite() || read(&scientific) >= value.abs() {
+        return if value.is_finite() {
+            read(&scientific).copysign(value)
+        } else {
+            value
+        };
+    }
+    let Some((mantissa, exponent)) = scientific.split_once('e') else {
+        return value;
+    };
+    let last: u128 = mantissa.replace('.', "").parse().unwrap_or(0);
+    let exponent = exponent.parse::<i64>().unwrap_or(0) - decimals as i64;
+    read(&format!("{}e{exponent}", last + 1)).copysign(value)
+}
+
+/// The nearest number of so many decimals that is not nearer to 0 than `value`: for columns of a table.
+pub fn away_from_zero_decimals(value: f64, decimals: usize) -> String {
+    let nearest = format!("{:.decimals$}", value.abs());
+    let sign = if value < 0.0 { "-" } else { "" };
+    let is_below = nearest.parse::<f64>().is_ok_and(|n| n < value.abs());
+    if !is_below {
+        return format!("{sign}{nearest}");
+    }
+    let step = 10f64.powi(decimals as i32).recip();
+    format!("{sign}{:.decimals$}", value.abs() + 0.5 * step)
+}
+
 /// [`shown`] line by line: of a text that has lines of its own.
 pub fn lines(text: &str, place: Place) -> String {
     let lines: Vec<String> = text.split('\n').map(|line| shown(line, place)).collect();

@@ -40,6 +40,18 @@ fn hostile() -> impl Strategy<Value = String> {
 
 proptest! {
     #[test]
+    fn a_bound_is_never_printed_below_itself(mantissa in -1e3f64..1e3, exponent in -30i32..12, digits in 1usize..7) {
+        let value = mantissa * 10f64.powi(exponent);
+        let up = away_from_zero(value, digits);
+        prop_assert!(up.abs() >= value.abs() && up.abs() <= value.abs() * (1.0 + 10f64.powi(1 - digits as i32)));
+        let printed: f64 = at_most(value, digits).parse().unwrap();
+        prop_assert!(value.abs() < TOLD_AS_ZERO_BELOW || printed == up, "{printed} {up}");
+        let column: f64 = away_from_zero_decimals(value, digits).parse().unwrap();
+        let step = 10f64.powi(-(digits as i32));
+        prop_assert!(column.abs() >= value.abs(), "{column} {value}");
+        prop_assert!(column.abs() <= value.abs() + step * 1.001 + value.abs() * 1e-15);
+    }
+    #[test]
     fn in_a_source_nothing_ends_a_comment_or_a_string(text in hostile()) {
         let shown = shown(&text, Place::Source);
         prop_assert!(!shown.ends_with('\\'));

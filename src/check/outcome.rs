@@ -4,8 +4,9 @@ use super::budget::Line;
 use super::remarks::Remark;
 use super::requirements::Requirement;
 use crate::cost::Cost;
-use crate::numeric::format::Rounding;
+use crate::numeric::format::{Format, Rounding};
 use crate::study::certainty::Confidence;
+use crate::text::number;
 use serde::Serialize;
 
 /// What is known of a word's overflow.
@@ -66,6 +67,20 @@ pub struct NodeCheck {
 }
 
 impl NodeCheck {
+    /// A range of raw words as values, in the unit of the compensation where it is one of its words; raw where the word
+    /// has no format.
+    pub fn in_units(&self, [low, high]: [i128; 2]) -> String {
+        let Ok(format) = self.format.parse::<Format>() else {
+            return format!("the raw words {low} to {high}");
+        };
+        let unit = match self.name.starts_with("compensation.") {
+            true => " deg/s",
+            false => "",
+        };
+        let value = |raw: i128| number(raw as f64 * format.lsb(), 5);
+        format!("{} to {}{unit}", value(low), value(high))
+    }
+
     /// What makes the check fail, in a sentence.
     pub fn failure(&self) -> Option<String> {
         if self.overflow != Overflows::Certain {

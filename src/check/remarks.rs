@@ -76,8 +76,15 @@ fn idle_bits(node: &NodeCheck, all: &mut Vec<Remark>) {
         code: "idle_bits",
         node: node.name.clone(),
         message: format!(
-            "its raw words go from {} to {} at most (proved), so that {idle} of the upper bits of {} never change",
-            node.proved[0], node.proved[1], node.format
+            "its raw words go from {} to {} at most (proved), so that {} of {} {} needed",
+            node.proved[0],
+            node.proved[1],
+            match idle {
+                1 => "the highest bit".to_owned(),
+                _ => format!("the {idle} highest bits"),
+            },
+            node.format,
+            if idle == 1 { "is not" } else { "are not" }
         ),
         mend,
     });

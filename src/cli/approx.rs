@@ -16,7 +16,7 @@ use crate::tabulate::job;
 use crate::tabulate::job::{Asked, Request, Weight};
 use crate::tabulate::outcome::{Alternative, Outcome, Search};
 use crate::tabulate::selection::Reason;
-use crate::text::number;
+use crate::text::{at_most, number};
 use crate::timing;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -147,7 +147,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     }
     Err(Error::Check(format!(
         "the certified error {} is above the bound",
-        number(made.outcome.error.certified_max_abs, 3)
+        at_most(made.outcome.error.certified_max_abs, 3)
     )))
 }
 
@@ -225,7 +225,7 @@ fn print(o: &Outcome, out: &std::path::Path) {
         f.intermediate.as_deref().unwrap_or("none")
     );
     let lsb = f.output.parse::<Format>().map_or(1.0, Format::lsb);
-    let shown = |v: f64| format!("{v} ({:.3} LSB)", v / lsb, v = number(v, 6));
+    let shown = |v: f64| format!("{} ({} LSB)", at_most(v, 6), at_most(v / lsb, 4));
     say!(
         "certified error at most {}",
         shown(o.error.certified_max_abs)
@@ -272,7 +272,7 @@ fn alternative(a: &Alternative) -> alternatives::Line<'_> {
     alternatives::Line {
         detail: &a.detail,
         cost: a.cost,
-        errors: vec![number(a.certified_max_abs, 5)],
+        errors: vec![at_most(a.certified_max_abs, 5)],
         undominated: a.undominated,
         chosen: a.chosen,
     }
@@ -282,7 +282,7 @@ fn alternative(a: &Alternative) -> alternatives::Line<'_> {
 fn taken(search: &Search) -> String {
     let part = match search.rounding_part {
         part if part < 0.001 => "less than 0.1 %".to_owned(),
-        part if part < 1.0 => format!("{} %", number(100.0 * part, 2)),
+        part if part < 1.0 => format!("{} %", at_most(100.0 * part, 2)),
         // A bound of the rounding, beside an error that was found.
         _ => "all".to_owned(),
     };

@@ -4,6 +4,7 @@ use super::recorded::Recorded;
 use super::stages::Stages;
 use super::terminal::OutputFormat;
 use crate::check::outcome::{Check, NodeCheck, Overflows};
+use crate::check::remarks::Remark;
 use crate::check::{self, SAMPLES};
 use crate::error::{Error, Result};
 use crate::output::Results;
@@ -81,16 +82,13 @@ fn print(check: &Check) {
         .iter()
         .filter(|n| n.overflow == Overflows::Possible)
     {
-        let operands: Vec<String> = node
-            .operands
-            .iter()
-            .map(|[low, high]| format!("{low} to {high}"))
-            .collect();
         say!(
-            "{} can {}: what goes into it ranges over the raw words {}. From there it reaches {}.",
+            "{} can {}: its value ranges over {} (proved), and {} holds {}. From there it reaches {}.",
             node.name,
             node.mode,
-            operands.join(" and "),
+            node.in_units(node.proved),
+            node.format,
+            node.in_units(node.limits),
             node.path.get(1..).unwrap_or_default().join(" > ")
         );
     }
@@ -140,14 +138,25 @@ fn print(check: &Check) {
         );
     }
     requirements(check);
-    for remark in &check.remarks {
+    let mut rest = check.remarks.as_slice();
+    while let Some(remark) = rest.first() {
+        let key = |r: &Remark| r.node.split(' ').next().unwrap_or_default().to_owned();
+        let is_like = |r: &&Remark| {
+            (r.code, key(r), &r.message, &r.mend)
+                == (remark.code, key(remark), &remark.message, &remark.mend)
+        };
+        let (like, others) = rest.split_at(rest.iter().take_while(is_like).count());
+        let node = match like.len() {
+            1 => remark.node.clone(),
+            count => format!("{} ({count} words)", key(remark)),
+        };
         say!(
-            "{}: {}. To mend it, {} [{}]",
-            remark.node,
+            "{node}: {}. To mend it, {} [{}]",
             remark.message,
             remark.mend,
             remark.code
         );
+        rest = others;
     }
     say!(
         "{}",

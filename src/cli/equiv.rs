@@ -12,7 +12,7 @@ use crate::equivalence::shrink;
 use crate::error::{Error, Result};
 use crate::output::{Results, name_of};
 use crate::record::capture::CaptureReader;
-use crate::text::number;
+use crate::text::{away_from_zero_decimals, number};
 use crate::timing;
 use std::path::{Path, PathBuf};
 
@@ -246,15 +246,18 @@ fn print_spurs(e: &Equivalence) {
 }
 
 fn row(n: &NodeReport) -> Vec<String> {
-    let lsb = |v: f64| format!("{:.3}", v / n.lsb);
+    let decimals = |v: f64| if v.abs() < 1e3 { 3 } else { 0 };
+    let lsb = |v: f64| format!("{:.*}", decimals(v / n.lsb), v / n.lsb);
+    let bound = n.bound / n.lsb;
+    let unit = if n.unit == "1" { "" } else { n.unit };
     let some = |v: Option<f64>| v.map_or("-".to_owned(), lsb);
     vec![
         n.name.clone(),
         lsb(n.max_abs_error),
-        lsb(n.bound),
+        away_from_zero_decimals(bound, decimals(bound)),
         lsb(n.rms_error),
         some(n.predicted_rms),
-        format!("{} {}", number(n.lsb, 3), n.unit),
+        format!("{} {unit}", number(n.lsb, 3)).trim_end().to_owned(),
         n.headroom_bits.map_or("-".into(), |b| format!("{b:.2}")),
         n.overflows.to_string(),
         n.flags.join(" "),

@@ -10,7 +10,7 @@ use crate::job;
 use crate::job::bound::Line;
 use crate::job::outcome::{Drift, Outcome};
 use crate::output::Results;
-use crate::text::number;
+use crate::text::at_most;
 use crate::timing;
 use std::path::PathBuf;
 
@@ -159,9 +159,9 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
         say!("chosen: {chosen}");
     }
     say!(
-        "budget of the compensation: its words keep bias and rate within {:.5} deg/s of the fitted polynomial (bound). \
+        "budget of the compensation: its words keep bias and rate within {} deg/s of the fitted polynomial (bound). \
          Calibration and fit add about {:.4} deg/s (estimate).",
-        s.budget.bound_dps,
+        at_most(s.budget.bound_dps, 3),
         s.budget.estimate_dps
     );
     for line in &s.certainty_text {
@@ -197,8 +197,8 @@ fn alternative(line: &Line) -> alternatives::Line<'_> {
         detail: &line.detail,
         cost: line.cost,
         errors: vec![
-            number(line.certified_max_dps, 5),
-            format!("{:.3}", line.certified_max_lsb),
+            at_most(line.certified_max_dps, 5),
+            at_most(line.certified_max_lsb, 4),
         ],
         undominated: line.undominated,
         chosen: line.chosen,

@@ -8,7 +8,7 @@ use crate::design::{Compensation, Design, Outside};
 use crate::error::{Error, InputError, Result};
 use crate::tabulate::choice;
 use crate::tabulate::describe;
-use crate::text::number;
+use crate::text::{at_most, number};
 use serde::Serialize;
 
 /// Words that are all run; of more, as many evenly spread.
@@ -284,9 +284,9 @@ pub fn sentences(design: &Design, bounds: &Bounds) -> Vec<String> {
         "The firmware's bias is at most {} from the {against} (proved{unless}). Of this the coefficients' words make {}, the \
          rounding of the steps {} and that of the output {} deg/s.",
         figure(design, bounds.certified_max_dps),
-        number(bounds.coefficients_dps, 3),
-        number(bounds.evaluation_dps, 3),
-        number(bounds.output_dps, 3)
+        at_most(bounds.coefficients_dps, 3),
+        at_most(bounds.evaluation_dps, 3),
+        at_most(bounds.output_dps, 3)
     )];
     if let Some(asked) = design.bound {
         let covered = bounds.certified_max_dps + output_rounding_dps(c);
@@ -299,7 +299,7 @@ pub fn sentences(design: &Design, bounds: &Bounds) -> Vec<String> {
             "Bias and rate were asked to be within {} deg/s of it at every calibrated input. With the rounding of the rate \
              they are within {}: {word}.",
             asked.bound_dps,
-            number(covered, 3)
+            at_most(covered, 3)
         ));
     }
     if let Some(form) = c.form.as_ref() {
@@ -326,7 +326,7 @@ pub fn sentences(design: &Design, bounds: &Bounds) -> Vec<String> {
             "Outside the calibrated inputs the contract is {}: there the bias is up to {} deg/s from the polynomial, \
              continued to every input.",
             outside.contract,
-            number(outside.worst_dps, 3)
+            at_most(outside.worst_dps, 3)
         ));
     }
     lines
@@ -357,8 +357,8 @@ fn output_rounding_dps(c: &Compensation) -> f64 {
 fn figure(design: &Design, dps: f64) -> String {
     let output = design.compensation.as_ref().map(|c| c.output.format.lsb());
     format!(
-        "{dps} deg/s ({:.3} output LSB)",
-        dps / output.unwrap_or(1.0),
-        dps = number(dps, 3)
+        "{} deg/s ({} output LSB)",
+        at_most(dps, 3),
+        at_most(dps / output.unwrap_or(1.0), 3)
     )
 }

@@ -17,6 +17,7 @@ use crate::numeric::fixed::{Fixed, Words};
 use crate::numeric::format::{Overflow, Quantizer, Rounding, pow2};
 use crate::numeric::trace::Trace;
 use crate::numeric::trace::ir::{Interval, Program};
+use crate::text::at_most;
 
 /// The emitted function.
 pub const CONVERT: &str = "convert";
@@ -148,11 +149,11 @@ impl Conversion {
         ];
         facts.extend(self.channels.iter().map(|c| {
             format!(
-                "{} = the mean of {}: {}; at most {:.3} LSB from the exact mean",
+                "{} = the mean of {}: {}; at most {} LSB from the exact mean",
                 c.name(),
                 c.column.source.name(),
                 c.meaning,
-                c.error_lsb
+                at_most(c.error_lsb, 3)
             )
         }));
         if self.channels.iter().any(|c| c.column.turn.is_some()) {

@@ -3,7 +3,7 @@
 use super::curve::name;
 use super::plan::{Plan, Term};
 use super::run::Correction;
-use crate::text::number;
+use crate::text::{at_most, number};
 
 /// The plan and its words, one line each: how it is called, its inputs, its terms, its bound.
 pub fn facts(correction: &Correction) -> Vec<String> {
@@ -34,7 +34,7 @@ pub fn facts(correction: &Correction) -> Vec<String> {
     };
     facts.push(format!(
         "at most {} deg/s from these terms in real numbers (analysis), where no word saturates{relay}",
-        number(correction.bound_dps(), 3)));
+        at_most(correction.bound_dps(), 3)));
     facts
 }
 

@@ -17,7 +17,7 @@ use crate::design::{BiasBound, Compensation, CompensationInput, Design, limits};
 use crate::error::{InputError, Result};
 use crate::numeric::format::Format;
 use crate::tabulate::choice;
-use crate::text::number;
+use crate::text::{at_most, number};
 use crate::thermal::BaselineFit;
 use serde::Serialize;
 
@@ -336,7 +336,7 @@ fn unreached(
          rounding of the rate leaves room for {room}",
         c.coefficient_format,
         c.accumulator.format,
-        has = number(has, 3),
+        has = at_most(has, 3),
         room = number(room, 3)
     );
     Ok(InputError::new(message).help(match finer {

@@ -1,6 +1,6 @@
 //! The nodes of a design: names, units and formats, in the order of the circuit's steps.
 
-use super::node::Identity;
+use super::node::{Identity, UNLIMITED};
 use crate::circuit::CHANNELS;
 use crate::design::Design;
 use crate::numeric::format::{Format, Overflow, Quantizer, pow2};
@@ -124,12 +124,7 @@ impl Layout {
             self.places.bias = Some(self.identities.len());
             self.quantized("compensation.output bias".into(), "deg/s", c.output);
             let bits = c.output.format.fraction_bits as i32;
-            self.push(
-                "compensation.output input".into(),
-                "deg/s",
-                bits,
-                signed(127),
-            );
+            self.push("compensation.output input".into(), "deg/s", bits, UNLIMITED);
             self.quantized("compensation.output rate".into(), "deg/s", c.output);
         }
         if let Some(l) = &circuit.phase_loop {

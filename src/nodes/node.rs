@@ -6,6 +6,9 @@ use crate::numeric::cast::Label;
 use crate::numeric::lane::Lane;
 use crate::numeric::paired::Pair;
 
+/// Of an exact intermediate, which is held by no word of the design.
+pub const UNLIMITED: (i128, i128) = (i128::MIN, i128::MAX);
+
 /// What a node is.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identity {
@@ -214,7 +217,7 @@ impl Node {
     /// log2 of how many times larger the words could become before the format is left: of the
     /// tighter end. `None` for a node that never left 0 or saw nothing.
     pub fn headroom_bits(&self) -> Option<f64> {
-        if self.count == 0 {
+        if self.count == 0 || self.identity.limits == UNLIMITED {
             return None;
         }
         let (low, high) = self.identity.limits;

@@ -7,7 +7,7 @@
 use super::columns;
 use super::temperature::temperature;
 use super::thermal::ThermalRecord;
-use super::warning::Warning;
+use super::warning::{Warning, unit_in_design};
 use super::{scale, timing};
 use crate::statistics::stats;
 use crate::text::number;
@@ -88,12 +88,13 @@ fn phase(c: &Column<'_>) -> Option<Warning> {
     let steps = c.values.windows(2).map(|w| (w[1] - w[0]).abs());
     let wraps = steps.filter(|d| (*d - TAU).abs() < 0.25 * TAU).count();
     let span = c.quantile(0.95) - c.quantile(0.05);
+    let said = |unit: &str| format!("If it is, say so: {}", unit_in_design("phase_rad", unit));
     if largest > TAU {
         return c.warn(
             "phase_in_degrees",
             format!(
-                "phase_rad runs from {range}: beyond a full turn of 2 pi, so it looks like \
-                 degrees; divide by 57.29578 if it is"
+                "phase_rad runs from {range}, and a full turn is 6.283 rad. It looks like degrees. {}",
+                said("deg")
             ),
         );
     }
@@ -101,8 +102,8 @@ fn phase(c: &Column<'_>) -> Option<Warning> {
         return c.warn(
             "phase_wraps",
             format!(
-                "phase_rad jumps by a full turn {wraps} times (range {range}): unwrap it, or the \
-                 polynomial sees two ends of one temperature"
+                "phase_rad runs from {range} and jumps by a full turn {wraps} times. One temperature has two phases then, which \
+                 no polynomial can follow. Unwrap the phase"
             ),
         );
     }
@@ -110,8 +111,9 @@ fn phase(c: &Column<'_>) -> Option<Warning> {
         return c.warn(
             "phase_in_degrees",
             format!(
-                "phase_rad runs from {range}: a resonator's phase moves by half a turn (pi) at \
-                 most, so this looks like degrees; divide by 57.29578 if it is"
+                "phase_rad runs from {range}, and a resonator's phase moves by half a turn (3.142 rad) at most. It looks like \
+                 degrees. {}",
+                said("deg")
             ),
         );
     }
@@ -119,7 +121,10 @@ fn phase(c: &Column<'_>) -> Option<Warning> {
     if beyond > 0 {
         return c.warn(
             "phase_out_of_range",
-            format!("{beyond} values of phase_rad lie beyond 2 pi, the first on line {line}"),
+            format!(
+                "{beyond} values of phase_rad lie beyond a full turn (6.283 rad), the first on line {line}. Glitches bend the \
+                 fit. Leave their cells empty"
+            ),
         );
     }
     None
@@ -134,10 +139,12 @@ fn rate(c: &Column<'_>) -> Option<Warning> {
             "rate_out_of_range",
             name,
             format!(
-                "{beyond} values of {name} lie beyond +-20000 deg/s (range {:.1} to {:.1}), the \
-                 first on line {line}: raw codes or millidegrees, not deg/s?",
+                "{beyond} values of {name} lie beyond +-20000 deg/s (range {:.1} to {:.1}), the first on line {line}, and no \
+                 gyro turns so fast. They look like mdeg/s or raw codes. If they are mdeg/s, say so: {}. Multiply raw codes by \
+                 the gyro's scale first",
                 c.min(),
-                c.max()
+                c.max(),
+                unit_in_design(name, "mdps")
             ),
         )
     })
@@ -178,10 +185,11 @@ fn at_rest(c: &Column<'_>) -> Option<Warning> {
         return c.warn(
             "rate_in_millidegrees",
             format!(
-                "{} is about {middle:.1} deg/s with a noise of {noise_dps:.2} deg/s at rest, and no gyro has such: mdeg/s? Say so in the design if it is: \
-                 [record.columns] rate_out_dps = {{ column = \"rate_out_dps\", unit = \"mdps\" }}; raw codes are to be \
-                 multiplied by the gyro's scale first; and if it was turning, rate_dps is to say how fast",
-                c.name
+                "{} is about {middle:.1} deg/s with a noise of {noise_dps:.2} deg/s at rest, and no gyro has such. It looks \
+                 like mdeg/s or raw codes. If it is mdeg/s, say so: {}. Multiply raw codes by the gyro's scale first. If the \
+                 gyro was turning, give the rate in rate_dps",
+                c.name,
+                unit_in_design(c.name, "mdps")
             ),
         );
     }
@@ -206,9 +214,9 @@ fn at_rest(c: &Column<'_>) -> Option<Warning> {
         return c.warn(
             "rate_in_radians",
             format!(
-                "{} {why}: rad/s? Say so in the design if it is: [record.columns] rate_out_dps = {{ column = \
-                 \"rate_out_dps\", unit = \"rad/s\" }}",
-                c.name
+                "{} {why}. It looks like rad/s. If it is, say so: {}",
+                c.name,
+                unit_in_design(c.name, "rad/s")
             ),
         );
     }
@@ -221,7 +229,10 @@ fn frequency(c: &Column<'_>) -> Option<Warning> {
     if low > 0 {
         return c.warn(
             "frequency_out_of_range",
-            format!("{low} values of freq_hz are not positive, the first on line {line}"),
+            format!(
+                "{low} values of freq_hz are not positive, the first on line {line}. No frequency is. Leave cells empty that \
+                 were not measured"
+            ),
         );
     }
     (c.median() < 200.0).then(|| {
@@ -229,9 +240,10 @@ fn frequency(c: &Column<'_>) -> Option<Warning> {
             "frequency_in_kilohertz",
             c.name,
             format!(
-                "freq_hz is about {:.6}: no gyro resonates so low; kHz, or an offset from a \
-                 reference, rather than Hz?",
-                c.median()
+                "freq_hz is about {:.6}, and no gyro resonates so low. It looks like kHz, or like an offset from a reference. \
+                 If it is kHz, say so: {}. Add the reference to an offset",
+                c.median(),
+                unit_in_design(c.name, "kHz")
             ),
         )
     })
@@ -244,8 +256,8 @@ fn gain(c: &Column<'_>) -> Option<Warning> {
             "agc_not_relative",
             c.name,
             format!(
-                "agc is about {:.6}; it is the drive gain relative to nominal, so about 1: divide \
-                 by its nominal value",
+                "agc is about {:.6}. It is the drive gain relative to its nominal value, so that about 1 is expected. Divide it \
+                 by the nominal value",
                 c.median()
             ),
         )
@@ -260,10 +272,11 @@ fn supply(c: &Column<'_>) -> Option<Warning> {
             "supply_out_of_range",
             c.name,
             format!(
-                "{beyond} values of supply_v lie outside 0..100 V (range {:.3} to {:.3}), the \
-                 first on line {line}: millivolts?",
+                "{beyond} values of supply_v lie outside 0 to 100 V (range {:.3} to {:.3}), the first on line {line}. They look \
+                 like mV. If they are, say so: {}",
                 c.min(),
-                c.max()
+                c.max(),
+                unit_in_design(c.name, "mV")
             ),
         )
     })
@@ -279,8 +292,9 @@ fn acceleration(c: &Column<'_>) -> Option<Warning> {
         return c.warn(
             "acceleration_in_m_per_s2",
             format!(
-                "accel_g is about 9.8 in {gravity} of {measured} rows and hardly ever more: \
-                 gravity in m/s^2? Divide by 9.80665"
+                "accel_g is about 9.8 in {gravity} of {measured} rows and hardly ever more. It looks like gravity in m/s^2. If \
+                 it is, say so: {}",
+                unit_in_design(c.name, "m/s^2")
             ),
         );
     }
@@ -289,7 +303,10 @@ fn acceleration(c: &Column<'_>) -> Option<Warning> {
         Warning::on(
             "acceleration_out_of_range",
             c.name,
-            format!("{beyond} values of accel_g lie beyond 20000 g, the first on line {line}"),
+            format!(
+                "{beyond} values of accel_g lie beyond 20000 g, the first on line {line}. No gyro survives that. Check the \
+                 unit, and leave cells of glitches empty"
+            ),
         )
     })
 }

@@ -17,7 +17,9 @@ pub(super) fn check(record: &ThermalRecord) -> Option<Warning> {
         return Some(Warning::on(
             code,
             "rate_out_dps",
-            format!("rate_out_dps follows rate_dps with slope {slope:.5}: {what}"),
+            format!(
+                "rate_out_dps follows rate_dps with slope {slope:.5}, where 1 is expected. {what}"
+            ),
         ));
     }
     both_in_radians(applied)
@@ -28,21 +30,24 @@ fn meaning(slope: f64) -> Option<(&'static str, &'static str)> {
     Some(if (0.5..=2.0).contains(&slope) {
         return None;
     } else if (-2.0..=-0.5).contains(&slope) {
-        ("rate_sign_reversed", "one of the two has the opposite sign")
+        (
+            "rate_sign_reversed",
+            "One of the two has the opposite sign. Turn it round in one of them",
+        )
     } else if (0.012..=0.023).contains(&slope.abs()) {
         (
             "rate_in_radians",
-            "rate_out_dps looks like rad/s: multiply by 57.29578",
+            "rate_out_dps looks like rad/s. If it is, multiply it by 57.29578, or say its unit in [record.columns]",
         )
     } else if (43.0..=75.0).contains(&slope.abs()) {
         (
             "rate_in_radians",
-            "rate_dps looks like rad/s: multiply by 57.29578",
+            "rate_dps looks like rad/s. If it is, multiply it by 57.29578, or say its unit in [record.columns]",
         )
     } else {
         (
             "scale_not_nominal",
-            "rate_out_dps is to be at nominal scale, so about 1 is expected",
+            "One of the two has another unit or scale. Divide rate_out_dps by the slope, or say the unit in [record.columns]",
         )
     })
 }
@@ -160,8 +165,8 @@ fn both_in_radians(applied: &[f64]) -> Option<Warning> {
             "rate_in_radians",
             "rate_dps",
             format!(
-                "the {} rates that were applied are whole numbers of deg/s if rate_dps is in \
-                 rad/s: multiply rate_dps and rate_out_dps by 57.29578 if so",
+                "the {} rates that were applied are whole numbers of deg/s if rate_dps is in rad/s. If it is, multiply \
+                 rate_dps and rate_out_dps by 57.29578, or say their units in [record.columns]",
                 rates.len()
             ),
         )

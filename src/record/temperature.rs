@@ -1,7 +1,7 @@
 //! Temperatures that are unlikely to be in degC: other units, raw codes.
 
 use super::plausibility::Column;
-use super::warning::Warning;
+use super::warning::{Warning, unit_in_design};
 
 /// Hotter than a gyro is, as a rule, degC: industrial parts end at 85, and heat themselves by some kelvin.
 const HOTTEST_DEGC: f64 = 105.0;
@@ -11,16 +11,12 @@ const HOTTEST_DEGC: f64 = 105.0;
 pub(super) fn temperature(c: &Column<'_>) -> Option<Warning> {
     let name = c.name;
     let range = format!("{:.2} to {:.2}", c.min(), c.max());
-    let said = |unit: &str| {
-        format!(
-            "say so in the design if it is: [record.columns] {name} = {{ column = \"{name}\", unit = \"{unit}\" }}"
-        )
-    };
+    let said = |unit: &str| format!("If it is, say so: {}", unit_in_design(name, unit));
     if (200.0..=450.0).contains(&c.median()) && c.quantile(0.05) > 150.0 {
         return c.warn(
             "temperature_in_kelvin",
             format!(
-                "{name} runs from {range}: it looks like kelvin; {}",
+                "{name} runs from {range}. It looks like kelvin. {}",
                 said("K")
             ),
         );
@@ -31,8 +27,8 @@ pub(super) fn temperature(c: &Column<'_>) -> Option<Warning> {
         return c.warn(
             "temperature_in_fahrenheit",
             format!(
-                "{name} runs from {range}: no gyro is rated beyond 125 degC, and few are heated beyond {HOTTEST_DEGC}. It \
-                 looks like Fahrenheit ({:.1} to {:.1} degC); {}",
+                "{name} runs from {range}, where no gyro is rated beyond 125 degC and few are heated beyond {HOTTEST_DEGC}. It \
+                 looks like Fahrenheit ({:.1} to {:.1} degC). {}",
                 celsius(c.min()),
                 celsius(c.max()),
                 said("degF")
@@ -51,8 +47,8 @@ pub(super) fn temperature(c: &Column<'_>) -> Option<Warning> {
         return c.warn(
             "temperature_out_of_range",
             format!(
-                "{name} runs from {range}: degrees times {times} ({:.1} to {:.1} degC)? Then {}; raw codes are to be \
-                 converted by the thermometer's law first",
+                "{name} runs from {range}. It looks like degrees times {times} ({:.1} to {:.1} degC). {}. Convert raw codes by \
+                 the thermometer's law first",
                 c.min() / times,
                 c.max() / times,
                 said(unit)
@@ -63,8 +59,9 @@ pub(super) fn temperature(c: &Column<'_>) -> Option<Warning> {
         return c.warn(
             "temperature_out_of_range",
             format!(
-                "{beyond} values of {name} lie outside -100..250 degC (range {range}), the first \
-                 on line {line}: raw counts, another unit, or glitches?"
+                "{beyond} values of {name} lie outside -100 to 250 degC (range {range}), the first on line {line}. They are \
+                 glitches, or raw codes, or in another unit. Leave cells of glitches empty, or say the unit in \
+                 [record.columns]"
             ),
         );
     }

@@ -1,7 +1,7 @@
 //! Is the clock of a record in seconds since its start?
 
 use super::thermal::ThermalRecord;
-use super::warning::Warning;
+use super::warning::{Warning, unit_in_design};
 use crate::statistics::stats;
 
 /// No die moves faster over 10 K, K/s: a chamber's ramp makes 0.2, power-on and hot air 0.5. Ramps
@@ -42,10 +42,10 @@ fn too_long(record: &ThermalRecord, lasts_s: f64) -> Option<Warning> {
             "time_step_implausible",
             "time_s",
             format!(
-                "the record lasts {days:.1} days with {step} s between rows: {name} for seconds? In {unit} the rows are {} s \
-                 apart. If so, divide by {per_s}, or say the unit in the design: [record.columns] time_s = {{ column = \
-                 \"time_s\", unit = \"{unit}\" }}",
-                step / per_s
+                "the record lasts {days:.1} days with {step} s between rows. It looks like {name}: the rows are {} s apart \
+                 then. If it is, divide by {per_s}, or say so: {}",
+                step / per_s,
+                unit_in_design("time_s", unit)
             ),
         )
     })
@@ -82,8 +82,8 @@ fn clocks(record: &ThermalRecord) -> Option<Warning> {
             "clocks_disagree",
             "time_since_power_on_s",
             format!(
-                "time_since_power_on_s advances by {ratio:.6} s for each s of time_s: one of them \
-                 is in another unit (minutes, ms)"
+                "time_since_power_on_s advances by {ratio:.6} s for each s of time_s. One of them is in another unit (minutes, \
+                 ms). Say its unit in [record.columns]"
             ),
         )
     })
@@ -126,10 +126,10 @@ fn too_short(record: &ThermalRecord) -> Option<Warning> {
             "record_spliced",
             "die_degc",
             format!(
-                "die_degc jumps from {:.1} to {:.1} degC at {:.1} s, faster than a die can: were \
-                 two sessions joined? Then whatever else changed between them (orientation, mounting, power) \
-                 goes with the temperature, and a difference may be any of these: record both temperatures \
-                 in one session. Give time_s the pause between them, or close them one by one",
+                "die_degc jumps from {:.1} to {:.1} degC at {:.1} s, faster than a die can. It looks like two \
+                 sessions in one file: whatever else changed between them (orientation, mounting, power) cannot be told from \
+                 the temperature. Record both temperatures in one session, give time_s the pause between them, or close them \
+                 one by one",
                 a.1, b.1, b.0
             ),
         ));
@@ -139,8 +139,9 @@ fn too_short(record: &ThermalRecord) -> Option<Warning> {
             "time_step_implausible",
             "time_s",
             format!(
-                "die_degc moves by {LEAST_MOVE_K} K and more at {fastest:.2} K/s: minutes for \
-                 seconds? Multiply by 60 if so"
+                "die_degc moves by {LEAST_MOVE_K} K and more at {fastest:.2} K/s, faster than a die can. time_s looks like \
+                 minutes. If it is, say so: {}",
+                unit_in_design("time_s", "min")
             ),
         )
     })

@@ -4,7 +4,7 @@ use super::axis::{Axis, Interval};
 use super::figure::{Figure, both};
 use super::narrow::rendered;
 use super::svg::{Shape, Svg, Swatch};
-use super::text::{grouped, minus, significant};
+use super::text::{bounding, grouped, minus, significant};
 use crate::approx::minimax::Target;
 use crate::error::Result;
 use crate::tabulate::job::Approximation;
@@ -98,8 +98,8 @@ fn headline(o: &Outcome, lsb: f64) -> String {
     };
     format!(
         "The error is at most {} ({} LSB of the output) at every input, proved{bound}: {} in {} bytes.",
-        significant(certified, 3),
-        significant(certified / lsb, 3),
+        bounding(certified, 3),
+        bounding(certified / lsb, 3),
         o.detail,
         grouped(o.cost.rom_bytes)
     )
@@ -124,7 +124,8 @@ fn finding(o: &Outcome, lsb: f64) -> String {
 
 fn errors(o: &Outcome, lsb: f64) -> Vec<[String; 3]> {
     let e = &o.error;
-    let line = |what: &str, v: f64| [what.to_owned(), significant(v, 3), significant(v / lsb, 3)];
+    let up = |v: f64| bounding(v, 3);
+    let line = |what: &str, v: f64| [what.to_owned(), up(v), up(v / lsb)];
     let mut out = vec![line(
         "certified: approximation, data, evaluation, output",
         e.certified_max_abs,
@@ -162,7 +163,7 @@ fn form(a: &Alternative) -> Form {
             a.cost.multiplies.to_string(),
             a.cost.adds.to_string(),
             a.cost.cycles.to_string(),
-            significant(a.certified_max_abs, 3),
+            bounding(a.certified_max_abs, 3),
         ],
         chosen: a.chosen,
         mark: match (a.chosen, a.undominated) {
@@ -333,7 +334,7 @@ fn front(o: &Outcome, listed: &[Alternative], width: f64) -> Figure {
                 a.detail,
                 a.cost.rom_bytes,
                 a.cost.cycles,
-                significant(a.certified_max_abs, 3)
+                bounding(a.certified_max_abs, 3)
             );
             frame.hint(9.0, (of(a), error(a)), &said);
         }

@@ -5,7 +5,7 @@ use super::axis::{Axis, Interval};
 use super::figure::{Figure, both};
 use super::scene::Scene;
 use super::svg::{Frame, Shape, Svg, Swatch};
-use super::text::significant;
+use super::text::{bounding, significant};
 use crate::job::outcome::Point;
 
 /// All of them, in the order of the page.
@@ -203,7 +203,7 @@ impl Scene<'_> {
                 Swatch::Line,
                 format!(
                     "± bound of the compensation alone, {} LSB",
-                    significant(bound, 3)
+                    bounding(bound, 3)
                 ),
             ),
         ];

@@ -4,7 +4,7 @@ use super::Shown;
 use super::figure::Figure;
 use super::figures;
 use super::tables;
-use super::text::{decimals_of, fixed, grouped, percent, significant};
+use super::text::{bounding, decimals_of, fixed, grouped, percent, significant};
 use crate::job::outcome::Drift;
 use crate::output::name_of;
 use crate::verify::compare::Compared;
@@ -265,12 +265,11 @@ fn drift(shown: &Shown) -> Vec<[String; 4]> {
 
 fn budget_line(what: &str, dps: f64, shown: &Shown, kind: &str) -> [String; 4] {
     let lsb = dps / shown.output_lsb;
-    [
-        what.to_owned(),
-        significant(dps, 3),
-        significant(lsb, 3),
-        kind.to_owned(),
-    ]
+    let shown = |v: f64| match kind {
+        "bound" => bounding(v, 3),
+        _ => significant(v, 3),
+    };
+    [what.to_owned(), shown(dps), shown(lsb), kind.to_owned()]
 }
 
 fn equivalence(shown: &Shown) -> Vec<Equivalent> {

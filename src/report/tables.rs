@@ -2,7 +2,7 @@
 
 use super::Shown;
 use super::page::{Alternative, Order};
-use super::text::{grouped, minus, significant, superscript, trimmed};
+use super::text::{bounding, grouped, minus, significant, superscript, trimmed};
 use crate::design::CompensationInput;
 
 /// The fit: name, value.
@@ -78,8 +78,8 @@ pub fn alternatives(shown: &Shown) -> Vec<Alternative> {
             l.cost.multiplies.to_string(),
             l.cost.adds.to_string(),
             l.cost.cycles.to_string(),
-            significant(l.certified_max_dps, 4),
-            significant(l.certified_max_lsb, 4),
+            bounding(l.certified_max_dps, 4),
+            bounding(l.certified_max_lsb, 4),
         ],
         chosen: l.chosen,
         mark: match (l.chosen, l.undominated) {

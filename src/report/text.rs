@@ -1,6 +1,6 @@
 //! Numbers as people read them, and text that HTML and SVG take as text.
 
-use crate::text::Place;
+use crate::text::{Place, away_from_zero};
 
 /// `value` with `digits` significant digits; as a power of ten beyond 1e-4..1e6.
 pub fn significant(value: f64, digits: usize) -> String {
@@ -30,6 +30,11 @@ pub fn significant(value: f64, digits: usize) -> String {
         "{mantissa}\u{202f}×\u{202f}10{}",
         superscript(exponent)
     ))
+}
+
+/// A bound: as [`significant`], rounded away from 0, so that what is printed is never below what was proved.
+pub fn bounding(value: f64, digits: usize) -> String {
+    significant(away_from_zero(value, digits), digits)
 }
 
 /// `value` with fixed decimals.

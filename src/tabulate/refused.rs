@@ -12,7 +12,7 @@ use crate::approx::form::{Codes, Form};
 use crate::approx::reference::Function;
 use crate::error::{Error, InputError};
 use crate::numeric::format::Format;
-use crate::text::number;
+use crate::text::{at_most, number};
 
 /// Segments of a table that comes as near as it can.
 const LARGE_SEGMENTS: usize = 1 << 12;
@@ -31,7 +31,7 @@ pub(super) fn unmet(
     let reached = nearest.map_or_else(String::new, |c| {
         format!(
             "; the nearest reaches {}: {}",
-            number(c.measured.certified, 3),
+            at_most(c.measured.certified, 3),
             named(&c, request)
         )
     });
@@ -76,7 +76,7 @@ fn in_the_way(function: &Function, codes: Codes, request: &Request, bound: f64) 
         Some(format!(
             "{} is certified at {}",
             named(one, asked),
-            number(one.measured.certified, 3)
+            at_most(one.measured.certified, 3)
         ))
     };
     let limits = limits(request).into_iter();

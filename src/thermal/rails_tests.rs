@@ -229,7 +229,7 @@ fn closed(seed: u64, (low, high): (f64, f64), supply_dps: f64) -> (Closed, f64, 
 fn is_told(closed: &Closed, (low, high): (f64, f64), due_dps: f64) {
     let closure = &closed.closure;
     let step = closure.steps.iter().find(|s| s.effect == EFFECT).unwrap();
-    for (name, due) in [("lower_dps", low), ("upper_dps", high)] {
+    for (name, due) in [("low_dps", low), ("high_dps", high)] {
         let found = step.parameters.get(name);
         assert_eq!(found.is_some(), due.is_finite(), "{step:?}");
         assert!(found.is_none_or(|found| (found - due).abs() < 1e-12));

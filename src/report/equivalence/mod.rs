@@ -8,7 +8,7 @@ pub mod figures;
 use super::figure::{Figure, both, one};
 use super::narrow::rendered;
 use super::page::Equivalent;
-use super::text::{fixed, grouped, significant, trimmed};
+use super::text::{bounding, fixed, grouped, significant, trimmed};
 use crate::check::proved::{self, Proved};
 use crate::circuit::engine;
 use crate::design::Design;
@@ -166,7 +166,7 @@ fn line(n: &NodeReport) -> Line {
         name: n.name.clone(),
         numbers: [
             lsb(n.max_abs_error),
-            lsb(n.bound),
+            bounding(n.bound / n.lsb, 3),
             fixed(100.0 * n.worst_error_to_bound, 1),
             lsb(n.rms_error),
             n.predicted_rms.map_or("–".to_owned(), lsb),

@@ -21,7 +21,7 @@ const LEAKAGE: Sheet = Sheet {
     physics: "a constant phase error of the demodulator lets part of the quadrature into the rate",
     equation: "Q sin(theta)",
     parameters: &[Parameter {
-        name: "phase_error_rad",
+        name: "phase_rad",
         plausible: (1e-5, 0.1),
     }],
     compensable: true,
@@ -58,7 +58,7 @@ impl Candidate for Leakage {
     }
 
     fn report(&self, _c: &Channels, e: &Estimate) -> Reported {
-        [gain("phase_error_rad", e, 0, 1.0)].into_iter().collect()
+        [gain("phase_rad", e, 0, 1.0)].into_iter().collect()
     }
 }
 
@@ -72,11 +72,11 @@ const PHASE_DRIFT: Sheet = Sheet {
     equation: "Q theta_1 (T - T_0)",
     parameters: &[
         Parameter {
-            name: "phase_slope_rad_per_k",
+            name: "rad_per_k",
             plausible: (1e-7, 3e-3),
         },
         Parameter {
-            name: "zero_degc",
+            name: "reference_degc",
             plausible: ZERO_DEGC,
         },
     ],
@@ -162,8 +162,8 @@ impl Candidate for PhaseDrift {
         let degc = c.middle_degc + c.kelvin_per_u * at(&e.point.theta);
         let std = (c.kelvin_per_u * at(&e.theta_std)).abs();
         [
-            gain("phase_slope_rad_per_k", e, 0, 1.0 / c.kelvin_per_u),
-            entry("zero_degc", degc, std),
+            gain("rad_per_k", e, 0, 1.0 / c.kelvin_per_u),
+            entry("reference_degc", degc, std),
         ]
         .into_iter()
         .collect()

@@ -83,7 +83,7 @@ const SCALE_TEMPERATURE: Sheet = Sheet {
             plausible: (1.0, 3000.0),
         },
         Parameter {
-            name: "zero_degc",
+            name: "reference_degc",
             plausible: (-40.0, 125.0),
         },
     ],
@@ -156,7 +156,7 @@ impl Candidate for ScaleTemperature {
             }
             let std = c.kelvin_per_u * scale_zero_std(e, zero);
             out.insert(
-                "zero_degc".to_owned(),
+                "reference_degc".to_owned(),
                 (c.middle_degc + c.kelvin_per_u * zero, std),
             );
         }

@@ -15,11 +15,11 @@ const SATURATION: Sheet = Sheet {
     equation: "clip(rate + bias) - (rate + bias)",
     parameters: &[
         Parameter {
-            name: "upper_dps",
+            name: "high_dps",
             plausible: (10.0, 3000.0),
         },
         Parameter {
-            name: "lower_dps",
+            name: "low_dps",
             plausible: (-3000.0, -10.0),
         },
     ],
@@ -171,11 +171,11 @@ impl Candidate for Saturation {
         let std = |k: usize| e.theta_std.get(k).copied().unwrap_or(0.0);
         let mut out = Reported::new();
         if high.is_finite() {
-            out.insert("upper_dps".to_owned(), (high, std(0)));
+            out.insert("high_dps".to_owned(), (high, std(0)));
         }
         if low.is_finite() {
             let k = usize::from(e.point.form == 3);
-            out.insert("lower_dps".to_owned(), (low, std(k)));
+            out.insert("low_dps".to_owned(), (low, std(k)));
         }
         out
     }

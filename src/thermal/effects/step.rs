@@ -24,15 +24,15 @@ const STRESS_JUMP: Sheet = Sheet {
                joint give way one after the other, h / (1 + exp(-2 (T - T_s) / width))",
     parameters: &[
         Parameter {
-            name: "step_dps",
+            name: "height_dps",
             plausible: (0.01, 5.0),
         },
         Parameter {
-            name: "centre_degc",
+            name: "temperature_degc",
             plausible: (-40.0, 125.0),
         },
         Parameter {
-            name: "gap_k",
+            name: "hysteresis_k",
             plausible: (0.0, 20.0),
         },
         Parameter {
@@ -333,9 +333,9 @@ impl Candidate for StressJump {
         let k = c.kelvin_per_u;
         let std = |i: usize| e.theta_std.get(i).copied().unwrap_or(0.0);
         let mut out: Reported = [
-            gain("step_dps", e, 0, k.signum()),
+            gain("height_dps", e, 0, k.signum()),
             entry(
-                "centre_degc",
+                "temperature_degc",
                 c.middle_degc + k * e.point.theta[0],
                 (k * std(0)).abs(),
             ),
@@ -344,7 +344,10 @@ impl Candidate for StressJump {
         .collect();
         if matches!(e.point.form, RELAY | OTHER_SIDE) {
             let gap = e.point.theta[1].abs();
-            out.insert("gap_k".to_owned(), ((k * gap).abs(), (k * std(1)).abs()));
+            out.insert(
+                "hysteresis_k".to_owned(),
+                ((k * gap).abs(), (k * std(1)).abs()),
+            );
         }
         if e.point.form == SPREAD {
             let width = width(&e.point);

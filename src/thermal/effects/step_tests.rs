@@ -128,7 +128,7 @@ fn of_a_step_once_and_a_hysteresis_that_do_equally_well_the_law_is_taken() {
         // Never below 30 degC again: whether it would have come back nothing says.
         let open = stepped(seed, 30.0);
         assert!(!open.contains_key("returns"), "{seed}: {open:?}");
-        let (centre, gap) = (open["centre_degc"].0, open["gap_k"].0);
+        let (centre, gap) = (open["temperature_degc"].0, open["hysteresis_k"].0);
         let (up, down) = (centre + 0.5 * gap, centre - 0.5 * gap);
         assert!(
             (43.0..47.0).contains(&up) && down < 30.5,
@@ -136,7 +136,7 @@ fn of_a_step_once_and_a_hysteresis_that_do_equally_well_the_law_is_taken() {
         );
         // It came back.
         let shown = stepped(seed, 10.0);
-        let gap = shown["gap_k"].0;
+        let gap = shown["hysteresis_k"].0;
         assert!((18.0..22.0).contains(&gap), "{seed}: {shown:?}");
     }
 }
@@ -168,9 +168,9 @@ fn a_step_by_and_by_is_a_step_with_a_width() {
         let estimate = &search.estimates(&model)[0];
         let reported: Reported = found.terms[0].candidate.report(&c, estimate);
         for (name, value) in [
-            ("centre_degc", 30.0),
+            ("temperature_degc", 30.0),
             ("width_k", width_k),
-            ("step_dps", 0.3),
+            ("height_dps", 0.3),
         ] {
             let (found, std) = reported[name];
             assert!(
