@@ -1,14 +1,15 @@
-//! What the README shows is what the commands print, and its C compiles.
+//! What the README and the tour show is what the commands print, and the README's C compiles.
 
 use std::path::Path;
 use std::process::Command;
 
 const README: &str = include_str!("../README.md");
+const TOUR: &str = include_str!("../docs/tour.md");
 
 /// The contents of the fenced blocks of a language, in order.
-fn blocks(language: &str) -> Vec<String> {
+fn blocks(page: &str, language: &str) -> Vec<String> {
     let mut found = Vec::new();
-    let mut rest = README;
+    let mut rest = page;
     while let Some((_, after)) = rest.split_once("\n```") {
         let (block, next) = after.split_once("\n```").expect("a block that ends");
         let (first, text) = block.split_once('\n').unwrap_or((block, ""));
@@ -45,7 +46,7 @@ fn shows(block: &str, printed: &str) {
     for part in block.split("\n...\n") {
         let part = words(part);
         let at = rest.find(&part);
-        let at = at.unwrap_or_else(|| panic!("the README has\n{part}\nand printed is\n{printed}"));
+        let at = at.unwrap_or_else(|| panic!("the page has\n{part}\nand printed is\n{printed}"));
         rest = &rest[at + part.len()..];
     }
 }
@@ -54,7 +55,7 @@ fn shows(block: &str, printed: &str) {
 fn printed_outputs_are_those_of_real_runs_and_the_c_compiles() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
-    let outputs = blocks("text");
+    let outputs = blocks(README, "text");
     let [of_run, of_close] = outputs.as_slice() else {
         panic!(
             "{} outputs in the README, and two are known here",
@@ -63,9 +64,19 @@ fn printed_outputs_are_those_of_real_runs_and_the_c_compiles() {
     };
     shows(of_run, &printed(&["run", "--out", "out"], dir));
     let close = ["close", "--record", "out/record.csv", "--out", "closed"];
-    shows(of_close, &printed(&close, dir));
+    let closed = printed(&close, dir);
+    shows(of_close, &closed);
+    let outputs = blocks(TOUR, "text");
+    let [of_close, of_equiv] = outputs.as_slice() else {
+        panic!(
+            "{} outputs in the tour, and two are known here",
+            outputs.len()
+        );
+    };
+    shows(of_close, &closed);
+    shows(of_equiv, &printed(&["equiv", "--out", "eq"], dir));
 
-    let c = blocks("c");
+    let c = blocks(README, "c");
     let main = "int main(void) { int32_t r; return start() && !rate_of(1, 2, &r) ? 0 : 1; }\n";
     std::fs::write(dir.join("main.c"), c.concat() + main).unwrap();
     let bundle = dir.join("out/firmware/c");

@@ -434,4 +434,10 @@ fn an_overflow_is_said_first_and_a_wrong_word_in_its_place() {
     assert_eq!(done.status.code(), Some(2));
     let said = String::from_utf8_lossy(&done.stderr).into_owned();
     assert!(said.contains("wrong.toml:2:"), "{said}");
+    // A study that does not begin leaves no folder.
+    let out = folder.path().join("merged");
+    let parts = folder.path().to_str().expect("UTF-8");
+    let done = study(&["--merge", parts], &out);
+    assert_eq!(done.status.code(), Some(2));
+    assert!(!out.exists());
 }

@@ -3,7 +3,7 @@
 use super::recorded::Recorded;
 use super::stages::Stages;
 use super::terminal::OutputFormat;
-use crate::design::Limits;
+use crate::design::{Design, Limits};
 use crate::error::{Error, Result, io_error};
 use crate::output::Results;
 use crate::study::job::{self, Request};
@@ -57,10 +57,27 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         Some(text) => Limits::parse(text)?,
         None => design.requirements.clone(),
     };
-    let threads = super::threads(arguments.threads);
+    let was_there = arguments.out.exists();
     // The journal of a study that was stopped stands in the folder itself.
     std::fs::create_dir_all(&arguments.out)
         .map_err(|e| io_error(&arguments.out, "make the folder", &e))?;
+    let done = into_folder(arguments, recorded, &design, limits, watch);
+    if done.is_err() && !was_there {
+        // Only what is empty can be removed so: a journal stays.
+        let _ = std::fs::remove_dir(&arguments.out);
+    }
+    done
+}
+
+/// The study, written into a folder that is there.
+fn into_folder(
+    arguments: &Arguments,
+    recorded: &Recorded,
+    design: &Design,
+    limits: Limits,
+    watch: Stages,
+) -> Result<()> {
+    let threads = super::threads(arguments.threads);
     let mut results = Results::claim(&arguments.out, &PLANNED, &recorded.inputs)?;
     let begun: Mutex<Option<(Step, Instant)>> = Mutex::new(None);
     let said = |progress: Progress| {
@@ -73,7 +90,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         }
     };
     if let Some(part) = arguments.shard {
-        let path = job::part(&design, part, threads, &arguments.out, &said)?;
+        let path = job::part(design, part, threads, &arguments.out, &said)?;
         super::terminal::give(&path.display().to_string());
         return Ok(());
     }
@@ -85,7 +102,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         merged: &arguments.merge,
         heuristic: false,
     };
-    let done = job::study(&design, &request, &said)?;
+    let done = job::study(design, &request, &said)?;
     let json = super::json(&done.study);
     let html = crate::report::study::html(&done.study)?;
     let files = done

@@ -157,7 +157,9 @@ impl Limits {
                 // `bias_dps=0.01` has no sign of an inequality.
                 let (figure, rest) = word.split_once(['=', '<', '>']).unwrap_or((word, ""));
                 let near = crate::nearest::nearest(figure, &all);
-                let help = match LimitName::of_name(figure).map(|f| f.is_least()) {
+                let known = LimitName::of_name(figure);
+                let what = if known.is_some() { "limit" } else { "figure" };
+                let help = match known.map(|f| f.is_least()) {
                     Some(true) => format!("write `{figure}>={rest}`"),
                     Some(false) => format!("write `{figure}<={rest}`"),
                     None => near.map_or_else(
@@ -169,7 +171,7 @@ impl Limits {
                         |near| format!("did you mean `{near}`?"),
                     ),
                 };
-                return Err(refused(format!("`{word}` is no figure"), help));
+                return Err(refused(format!("`{word}` is no {what}"), help));
             };
             let (sign, other) = if name.is_least() {
                 (">=", "<=")

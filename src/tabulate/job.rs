@@ -39,8 +39,9 @@ pub fn approximate(
     threads: usize,
     progress: &(dyn Fn(u128, u64) + Sync),
 ) -> Result<Approximation> {
-    check::request(request)?;
+    // The function and its domain first: what is wrong there is what the user looks at.
     let function = check::function(request)?;
+    check::request(request)?;
     let codes = check::codes(request, &function)?;
     check::output(request, &function)?;
     check::polynomial(request, &function, codes)?;
