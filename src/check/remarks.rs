@@ -56,6 +56,10 @@ fn idle_bits(node: &NodeCheck, all: &mut Vec<Remark>) {
         return;
     }
     let idle = (headroom + 1e-9).floor() as u32;
+    let fewer = match idle {
+        1 => "take 1 bit fewer, which holds every value".to_owned(),
+        _ => format!("take {idle} bits fewer, which hold every value"),
+    };
     let mend = match node
         .format
         .strip_prefix('Q')
@@ -68,9 +72,9 @@ fn idle_bits(node: &NodeCheck, all: &mut Vec<Remark>) {
                     integer - idle
                 )
             }
-            _ => format!("take {idle} fewer bits, which hold every value"),
+            _ => fewer,
         },
-        None => format!("take {idle} fewer bits, which hold every value"),
+        None => fewer,
     };
     all.push(Remark {
         code: "idle_bits",

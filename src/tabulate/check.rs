@@ -8,7 +8,7 @@ use crate::approx::form::polynomial::{Monomials, Scheme};
 use crate::approx::form::{Codes, piecewise};
 use crate::approx::real::{Domain, Expression};
 use crate::approx::reference::Function;
-use crate::error::{InputError, Result};
+use crate::error::{Error, InputError, Result};
 use crate::numeric::format::{Format, pow2};
 use crate::text::number;
 
@@ -133,8 +133,14 @@ fn check_name(name: &str) -> Result<()> {
 /// # Errors
 /// What the expression or the domain lacks.
 pub(super) fn function(request: &Request) -> Result<Function> {
-    let expression = Expression::parse_with(&request.function, &request.parameters)?;
-    let end = |text: &String| Expression::parse_with(text, &request.parameters);
+    let parse = |text: &str, option: &str| {
+        Expression::parse_with(text, &request.parameters).map_err(|e| match e {
+            Error::Input(e) => Error::Input(Box::new(e.in_file(option))),
+            other => other,
+        })
+    };
+    let expression = parse(&request.function, "--function")?;
+    let end = |text: &String| parse(text, "--domain");
     let domain = Domain::new(&end(&request.domain[0])?, &end(&request.domain[1])?)?;
     let tolerance = request.output.lsb() * pow2(-34);
     Function::new(&request.function, expression, domain, tolerance)
