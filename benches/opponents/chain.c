@@ -44,8 +44,12 @@ static inline void slow(const tabs*t,const int64_t S[4], int64_t *row){
 #define CASTP(v) (v)
 #define PROD_SHIFT 0
 #endif
-void serial(const tabs*t,const T_CODE*d,const T_CODE*s,long n,uint32_t step,int64_t*rows){
-  uint64_t I[4][3]={{0}}, D[4][3]={{0}}; uint32_t ph=0;
+/* Integrators, combs and phase between two calls. */
+typedef struct { uint64_t I[4][3], D[4][3]; uint32_t ph; } state;
+#define LOAD uint64_t I[4][3], D[4][3]; uint32_t ph=kept->ph; memcpy(I,kept->I,sizeof I); memcpy(D,kept->D,sizeof D)
+#define KEEP memcpy(kept->I,I,sizeof I); memcpy(kept->D,D,sizeof D); kept->ph=ph
+void serial(const tabs*t,state*kept,const T_CODE*d,const T_CODE*s,long n,uint32_t step,int64_t*rows){
+  LOAD;
   for(long b=0;b+R<=n;b+=R){
     for(int i=0;i<R;i++){
       ph+=step; uint32_t a=ph>>22; int64_t si=t->table[a], co=t->table[(a+256)&1023];
@@ -56,9 +60,10 @@ void serial(const tabs*t,const T_CODE*d,const T_CODE*s,long n,uint32_t step,int6
     for(int k=0;k<4;k++){ uint64_t v=I[k][2]; for(int j=0;j<3;j++){uint64_t w=v-D[k][j]; D[k][j]=v; v=w;} S[k]=(int64_t)(v<<PROD_SHIFT); }
     slow(t,S,rows); rows+=7;
   }
+  KEEP;
 }
-void block(const tabs*t,const T_CODE*d,const T_CODE*s,long n,uint32_t step,int64_t*rows){
-  uint64_t I[4][3]={{0}}, D[4][3]={{0}}; uint32_t ph=0;
+void block(const tabs*t,state*kept,const T_CODE*d,const T_CODE*s,long n,uint32_t step,int64_t*rows){
+  LOAD;
   int32_t w2[R],w3[R]; for(int i=0;i<R;i++){w2[i]=R-i; w3[i]=(R-i)*(R-i+1)/2;}
   for(long b=0;b+R<=n;b+=R){
     int32_t si[R],co[R];
@@ -75,25 +80,38 @@ void block(const tabs*t,const T_CODE*d,const T_CODE*s,long n,uint32_t step,int64
     }
     slow(t,S,rows); rows+=7;
   }
+  KEEP;
 }
 
 static double now(void){ struct timespec t; clock_gettime(CLOCK_MONOTONIC,&t); return (double)t.tv_sec+1e-9*(double)t.tv_nsec; }
 static int saturated(int v){ return v>32767?32767:v<-32768?-32768:v; }
-int main(int argc,char**argv){
-  if(argc<5) return 2;
+/* The capture of the manual's golden values. */
+typedef struct { uint32_t x,ph,m; } signals;
+static void codes(const tabs*t,signals*g,T_CODE*d,T_CODE*s,long n){
+  uint32_t x=g->x,ph=g->ph,m=g->m;
+  for(long i=0;i<n;i++){ ph+=33555666; m+=77777; int si=t->table[ph>>22],co=t->table[((ph>>22)+256)&1023],mm=t->table[m>>22];
+    x=x*1664525+1013904223; int n1=(int)(x>>24)-128; x=x*1664525+1013904223; int n2=(int)(x>>24)-128;
+    d[i]=(int16_t)saturated(((26000*si)>>15)+n1); s[i]=(int16_t)saturated((((((mm*3000)>>15)+9000)*co)>>15)+((2000*si)>>15)+n2); }
+  *g=(signals){x,ph,m};
+}
+static tabs tables(void){
   tabs t; for(int i=0;i<1024;i++) t.table[i]=(int16_t)lrint(32767*sin(2*M_PI*i/1024));
   double g=1; for(int i=0;i<16;i++){ t.atan[i]=(int32_t)llrint(atan(ldexp(1,-i))/(2*M_PI)*4294967296.0); g*=sqrt(1+ldexp(1,-2*i)); }
   t.k=(int32_t)lrint(65536/g);
+  return t;
+}
+#ifndef WITHOUT_MAIN
+int main(int argc,char**argv){
+  if(argc<5) return 2;
+  tabs t=tables();
   uint32_t word=(uint32_t)strtoul(argv[2],0,10); long n=atol(argv[3]); int runs=atoi(argv[4]);
   int16_t*d=malloc(2*(size_t)n),*s=malloc(2*(size_t)n); int64_t*rows=malloc(8*7*(size_t)(n/R)+8); memset(rows,1,8*7*(size_t)(n/R));
-  uint32_t x=0x12345678,ph=0,m=0;
-  for(long i=0;i<n;i++){ ph+=33555666; m+=77777; int si=t.table[ph>>22],co=t.table[((ph>>22)+256)&1023],mm=t.table[m>>22];
-    x=x*1664525+1013904223; int n1=(int)(x>>24)-128; x=x*1664525+1013904223; int n2=(int)(x>>24)-128;
-    d[i]=(int16_t)saturated(((26000*si)>>15)+n1); s[i]=(int16_t)saturated((((((mm*3000)>>15)+9000)*co)>>15)+((2000*si)>>15)+n2); }
+  signals g={0x12345678,0,0}; codes(&t,&g,d,s,n);
   double best=1e9;
-  for(int r=0;r<runs;r++){ double a=now(); (argv[1][0]=='s'?serial:block)(&t,d,s,n,word,rows); double b=now()-a; if(b<best) best=b; }
+  for(int r=0;r<runs;r++){ double a=now(); state kept={0}; (argv[1][0]=='s'?serial:block)(&t,&kept,d,s,n,word,rows); double b=now()-a; if(b<best) best=b; }
   uint64_t h=0xcbf29ce484222325ull;
   for(long i=0;i<n/R;i++){ int64_t w[3]={rows[7*i+6],rows[7*i+4],rows[7*i+5]}; for(int j=0;j<3;j++) h=(h^(uint32_t)w[j])*0x100000001b3ull; }
   printf("%.9f %016llx\n",best,(unsigned long long)h);
   return 0;
 }
+#endif

@@ -19,7 +19,7 @@ use crate::numeric::lane::Lane;
 
 #[cfg(test)]
 #[path = "block_kernel_tests.rs"]
-mod tests;
+pub(super) mod tests;
 
 /// What the fast rate is computed with. All give the same bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -8,14 +8,14 @@ use crate::design::{Design, LoopGain, PhaseLoop, limits};
 use crate::numeric::format::{Format, Overflow, Quantizer, Rounding};
 use crate::numeric::splitmix::{GOLDEN, mix};
 
-struct Draw(u64);
+pub(crate) struct Draw(pub u64);
 
 impl Draw {
-    fn next(&mut self) -> u64 {
+    pub fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(GOLDEN);
         mix(self.0)
     }
-    fn within(&mut self, low: u32, high: u32) -> u32 {
+    pub fn within(&mut self, low: u32, high: u32) -> u32 {
         low + (self.next() % u64::from(high - low + 1)) as u32
     }
     fn one_in(&mut self, n: u64) -> bool {
@@ -36,7 +36,7 @@ const ROUNDINGS: [Rounding; 6] = [
 ];
 
 /// A design whose sample rate is drawn; the rest is the default's.
-fn design(draw: &mut Draw) -> Design {
+pub(crate) fn design(draw: &mut Draw) -> Design {
     let mut design = default_design().expect("the default");
     if draw.one_in(2) {
         design.compensation = None;
@@ -89,7 +89,7 @@ fn design(draw: &mut Draw) -> Design {
 }
 
 /// Codes of the design's ADC, its extremes among them.
-fn codes(draw: &mut Draw, format: Format, count: usize) -> Vec<i32> {
+pub(crate) fn codes(draw: &mut Draw, format: Format, count: usize) -> Vec<i32> {
     let (low, high) = (format.min_raw() as i64, format.max_raw() as i64);
     let span = (high - low + 1) as u64;
     let mut one = || match draw.next() % 8 {

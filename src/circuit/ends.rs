@@ -1,8 +1,9 @@
 //! How an arithmetic meets the outside of a chain: codes in, columns out, overflows.
 
 use super::block_kernel::BlockKernel;
-use super::chain::{FastState, Row};
+use super::chain::{Chain, FastState, Row};
 use super::engine::Rows;
+use super::float_kernel::FloatKernel;
 use crate::design::Design;
 use crate::numeric::arithmetic::Arithmetic;
 use crate::numeric::cast::HasKernel;
@@ -46,6 +47,14 @@ pub(super) trait Ends: Arithmetic {
         _kernel: &mut BlockKernel<N>,
         _state: &mut FastState<Self::Residue, N>,
         _codes: [&[i32]; 2],
+    ) {
+    }
+    /// Runs a whole period of inputs without quantisation.
+    fn run_inputs<const N: usize>(
+        _kernel: &mut FloatKernel<N>,
+        _chain: &Chain<N>,
+        _state: &mut FastState<Self::Residue, N>,
+        _inputs: [&[f64]; 2],
     ) {
     }
     fn at(&self, _sample: u64) {}
@@ -117,6 +126,14 @@ impl Ends for Float {
     #[inline(always)]
     fn input(&self, lsb: f64, fraction_bits: i32, _limits: [f64; 2]) -> f64 {
         lsb * pow2(-fraction_bits)
+    }
+    fn run_inputs<const N: usize>(
+        kernel: &mut FloatKernel<N>,
+        chain: &Chain<N>,
+        state: &mut FastState<i128, N>,
+        inputs: [&[f64]; 2],
+    ) {
+        kernel.run(chain, state, inputs);
     }
     fn turns(residue: i128, _bits: u32) -> u64 {
         // One turn is the whole 128-bit circle.

@@ -4,6 +4,7 @@
 use super::block_kernel::{BlockKernel, Instructions};
 use super::chain::{Chain, FastState, Held, SlowState};
 use super::ends::{Ends, FloatScale};
+use super::float_kernel::FloatKernel;
 use super::row_batch::RowBatch;
 use crate::design::Design;
 use crate::numeric::arithmetic::{Arithmetic, Block};
@@ -42,7 +43,8 @@ pub trait Engine {
         rows: &mut Rows,
     ) -> Result<(), Box<Overflowed>>;
     /// The same for ADC inputs in LSB. The bit-accurate engine quantises them as an ideal ADC does
-    /// (nearest, ties up, saturating); the one without quantisation takes them as they are.
+    /// (nearest, ties up, saturating); the one without quantisation takes them as they are, and a whole
+    /// period at once by [`super::float_kernel`], which rounds elsewhere than its samples one by one.
     ///
     /// # Errors
     /// As [`Engine::process`].
@@ -176,7 +178,10 @@ fn with_stages<const N: usize>(
     let mut chain = Chain::<N>::new(design);
     let float_scale = FloatScale::new(design);
     if kind == ArithmeticKind::Float {
-        return Box::new(Running::new(chain, Float, Float, float_scale, (None, None)));
+        let whole = FloatKernel::new(&chain);
+        let mut running = Running::new(chain, Float, Float, float_scale, (None, None));
+        running.float_kernel = Some(whole);
+        return Box::new(running);
     }
     let bits = lane_bits(&chain, &chain.trace());
     let narrow = bits.fast <= 64 && bits.residue <= 64;
@@ -223,6 +228,8 @@ struct Running<F: Arithmetic, S: Arithmetic<Residue = F::Residue>, const N: usiz
     scale: FloatScale,
     /// What runs codes at the sample rate, where it applies.
     kernel: Option<BlockKernel<N>>,
+    /// What runs whole periods of inputs without quantisation.
+    float_kernel: Option<FloatKernel<N>>,
     /// Rows that wait; none do between two calls.
     batch: Option<RowBatch>,
     /// Samples so far.
@@ -254,6 +261,7 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Runnin
             slow,
             scale,
             kernel,
+            float_kernel: None,
             batch,
             samples: 0,
             phase: 0,
@@ -387,7 +395,16 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Engine
         let range = self.chain.code_range;
         let limits = [range.low as f64, range.high as f64];
         self.periods(drive_lsb, sense_lsb, rows, |running, drive, sense| {
-            running.block(drive, sense, |ar, lsb| ar.input(lsb, fraction_bits, limits));
+            let Running {
+                chain, fast_state, ..
+            } = running;
+            match &mut running.float_kernel {
+                Some(kernel) if kernel.samples() == drive.len() => {
+                    F::run_inputs(kernel, chain, fast_state, [drive, sense]);
+                    running.samples += drive.len() as u64;
+                }
+                _ => running.block(drive, sense, |ar, lsb| ar.input(lsb, fraction_bits, limits)),
+            }
         })
     }
 

@@ -45,7 +45,7 @@ impl From<Arith> for ArithmeticKind {
 }
 
 /// ADC samples that are read, processed and written at a time.
-const BLOCK: usize = 1 << 16;
+const BLOCK: usize = 1 << 14;
 
 /// Runs the command.
 ///
@@ -111,14 +111,7 @@ fn rate(samples: u64, time: Duration) -> f64 {
 fn write(rows: &mut Rows, columns: usize, mut index: u64, writer: &mut RowWriter) -> Result<u64> {
     match rows {
         Rows::Integer(words) => {
-            let mut line = Vec::with_capacity(columns + 1);
-            for row in words.chunks_exact(columns) {
-                line.clear();
-                line.push(i128::from(index));
-                line.extend_from_slice(row);
-                writer.write_integers(&line)?;
-                index += 1;
-            }
+            index = writer.write_numbered_integers(index, words, columns)?;
             words.clear();
         }
         Rows::Real(values) => {

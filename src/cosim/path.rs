@@ -43,6 +43,8 @@ pub struct Path {
     nominal_gain: f64,
     drive_lsb: Vec<f64>,
     sense_lsb: Vec<f64>,
+    /// Noise of rms 1 of the drive and of the sense input.
+    noise: [Vec<f64>; 2],
     codes: [Vec<i32>; 2],
     rows: Rows,
     sample: u64,
@@ -119,6 +121,7 @@ impl Path {
             nominal_gain: rest::nominal_gain(design),
             drive_lsb: vec![0.0; ratio],
             sense_lsb: vec![0.0; ratio],
+            noise: [vec![0.0; ratio], vec![0.0; ratio]],
             codes: [vec![0; ratio], vec![0; ratio]],
             sample: 0,
         }
@@ -199,13 +202,8 @@ impl Path {
             ArithmeticKind::Fixed => {
                 let [d, s] = &mut self.codes;
                 let [drive, sense] = &self.converters;
-                let convert = |codes: &mut [i32], inputs: &[f64], adc: &Converter| {
-                    for (code, input) in codes.iter_mut().zip(inputs) {
-                        *code = adc.code(*input);
-                    }
-                };
-                convert(d, &self.drive_lsb, drive);
-                convert(s, &self.sense_lsb, sense);
+                drive.codes(&self.drive_lsb, d);
+                sense.codes(&self.sense_lsb, s);
                 self.engine.process(d, s, &mut self.rows)
             }
         }
@@ -220,18 +218,13 @@ impl Path {
 
     fn add_noise(&mut self, noise: &impl Pairs) {
         let [drive_rms, sense_rms] = self.noise_lsb;
-        let [drive_adc, sense_adc] = &self.converters;
-        let silent = drive_rms == 0.0 && sense_rms == 0.0;
-        let inputs = self.drive_lsb.iter_mut().zip(&mut self.sense_lsb);
-        for (index, (d, s)) in (self.sample..).zip(inputs) {
-            if !silent {
-                let (a, b) = noise.pair(index);
-                *d += drive_rms * a;
-                *s += sense_rms * b;
-            }
-            *d = drive_adc.analog(*d);
-            *s = sense_adc.analog(*s);
+        if drive_rms != 0.0 || sense_rms != 0.0 {
+            noise.fill(self.sample, self.noise.each_mut().map(|n| &mut n[..]));
         }
+        let [drive_adc, sense_adc] = &self.converters;
+        let [drive_noise, sense_noise] = &self.noise;
+        drive_adc.front_end(&mut self.drive_lsb, drive_rms, drive_noise);
+        sense_adc.front_end(&mut self.sense_lsb, sense_rms, sense_noise);
     }
 
     fn clear_rows(&mut self) {

@@ -31,7 +31,12 @@ const COSINE: [f64; 9] = [
 
 #[inline(always)]
 fn horner<const N: usize>(coefficients: &[f64; N], x: f64) -> f64 {
-    coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c)
+    // No closure, so that it is compiled for whatever SIMD its caller is.
+    let mut sum = 0.0;
+    for c in coefficients.iter().rev() {
+        sum = sum * x + c;
+    }
+    sum
 }
 
 /// Sine and cosine of a phase in 2^-64 turn; the error is below 1e-15.

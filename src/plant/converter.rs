@@ -119,6 +119,25 @@ impl Converter {
         }
     }
 
+    /// [`analog`](Self::analog) of inputs with noise of an rms added first, LSB; `noise` is of rms 1.
+    pub fn front_end(&self, inputs: &mut [f64], rms_lsb: f64, noise: &[f64]) {
+        pulp::Arch::new().dispatch(FrontEnd {
+            converter: *self,
+            inputs,
+            rms_lsb,
+            noise,
+        });
+    }
+
+    /// [`code`](Self::code) of as many inputs as there are codes.
+    pub fn codes(&self, inputs: &[f64], codes: &mut [i32]) {
+        pulp::Arch::new().dispatch(Codes {
+            converter: *self,
+            inputs,
+            codes,
+        });
+    }
+
     /// What is added to the ideal input at a time, LSB: `mains_pickup`, a sin(2 pi f t). 0.1 to
     /// 100 LSB, 50 or 60 Hz.
     pub fn additive_lsb(&self, time_s: f64) -> f64 {
@@ -180,6 +199,57 @@ impl Bend {
         let x = self.gain * x + self.offset_lsb / full_scale_lsb;
         let [cubic, quadratic] = self.bend_lsb;
         full_scale_lsb * x + x * x * (quadratic + cubic * x)
+    }
+}
+
+/// Inputs with their noise, in the widest SIMD that the processor has; the same values with each.
+struct FrontEnd<'a> {
+    converter: Converter,
+    inputs: &'a mut [f64],
+    rms_lsb: f64,
+    noise: &'a [f64],
+}
+
+impl pulp::WithSimd for FrontEnd<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _simd: S) {
+        if self.rms_lsb != 0.0 {
+            for (input, noise) in self.inputs.iter_mut().zip(self.noise) {
+                *input += self.rms_lsb * noise;
+            }
+        }
+        if let Some(bend) = &self.converter.bend {
+            for input in self.inputs {
+                *input = bend.of(*input, self.converter.full_scale_lsb);
+            }
+        }
+    }
+}
+
+/// Codes of inputs, as [`FrontEnd`].
+struct Codes<'a> {
+    converter: Converter,
+    inputs: &'a [f64],
+    codes: &'a mut [i32],
+}
+
+impl pulp::WithSimd for Codes<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _simd: S) {
+        let both = self.codes.iter_mut().zip(self.inputs);
+        if self.converter.missing.is_some() {
+            for (code, input) in both {
+                *code = self.converter.code(*input);
+            }
+            return;
+        }
+        for (code, input) in both {
+            *code = self.converter.quantiser.code(*input);
+        }
     }
 }
 

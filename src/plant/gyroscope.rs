@@ -14,8 +14,8 @@
 //!
 //! The discretisation is exact. The excitation is the band-limited sinusoid through the oscillator's
 //! phases, so that the steady state is eq. 5 to 7 without any hold's or DAC's phase. The motion is
-//! that steady state P(theta) plus a deviation w that decays freely, w(t + h) = exp(A h) w(t); where frequency,
-//! gain, rate or temperature change, P changes and w takes up the difference, so the motion itself
+//! that steady state P(theta) plus a deviation w that decays freely, w(t + h) = exp(A h) w(t) ([`motion`]); where
+//! frequency, gain, rate or temperature change, P changes and w takes up the difference, so the motion itself
 //! is continuous. In equilibrium w is 0, which is also the warm start.
 //!
 //! In-phase coupling: eq. 9 states what the authors measured at the *output*. A fixed-frequency
@@ -26,10 +26,11 @@
 use super::converter::{Channel, Converter};
 use super::device::Device;
 use super::effects;
+use super::motion::{self, Couplings, Power};
 use super::thermal::Temperatures;
 use crate::design::{Gyro, ThermalRun};
 use crate::numeric::turn;
-use nalgebra::{Complex, Matrix2, Matrix4, Vector2};
+use nalgebra::{Complex, Matrix2};
 use std::f64::consts::TAU;
 
 type C = Complex<f64>;
@@ -99,6 +100,10 @@ pub struct Gyroscope {
     sense_adc: Converter,
     conditions: Conditions,
     modes: Modes,
+    /// Their motion, by sample of a block.
+    tables: motion::Tables,
+    /// What the steady state takes from modes and frequency; `None` after a change of the modes.
+    tuned: Option<Tuned>,
     /// Steady state at the drive at hand.
     steady: Steady,
     drive: Drive,
@@ -112,16 +117,31 @@ struct Modes {
     /// w1, w2, rad/s, and the widths w1/Q1, w2/Q2.
     w: [f64; 2],
     width: [f64; 2],
-    /// exp(A h) of the drive and of the sense mode.
-    drive: Matrix2<f64>,
-    sense: Matrix2<f64>,
-    /// Its lower left block for a force K = 1 on u and on x.
-    by_velocity: Matrix2<f64>,
-    by_position: Matrix2<f64>,
     /// The electronics' phase that the drive channel adds, rad.
     electronics_rad: f64,
     /// The in-phase coupling, deg/s.
     in_phase_dps: f64,
+}
+
+/// What the steady motion takes from modes and frequency alone.
+#[derive(Debug, Clone, Copy)]
+struct Tuned {
+    /// Of the drive, 2^-64 turn a sample.
+    step: u64,
+    /// i w / w0, from x to u and from y to v.
+    ratio: C,
+    /// x at gain 1, LSB.
+    drive: C,
+    /// From a force on the sense mode to what its ADC sees.
+    sense: C,
+    /// Takes the sense channel's turn back.
+    untwisted: C,
+    /// w0 / w: a phase is a time; of what stands still it shows nothing.
+    per_velocity: f64,
+    sense_row: [f64; 2],
+    /// What the drive channel is turned by, rad, and its row.
+    drive_turn_rad: f64,
+    drive_row: [f64; 2],
 }
 
 /// The steady motion under a drive, as phasors of exp(i theta), sin(theta) being the imaginary part.
@@ -172,13 +192,11 @@ impl Gyroscope {
             modes: Modes {
                 w: [w0, w2],
                 width: [w0 / gyro.drive_q, w2 / gyro.sense_q],
-                drive: Matrix2::identity(),
-                sense: Matrix2::identity(),
-                by_velocity: Matrix2::zeros(),
-                by_position: Matrix2::zeros(),
                 electronics_rad: 0.0,
                 in_phase_dps: 0.0,
             },
+            tables: motion::Tables::new(Power::identity()),
+            tuned: None,
             steady: Steady::default(),
             drive: Drive {
                 phase: 0,
@@ -189,7 +207,7 @@ impl Gyroscope {
             device,
             reference,
         };
-        gyroscope.modes = gyroscope.modes_at(&conditions);
+        gyroscope.set_modes();
         gyroscope
     }
 
@@ -221,11 +239,13 @@ impl Gyroscope {
     /// Sense I per deg/s of rate relative to nominal in the steady state at hand, 1.
     pub fn scale_factor(&self) -> f64 {
         let u = self.steady.state[1];
-        self.rate_phasor(&self.modes, u, self.omega()).re / self.lsb_per_dps
+        let sense = self.sense_response(&self.modes, self.omega(self.drive.step));
+        self.rate_phasor(sense, u).re / self.lsb_per_dps
     }
 
-    fn omega(&self) -> f64 {
-        self.drive.step as i64 as f64 / TURN * TAU * self.reference.sample_rate_hz
+    /// An advance in 2^-64 turn a sample as an angular frequency, rad/s.
+    fn omega(&self, step: u64) -> f64 {
+        step as i64 as f64 / TURN * TAU * self.reference.sample_rate_hz
     }
 
     /// Sets what acts from the next block on. The motion stays continuous.
@@ -233,10 +253,10 @@ impl Gyroscope {
         let before = &self.conditions;
         let same_modes = before.temperatures == conditions.temperatures
             && (before.drive_q, before.softening) == (conditions.drive_q, conditions.softening);
-        if !same_modes {
-            self.modes = self.modes_at(&conditions);
-        }
         self.conditions = conditions;
+        if !same_modes {
+            self.set_modes();
+        }
         self.move_to(self.drive);
     }
 
@@ -257,28 +277,30 @@ impl Gyroscope {
         if drive != self.drive {
             self.move_to(drive);
         }
-        let m = &self.modes;
-        let (a, b) = (m.drive, m.sense);
-        let c = self.coupling
-            * (m.by_velocity * self.steady.rate_dps - m.by_position * self.quadrature_dps);
-        let [drive_out, sense_out] = self.steady.outputs;
-        let ([dx, du], [dy, dv]) = (self.steady.drive_row, self.steady.sense_row);
-        let [mut x, mut u, mut y, mut v] = self.deviation;
-        let mut phase = drive.phase;
-        for (d, s) in drive_lsb.iter_mut().zip(sense_lsb) {
-            (x, u, y, v) = (
-                a.m11 * x + a.m12 * u,
-                a.m21 * x + a.m22 * u,
-                c.m11 * x + c.m12 * u + b.m11 * y + b.m12 * v,
-                c.m21 * x + c.m22 * u + b.m21 * y + b.m22 * v,
+        let couplings = Couplings {
+            velocity: self.coupling * self.steady.rate_dps,
+            position: -self.coupling * self.quadrature_dps,
+        };
+        let rows = [self.steady.drive_row, self.steady.sense_row];
+        let pieces = drive_lsb.chunks_mut(motion::PIECE);
+        for (drive_lsb, sense_lsb) in pieces.zip(sense_lsb.chunks_mut(motion::PIECE)) {
+            let (sin, cos) = turn::sin_cos(self.drive.phase);
+            // Re sin(theta + n step) + Im cos(theta + n step), by cosine and sine of n step.
+            let carried = |p: &C| [p.re * sin + p.im * cos, p.re * cos - p.im * sin];
+            let steady = self.steady.outputs.each_ref().map(carried);
+            let samples = drive_lsb.len() as u64;
+            self.tables.piece(
+                drive.step,
+                steady,
+                rows,
+                couplings,
+                &mut self.deviation,
+                drive_lsb,
+                sense_lsb,
             );
-            phase = phase.wrapping_add(drive.step);
-            let (sin, cos) = turn::sin_cos(phase);
-            *d = drive_out.re * sin + drive_out.im * cos + dx * x + du * u;
-            *s = sense_out.re * sin + sense_out.im * cos + dy * y + dv * v;
+            let advance = drive.step.wrapping_mul(samples);
+            self.drive.phase = self.drive.phase.wrapping_add(advance);
         }
-        self.deviation = [x, u, y, v];
-        self.drive.phase = phase;
     }
 
     /// Takes up the difference of two steady states, so that the motion is continuous.
@@ -293,14 +315,14 @@ impl Gyroscope {
         }
     }
 
-    /// The sense ADC's phasor for a rate of 1 deg/s under the drive velocity u.
-    fn rate_phasor(&self, modes: &Modes, u: C, w: f64) -> C {
-        u * self.coupling * self.sense_response(modes, w)
+    /// The sense ADC's phasor for a rate of 1 deg/s under the drive velocity u, given the sense mode's response.
+    fn rate_phasor(&self, sense: C, u: C) -> C {
+        u * self.coupling * sense
     }
 
     /// The sense ADC's phasor of the quadrature under the drive motion x.
-    fn quadrature_phasor(&self, modes: &Modes, x: C, w: f64) -> C {
-        x * -self.coupling * self.quadrature_dps * self.sense_response(modes, w)
+    fn quadrature_phasor(&self, sense: C, x: C) -> C {
+        x * -self.coupling * self.quadrature_dps * sense
     }
 
     /// From a force on the sense mode to what its ADC sees.
@@ -308,14 +330,38 @@ impl Gyroscope {
         response(modes.w[1], modes.width[1], w) * C::cis(self.sense_turn_rad)
     }
 
-    fn steady_at(&self, drive: Drive) -> Steady {
-        let c = &self.conditions;
-        let w = drive.step as i64 as f64 / TURN * TAU * self.reference.sample_rate_hz;
+    /// What modes and frequency make of a steady state; the drive's row is that without any turn.
+    fn tuned_to(&self, step: u64) -> Tuned {
+        let w = self.omega(step);
         let w0 = TAU * self.device.drive.frequency_hz;
-        let ratio = C::new(0.0, w / w0);
-        let x = response(self.modes.w[0], self.modes.width[0], w) * self.force * drive.gain;
-        let u = ratio * x;
-        let per_dps = self.rate_phasor(&self.modes, u, w);
+        let per_velocity = if w == 0.0 { 0.0 } else { w0 / w };
+        let later = w / self.reference.sample_rate_hz * self.sense_adc.latency_samples();
+        Tuned {
+            step,
+            ratio: C::new(0.0, w / w0),
+            drive: response(self.modes.w[0], self.modes.width[0], w) * self.force,
+            sense: self.sense_response(&self.modes, w),
+            untwisted: C::cis(-self.sense_turn_rad),
+            per_velocity,
+            sense_row: turned(self.sense_turn_rad + later, per_velocity),
+            drive_turn_rad: 0.0,
+            drive_row: turned(0.0, per_velocity),
+        }
+    }
+
+    fn steady_at(&mut self, drive: Drive) -> Steady {
+        let known = self.tuned.filter(|t| t.step == drive.step);
+        let mut tuned = known.unwrap_or_else(|| self.tuned_to(drive.step));
+        let drive_turn = self.modes.electronics_rad + self.phase_pull_rad(drive.gain);
+        if tuned.drive_turn_rad != drive_turn {
+            tuned.drive_turn_rad = drive_turn;
+            tuned.drive_row = turned(drive_turn, tuned.per_velocity);
+        }
+        self.tuned = Some(tuned);
+        let c = &self.conditions;
+        let x = tuned.drive * drive.gain;
+        let u = tuned.ratio * x;
+        let per_dps = self.rate_phasor(tuned.sense, u);
         // An effect states what it adds to the output; the force that does so is larger where the
         // output is less sensitive. Without motion there is no output at all.
         let sensitivity = per_dps.re / self.lsb_per_dps;
@@ -325,15 +371,10 @@ impl Gyroscope {
             0.0
         };
         let rate_dps = c.rate_dps + self.modes.in_phase_dps + extra;
-        let untwisted = C::cis(-self.sense_turn_rad);
-        let y = (per_dps * rate_dps + self.quadrature_phasor(&self.modes, x, w)) * untwisted;
-        let v = ratio * y;
-        // A phase is a time; of what stands still it shows nothing.
-        let per_velocity = if w == 0.0 { 0.0 } else { w0 / w };
-        let turned = |angle: f64| [angle.cos(), per_velocity * angle.sin()];
-        let drive_turn = self.modes.electronics_rad + self.phase_pull_rad(drive.gain);
-        let later = w / self.reference.sample_rate_hz * self.sense_adc.latency_samples();
-        let (drive_row, sense_row) = (turned(drive_turn), turned(self.sense_turn_rad + later));
+        let quadrature = self.quadrature_phasor(tuned.sense, x);
+        let y = (per_dps * rate_dps + quadrature) * tuned.untwisted;
+        let v = tuned.ratio * y;
+        let (drive_row, sense_row) = (tuned.drive_row, tuned.sense_row);
         Steady {
             state: [x, u, y, v],
             outputs: [
@@ -368,12 +409,15 @@ impl Gyroscope {
         let m = &self.modes;
         let x = response(m.w[0], m.width[0], w) * self.force * self.drive.gain * relative;
         let u = C::new(0.0, hz / self.device.drive.frequency_hz) * x;
-        let sense = self.rate_phasor(m, u, w) * self.steady.rate_dps;
+        let response = self.sense_response(m, w);
+        let sense = self.rate_phasor(response, u) * self.steady.rate_dps;
         let drive = x * C::cis(m.electronics_rad);
-        Some((hz, [drive, sense + self.quadrature_phasor(m, x, w)]))
+        Some((hz, [drive, sense + self.quadrature_phasor(response, x)]))
     }
 
-    fn modes_at(&self, c: &Conditions) -> Modes {
+    /// Takes the modes from the conditions.
+    fn set_modes(&mut self) {
+        let c = &self.conditions;
         let t = &c.temperatures;
         let soft = |mode: &super::Resonator| {
             TAU * mode.softened_frequency_hz(t.structure_degc, c.softening)
@@ -383,38 +427,28 @@ impl Gyroscope {
         let w0 = TAU * self.device.drive.frequency_hz;
         let h = 1.0 / self.reference.sample_rate_hz;
         let mode = |k: usize| Matrix2::new(0.0, w0, -w[k] * w[k] / w0, -width[k]) * h;
-        // Below: the force K on v' of the sense mode, by x and by u.
-        let joined = |by: Vector2<f64>| {
-            let mut a = Matrix4::zeros();
-            a.fixed_view_mut::<2, 2>(0, 0).copy_from(&mode(0));
-            a.fixed_view_mut::<2, 2>(2, 2).copy_from(&mode(1));
-            a.fixed_view_mut::<1, 2>(3, 0)
-                .copy_from(&(by.transpose() * (h / w0)));
-            a.exp()
+        // The force on v' of the sense mode, by x and by u.
+        let rate_of_change = Power {
+            drive: mode(0),
+            sense: mode(1),
+            by_velocity: Matrix2::new(0.0, 0.0, 0.0, h / w0),
+            by_position: Matrix2::new(0.0, 0.0, h / w0, 0.0),
         };
-        let (position, velocity) = (
-            joined(Vector2::new(1.0, 0.0)),
-            joined(Vector2::new(0.0, 1.0)),
-        );
-        let block = |m: &Matrix4<f64>, row, column| m.fixed_view::<2, 2>(row, column).into_owned();
         let electronics = self.device.electronics_phase_rad(t.electronics_degc);
         let share = if self.reference.tracking {
             self.device.electronics.loop_share
         } else {
             1.0
         };
-        let mut modes = Modes {
+        self.modes = Modes {
             w,
             width,
-            drive: block(&velocity, 0, 0),
-            sense: block(&velocity, 2, 2),
-            by_velocity: block(&velocity, 2, 0),
-            by_position: block(&position, 2, 0),
             electronics_rad: electronics * share,
             in_phase_dps: 0.0,
         };
-        modes.in_phase_dps = self.in_phase_coupling_dps(&modes, electronics);
-        modes
+        self.modes.in_phase_dps = self.in_phase_coupling_dps(&self.modes, electronics);
+        self.tables.set(rate_of_change.exp());
+        self.tuned = None;
     }
 
     /// The in-phase coupling at the modes' temperature: what makes a fixed-frequency circuit read
@@ -437,13 +471,19 @@ impl Gyroscope {
         }
         let u = C::new(0.0, w / w0) * x;
         let wanted_lsb = self.device.bias_at_phase_dps(measured_rad) * self.lsb_per_dps;
-        let gain = self.rate_phasor(modes, u, w).re;
+        let sense = self.sense_response(modes, w);
+        let gain = self.rate_phasor(sense, u).re;
         if gain.abs() < 1e-9 * self.lsb_per_dps {
             // No motion to speak of: no rate, and nothing that could stand for one.
             return 0.0;
         }
-        (wanted_lsb - self.quadrature_phasor(modes, x, w).re) / gain
+        (wanted_lsb - self.quadrature_phasor(sense, x).re) / gain
     }
+}
+
+/// What an ADC whose channel is turned by an angle sees of displacement and velocity.
+fn turned(angle: f64, per_velocity: f64) -> [f64; 2] {
+    [angle.cos(), per_velocity * angle.sin()]
 }
 
 /// 1 / (wn^2 - w^2 + i w width): a mode's displacement under a unit force of frequency w (eq. 5).

@@ -52,6 +52,17 @@ impl Noise {
         (radius * cosine, radius * sine)
     }
 
+    /// [`gaussian_pair`](Self::gaussian_pair) of the indices from `first` on: the firsts and the seconds. In the widest SIMD
+    /// that the processor has; no sum is made in another order, so the values are the same.
+    pub fn gaussian_pairs(&self, first: u64, pairs: [&mut [f64]; 2]) {
+        let noise = *self;
+        pulp::Arch::new().dispatch(Fill {
+            noise,
+            first,
+            pairs,
+        });
+    }
+
     /// One standard normal number: the quantile of [`uniform`](Self::uniform), correct to 1e-6 and mostly to
     /// 1e-7, so that no value is beyond 8.21. A third of the cost of a pair.
     #[inline(always)]
@@ -60,42 +71,64 @@ impl Noise {
     }
 }
 
+/// A run of pairs: an object, because closures are not compiled for the caller's SIMD.
+struct Fill<'a> {
+    noise: Noise,
+    first: u64,
+    pairs: [&'a mut [f64]; 2],
+}
+
+impl pulp::WithSimd for Fill<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _simd: S) {
+        let [firsts, seconds] = self.pairs;
+        let count = firsts.len().min(seconds.len());
+        let (firsts, seconds) = (&mut firsts[..count], &mut seconds[..count]);
+        for k in 0..count {
+            let index = self.first.wrapping_add(k as u64);
+            (firsts[k], seconds[k]) = self.noise.gaussian_pair(index);
+        }
+    }
+}
+
 /// Pairs of independent standard normal numbers by the index of the ADC sample that they belong to.
 pub trait Pairs {
-    /// Those of a sample.
-    fn pair(&self, index: u64) -> (f64, f64);
+    /// Those of the samples from `first` on: the firsts and the seconds.
+    fn fill(&self, first: u64, pairs: [&mut [f64]; 2]);
 }
 
 impl Pairs for Noise {
-    #[inline(always)]
-    fn pair(&self, index: u64) -> (f64, f64) {
-        self.gaussian_pair(index)
+    fn fill(&self, first: u64, pairs: [&mut [f64]; 2]) {
+        self.gaussian_pairs(first, pairs);
     }
 }
 
 /// Pairs drawn beforehand, for many circuits that are to see the same noise; none beyond their end.
 #[derive(Debug, Clone)]
 pub struct Drawn {
-    pairs: Vec<(f64, f64)>,
+    pairs: [Vec<f64>; 2],
     first: u64,
 }
 
 impl Drawn {
     /// The first `count` pairs of a stream, for the samples from `first` on.
     pub fn new(noise: &Noise, first: u64, count: usize) -> Self {
-        let pairs = (0..count as u64).map(|k| noise.gaussian_pair(k));
-        Drawn {
-            pairs: pairs.collect(),
-            first,
-        }
+        let mut pairs = [vec![0.0; count], vec![0.0; count]];
+        noise.gaussian_pairs(0, pairs.each_mut().map(|p| &mut p[..]));
+        Drawn { pairs, first }
     }
 }
 
 impl Pairs for Drawn {
-    #[inline(always)]
-    fn pair(&self, index: u64) -> (f64, f64) {
-        let at = index.wrapping_sub(self.first) as usize;
-        self.pairs.get(at).copied().unwrap_or_default()
+    fn fill(&self, first: u64, pairs: [&mut [f64]; 2]) {
+        for (to, from) in pairs.into_iter().zip(&self.pairs) {
+            for (index, to) in (first..).zip(to) {
+                let at = index.wrapping_sub(self.first) as usize;
+                *to = from.get(at).copied().unwrap_or_default();
+            }
+        }
     }
 }
 
@@ -129,6 +162,19 @@ mod tests {
     use super::*;
 
     const COUNT: u64 = 1_000_000;
+
+    #[test]
+    fn many_pairs_are_those_one_by_one() {
+        let noise = Noise::new(20_040_024, 3);
+        for (first, count) in [(0, 1), (5, 31), (1 << 40, 1000), (u64::MAX - 3, 9)] {
+            let (mut a, mut b) = (vec![0.0; count], vec![0.0; count]);
+            noise.gaussian_pairs(first, [&mut a, &mut b]);
+            for k in 0..count {
+                let pair = noise.gaussian_pair(first.wrapping_add(k as u64));
+                assert_eq!((a[k], b[k]), pair, "{first} + {k}");
+            }
+        }
+    }
 
     /// The means of x, x^2, x^3, x^4 and how many are beyond 3.
     fn moments(values: impl Iterator<Item = f64>) -> ([f64; 4], f64, u64) {

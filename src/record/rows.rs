@@ -98,6 +98,39 @@ impl RowWriter {
         self.end_csv_row()
     }
 
+    /// Writes rows of `columns` raw integers, each after its number from `first` on, as
+    /// [`write_integers`](Self::write_integers) does; gives the next row's number.
+    ///
+    /// # Errors
+    /// As [`write_integers`](Self::write_integers).
+    pub fn write_numbered_integers(
+        &mut self,
+        first: u64,
+        rows: &[i128],
+        columns: usize,
+    ) -> Result<u64> {
+        let mut index = first;
+        let mut line = Vec::with_capacity(columns + 1);
+        for row in rows.chunks_exact(columns.max(1)) {
+            if self.npy {
+                self.check(Kind::Integer, columns + 1)?;
+                self.buffer.reserve(8 * row.len() + 8);
+                self.buffer.extend_from_slice(&index.to_le_bytes());
+                for &word in row {
+                    self.buffer.extend_from_slice(&(word as i64).to_le_bytes());
+                }
+                self.end_row()?;
+            } else {
+                line.clear();
+                line.push(i128::from(index));
+                line.extend_from_slice(row);
+                self.write_integers(&line)?;
+            }
+            index += 1;
+        }
+        Ok(index)
+    }
+
     /// Writes one row of reals, one a column. In CSV a value is the shortest decimal that reads
     /// back as the same f64; a whole number has no point, a very small or large one an exponent.
     ///
