@@ -7,6 +7,7 @@
 
 pub mod bound;
 mod circuit_tables;
+mod compensation;
 pub mod correction;
 mod correction_table;
 mod device_tables;
@@ -30,7 +31,6 @@ pub mod units;
 pub mod user_effects;
 pub mod word;
 
-pub use bound::BiasBound;
 pub use effects::Effects;
 pub use json_schema::json_schema;
 pub use schema::*;
