@@ -1,6 +1,6 @@
 //! `[compensation]` as the program sees it: the polynomial, its variable and its calibrated range.
 
-use super::schema::Circuit;
+use super::circuit::Circuit;
 use super::target::Target;
 use crate::approx::form::Codes;
 use crate::approx::form::stored::Stored;

@@ -6,6 +6,7 @@
 //! gyro, by name, [`user_effects`] those that the user suspects in a record; [`limits`] refuses formats whose exact intermediates the engine cannot hold; [`template`] holds the embedded default and what `gyrogen init` writes.
 
 pub mod bound;
+mod circuit;
 mod circuit_tables;
 mod compensation;
 pub mod correction;
