@@ -1,9 +1,10 @@
 //! Which inputs and states a function is compared at: ends, random words, both sides of each branch and
 //! limit, ties of each rounding, and what tells damaged operations from the function.
 
-use super::interpreter::Interpreter;
+use super::interpreter::{Interpreter, low_bits};
 use super::model::Model;
 use super::stimulus;
+use crate::numeric::arithmetic::SineTable;
 use crate::numeric::cast::round_shift;
 use crate::numeric::trace::ir::{Function, Id, Op};
 
@@ -15,6 +16,8 @@ const RANDOM_OF_MANY: usize = 256;
 const MANY: usize = 12;
 /// Vectors from which both sides of a branch are sought.
 const STARTS: usize = 6;
+/// Vectors from which a tie is sought further, once one has been found.
+const SPREAD: usize = 64;
 /// Newton's steps towards a value.
 const ROUNDS: usize = 32;
 /// So near is near enough for the last words to be tried one by one.
@@ -78,8 +81,9 @@ impl Search<'_> {
 
     /// Adds both sides of each branch and limit, and ties.
     fn directed(&self, chosen: &mut Vec<Vec<i128>>) {
+        let many = chosen.clone();
         let starts: Vec<Vec<i128>> = {
-            let step = (chosen.len() / 64).max(1);
+            let step = (chosen.len() / SPREAD).max(1);
             chosen.iter().step_by(step).cloned().collect()
         };
         let values: Vec<Vec<i128>> = starts.iter().map(|words| self.values(words)).collect();
@@ -121,7 +125,7 @@ impl Search<'_> {
                         let shift = cast.shift as u32;
                         let before = chosen.len();
                         for target in about(0).into_iter().chain(about(half)) {
-                            self.tie(&starts, a, shift, target, None, chosen);
+                            self.tie(&many, a, shift, target, None, chosen);
                             if matches!(self.function.nodes[a].op, Op::Mul(..)) {
                                 self.tie_of_product(&starts, a, shift, target, chosen);
                             }
@@ -140,11 +144,7 @@ impl Search<'_> {
                     let table = &self.program.program().sine_tables[number];
                     let dropped = table.phase_bits - table.address_bits;
                     if (1..=62).contains(&dropped) {
-                        let half = if table.half_step {
-                            1i128 << (dropped - 1)
-                        } else {
-                            0
-                        };
+                        let half = half_step(table);
                         for target in [-half - 1, -half] {
                             self.tie(&starts, phase, dropped, target, None, chosen);
                         }
@@ -209,7 +209,10 @@ impl Search<'_> {
     ) {
         let modulus = 1i128 << bits;
         let mut found = 0;
-        for start in spread(starts) {
+        for (tried, start) in spread(starts).enumerate() {
+            if found > 2 * STARTS || (found > 0 && tried >= SPREAD) {
+                return;
+            }
             let mut words = start.clone();
             let values = self.values(&words);
             let value = values[node];
@@ -246,9 +249,6 @@ impl Search<'_> {
                     }
                 }
                 words[k] = start[k];
-            }
-            if found > 2 * STARTS {
-                return;
             }
         }
     }
@@ -360,12 +360,13 @@ impl Search<'_> {
             return;
         }
         let dropped = table.phase_bits - table.address_bits;
+        let half = half_step(table);
         let mut lcg = stimulus::Lcg(seed + 6);
         for address in 0..1i128 << table.address_bits {
             let mut words: Vec<i128> = self.model.inputs.iter().map(|r| lcg.word(*r)).collect();
             let is = self.values(&words)[phase];
             let inside = i128::from(lcg.draw() >> 1) & ((1 << dropped) - 1);
-            let due = (address << dropped) + inside;
+            let due = low_bits((address << dropped) + inside - half, table.phase_bits);
             // The first word that moves the phase by as much.
             for k in 0..words.len() {
                 let before = words[k];
@@ -380,9 +381,18 @@ impl Search<'_> {
     }
 }
 
+/// What is added to a phase before its low bits are dropped.
+fn half_step(table: &SineTable) -> i128 {
+    let dropped = table.phase_bits - table.address_bits;
+    match table.half_step && dropped > 0 {
+        true => 1 << (dropped - 1),
+        false => 0,
+    }
+}
+
 /// Vectors far from each other first.
 fn spread(starts: &[Vec<i128>]) -> impl Iterator<Item = &Vec<i128>> {
-    let step = (starts.len() / STARTS).max(1);
+    let step = (starts.len() / SPREAD).max(1);
     (0..step).flat_map(move |first| starts.iter().skip(first).step_by(step))
 }
 
