@@ -1,6 +1,10 @@
 //! What the emitted C is to a compiler: equal functions are there once, no argument overflows, a shift is one
 //! instruction, and the chain links beside the correction of the same product.
 
+#[path = "common/compiler.rs"]
+mod compiler;
+
+use compiler::cc;
 use gyrogen::design::template::DEFAULT;
 use gyrogen::design::{Design, reader};
 use gyrogen::emit::bundle::Part;
@@ -35,8 +39,7 @@ fn text<'a>(files: &'a [EmittedFile], path: &str) -> &'a str {
 
 /// Compiles in the folder; the program's name, if it is to run.
 fn compile(folder: &Path, arguments: &[&str]) {
-    let mut command = Command::new("cc");
-    let out = command
+    let out = cc()
         .current_dir(folder)
         .args(arguments)
         .output()
@@ -183,6 +186,22 @@ fn a_portable_shift_is_one_instruction() {
         };
         let count = body.lines().filter(is_instruction).count() + 1;
         assert!(count <= most, "{name} takes {count} instructions:\n{body}");
+    }
+}
+
+/// A word of the state is stored where its new value is known: compilers then add to memory.
+#[test]
+fn a_state_is_stored_as_soon_as_it_is_known() {
+    let (_, emitted) = chain(DEFAULT);
+    let source = text(&emitted, "gyro.c");
+    let start = source.find("void gyro_integrate(").expect("the function");
+    let body = source[start..].split("\n}").next().expect("its end");
+    let lines: Vec<&str> = body.lines().map(str::trim).collect();
+    for k in 0..3 {
+        let store = format!("s->integrator[{k}] = new_integrator_{k};");
+        let place = lines.iter().position(|l| *l == store).expect("a store");
+        let made = format!("const uint64_t new_integrator_{k} = ");
+        assert!(lines[place - 1].starts_with(&made), "{body}");
     }
 }
 

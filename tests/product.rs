@@ -1,5 +1,9 @@
 //! `gyrogen emit --part all`: chain, conversion and correction of one design, built, checked and shown together.
 
+#[path = "common/compiler.rs"]
+mod compiler;
+
+use compiler::cc;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -109,7 +113,8 @@ fn run_c(main: &str, folder: &Path) -> Option<i32> {
         )
         .collect();
     arguments.extend(sources.iter().map(String::as_str));
-    let built = run("cc", &arguments, folder);
+    let built = cc().args(&arguments).current_dir(folder).output();
+    let built = built.expect("a C compiler");
     assert!(built.status.success(), "{}", said(&built));
     let status = run("./example", &[], folder).status.code();
     for made in ["build.c", "example"] {

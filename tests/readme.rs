@@ -1,5 +1,9 @@
 //! What the README and the tour show is what the commands print, and the README's C compiles.
 
+#[path = "common/compiler.rs"]
+mod compiler;
+
+use compiler::cc;
 use std::path::Path;
 use std::process::Command;
 
@@ -80,11 +84,8 @@ fn printed_outputs_are_those_of_real_runs_and_the_c_compiles() {
     let main = "int main(void) { int32_t r; return start() && !rate_of(1, 2, &r) ? 0 : 1; }\n";
     std::fs::write(dir.join("main.c"), c.concat() + main).unwrap();
     let bundle = dir.join("out/firmware/c");
-    let compiler = std::env::var("CC").unwrap_or("cc".to_owned());
-    let mut words = compiler.split_whitespace();
-    let mut compile = Command::new(words.next().expect("a compiler"));
+    let mut compile = cc();
     compile
-        .args(words)
         .args(["-std=c99", "-Wall", "-Wextra", "-Werror", "-I"])
         .arg(&bundle);
     for source in ["gyro.c", "gyro_tables.c", "gyro_selftest.c"] {

@@ -9,6 +9,7 @@ gyro_nco_out_t gyro_nco(gyro_oscillator_t *s)
     const uint32_t phase = s->phase;
     const uint32_t tuning_word = s->tuning_word;
     const uint32_t new_phase = (uint32_t)(phase + tuning_word);
+    s->phase = new_phase;
     const uint32_t sum = (uint32_t)(new_phase + UINT32_C(1073741824));
     const uint32_t half_step_on = (uint32_t)(new_phase + UINT32_C(524288));
     const uint32_t top_bits = (uint32_t)(half_step_on >> 20U);
@@ -18,7 +19,6 @@ gyro_nco_out_t gyro_nco(gyro_oscillator_t *s)
     const uint32_t top_bits_2 = (uint32_t)(half_step_on_2 >> 20U);
     const uint32_t address_2 = top_bits_2 & UINT32_C(4095);
     const int32_t cosine = (int32_t)gyro_sine_0[address_2]; /* -32767 .. 32767 */
-    s->phase = new_phase;
     gyro_nco_out_t out;
     out.sine = sine;
     out.cosine = cosine;
@@ -39,10 +39,10 @@ void gyro_integrate(gyro_cic_t *s, int32_t product)
     const uint64_t integrator_1 = s->integrator[1];
     const uint64_t integrator_2 = s->integrator[2];
     const uint64_t new_integrator_0 = (uint64_t)(integrator_0 + (uint64_t)product);
-    const uint64_t new_integrator_1 = (uint64_t)(integrator_1 + new_integrator_0);
-    const uint64_t new_integrator_2 = (uint64_t)(integrator_2 + new_integrator_1);
     s->integrator[0] = new_integrator_0;
+    const uint64_t new_integrator_1 = (uint64_t)(integrator_1 + new_integrator_0);
     s->integrator[1] = new_integrator_1;
+    const uint64_t new_integrator_2 = (uint64_t)(integrator_2 + new_integrator_1);
     s->integrator[2] = new_integrator_2;
 }
 
@@ -69,17 +69,17 @@ int32_t gyro_decimate(gyro_cic_t *s)
 {
     const uint64_t integrator_2 = s->integrator[2];
     const uint64_t delay_1 = s->delay_1;
+    s->delay_1 = integrator_2;
     const uint64_t delay_2 = s->delay_2;
     const uint64_t delay_3 = s->delay_3;
     const uint64_t new_delay_2 = (uint64_t)(integrator_2 - delay_1);
+    s->delay_2 = new_delay_2;
     const uint64_t new_delay_3 = (uint64_t)(new_delay_2 - delay_2);
+    s->delay_3 = new_delay_3;
     const uint64_t difference = (uint64_t)(new_delay_3 - delay_3);
     const int64_t comb_sum = gyro_sign_extend_64(difference, UINT64_C(274877906944)); /* -137434759168 .. 137434759168 */
     const int64_t biased = comb_sum + INT64_C(16384);
     const int64_t rounded = gyro_asr_64(biased, 15U); /* -4194176 .. 4194176 */
-    s->delay_1 = integrator_2;
-    s->delay_2 = new_delay_2;
-    s->delay_3 = new_delay_3;
     return (int32_t)rounded;
 }
 
@@ -164,11 +164,11 @@ int32_t gyro_amplitude_loop(gyro_amplitude_loop_t *s, int32_t magnitude)
     const int32_t error = INT32_C(1048576) - magnitude_in_range; /* -4882885 .. 1048576 */
     const int32_t integrated = integrator + error; /* -4882885 .. 135262208 */
     const int32_t new_integrator = gyro_clamp_32(integrated, INT32_C(0), INT32_C(134213632)); /* 0 .. 134213632 */
+    s->integrator = new_integrator;
     const int32_t proportional = gyro_asr_32(error, 7U); /* 2^0 units, floor; -38148 .. 8192 */
     const int32_t integral = (int32_t)((uint32_t)new_integrator >> 12U); /* 2^0 units, floor; 0 .. 32767 */
     const int32_t unlimited_gain = proportional + integral; /* -38148 .. 40959 */
     const int32_t gain = gyro_clamp_32(unlimited_gain, INT32_C(0), INT32_C(32767)); /* 0 .. 32767 */
-    s->integrator = new_integrator;
     return gain;
 }
 

@@ -1,7 +1,7 @@
 //! `compensation.bound_dps`, `form` and `target`: what the compensation's fixed-point error is asked to be; and
 //! `[compensation.evaluation]`, the form that was chosen for it.
 
-pub use super::schema::BiasBound;
+use super::compensation::BiasBound;
 use super::schema::{Circuit, Compensation, Outside};
 use super::table::{Real, Table, Value};
 use crate::approx::form::polynomial::Monomials;

@@ -6,7 +6,9 @@
 //! gyro, by name, [`user_effects`] those that the user suspects in a record; [`limits`] refuses formats whose exact intermediates the engine cannot hold; [`template`] holds the embedded default and what `gyrogen init` writes.
 
 pub mod bound;
+mod circuit;
 mod circuit_tables;
+mod compensation;
 pub mod correction;
 mod correction_table;
 mod device_tables;
@@ -30,7 +32,6 @@ pub mod units;
 pub mod user_effects;
 pub mod word;
 
-pub use bound::BiasBound;
 pub use effects::Effects;
 pub use json_schema::json_schema;
 pub use schema::*;

@@ -89,6 +89,7 @@ impl<'a> Lowering<'a> {
         }
         let mut body = self.blocks.pop().unwrap_or_default();
         tidy::drop_unused(&mut body, &outputs);
+        tidy::store_early(&mut body);
         let written_out = tidy::write_out_conversions(&mut body);
         Lowered {
             inputs: self

@@ -23,6 +23,46 @@ pub(super) fn drop_unused(body: &mut Vec<Statement>, outputs: &[(&'static str, T
     }
 }
 
+/// Moves each store of a state's word, which all stand at the end, to where its value is known and the old word has
+/// been read: fewer words are alive at once, and compilers add to memory.
+pub(super) fn store_early(body: &mut Vec<Statement>) {
+    let is_store = |s: &Statement| matches!(s, Statement::Store(..));
+    let stores: Vec<Statement> = body.iter().filter(|s| is_store(s)).cloned().collect();
+    body.retain(|s| !is_store(s));
+    let mut after: Vec<Vec<Statement>> = vec![Vec::new(); body.len() + 1];
+    for store in stores {
+        let Statement::Store(slot, element, v) = &store else {
+            continue;
+        };
+        let comes_first = |s: &Statement| {
+            let defines = matches!(v.value, Value::Temp(k) if defines(s, k));
+            let reads = Expr::Load(*slot, *element);
+            defines || matches!(s, Statement::Let(_, _, expr, _) if *expr == reads)
+        };
+        let place = body.iter().rposition(comes_first);
+        after[place.unwrap_or(body.len())].push(store);
+    }
+    let mut stored = after.into_iter();
+    let whole = std::mem::take(body).into_iter();
+    body.extend(
+        whole
+            .zip(&mut stored)
+            .flat_map(|(s, more)| std::iter::once(s).chain(more)),
+    );
+    body.extend(stored.flatten());
+}
+
+/// The temporary gets a value in this statement.
+fn defines(statement: &Statement, temp: usize) -> bool {
+    match statement {
+        Statement::Let(k, ..) | Statement::Carry(k, ..) => *k == temp,
+        Statement::Call(_, _, results) => results.iter().any(|(k, _)| *k == temp),
+        Statement::Loop(_, inner) => inner.iter().any(|s| defines(s, temp)),
+        Statement::Next(values) => values.iter().any(|(k, _)| *k == temp),
+        Statement::Store(..) => false,
+    }
+}
+
 fn count(body: &[Statement]) -> usize {
     body.iter()
         .map(|s| match s {

@@ -199,9 +199,15 @@ impl Interpreter {
     }
 
     /// The values of all nodes of one call (in a loop, those of its last round); the state stays.
-    pub fn values(&self, function: usize, inputs: &[i128], state: &[i128]) -> Vec<i128> {
+    pub fn values(
+        &self,
+        function: usize,
+        damage: Option<Damage>,
+        inputs: &[i128],
+        state: &[i128],
+    ) -> Vec<i128> {
         let mut state = state.to_vec();
-        self.evaluate(function, None, inputs, &mut state).values
+        self.evaluate(function, damage, inputs, &mut state).values
     }
 
     fn evaluate<'a>(

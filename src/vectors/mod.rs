@@ -8,3 +8,4 @@ pub mod model;
 mod repair;
 pub mod search;
 pub mod stimulus;
+mod telling;

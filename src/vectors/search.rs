@@ -1,9 +1,10 @@
 //! Which inputs and states a function is compared at: ends, random words, both sides of each branch and
 //! limit, ties of each rounding, and what tells damaged operations from the function.
 
-use super::interpreter::{Damage, Interpreter};
+use super::interpreter::{Interpreter, low_bits};
 use super::model::Model;
 use super::stimulus;
+use crate::numeric::arithmetic::SineTable;
 use crate::numeric::cast::round_shift;
 use crate::numeric::trace::ir::{Function, Id, Op};
 
@@ -13,14 +14,10 @@ const RANDOM: usize = 1024;
 const RANDOM_OF_MANY: usize = 256;
 /// Words beyond which a function has many.
 const MANY: usize = 12;
-/// Vectors that a damage is told by, where so many are found.
-const EACH: usize = 2;
-/// Random vectors among which damage is searched: fewer, the longer the function.
-const CANDIDATES: usize = 1 << 14;
-/// Operations of the whole search for one damage.
-const OPERATIONS: usize = 1 << 20;
 /// Vectors from which both sides of a branch are sought.
 const STARTS: usize = 6;
+/// Vectors from which a tie is sought further, once one has been found.
+const SPREAD: usize = 64;
 /// Newton's steps towards a value.
 const ROUNDS: usize = 32;
 /// So near is near enough for the last words to be tried one by one.
@@ -53,22 +50,23 @@ pub fn vectors(model: &Model, seed: u64) -> Vec<Vec<i128>> {
     chosen
 }
 
-struct Search<'a> {
-    model: &'a Model,
-    program: &'a Interpreter,
-    number: usize,
-    function: &'a Function,
+/// A function in which vectors are sought.
+pub(super) struct Search<'a> {
+    pub(super) model: &'a Model,
+    pub(super) program: &'a Interpreter,
+    pub(super) number: usize,
+    pub(super) function: &'a Function,
 }
 
 impl Search<'_> {
-    fn split<'a>(&self, words: &'a [i128]) -> (&'a [i128], &'a [i128]) {
+    pub(super) fn split<'a>(&self, words: &'a [i128]) -> (&'a [i128], &'a [i128]) {
         words.split_at(self.function.inputs.len())
     }
 
     /// The values of all nodes.
     fn values(&self, words: &[i128]) -> Vec<i128> {
         let (inputs, state) = self.split(words);
-        self.program.values(self.number, inputs, state)
+        self.program.values(self.number, None, inputs, state)
     }
 
     fn is_allowed(&self, words: &[i128]) -> bool {
@@ -83,8 +81,9 @@ impl Search<'_> {
 
     /// Adds both sides of each branch and limit, and ties.
     fn directed(&self, chosen: &mut Vec<Vec<i128>>) {
+        let many = chosen.clone();
         let starts: Vec<Vec<i128>> = {
-            let step = (chosen.len() / 64).max(1);
+            let step = (chosen.len() / SPREAD).max(1);
             chosen.iter().step_by(step).cloned().collect()
         };
         let values: Vec<Vec<i128>> = starts.iter().map(|words| self.values(words)).collect();
@@ -126,7 +125,7 @@ impl Search<'_> {
                         let shift = cast.shift as u32;
                         let before = chosen.len();
                         for target in about(0).into_iter().chain(about(half)) {
-                            self.tie(&starts, a, shift, target, None, chosen);
+                            self.tie(&many, a, shift, target, None, chosen);
                             if matches!(self.function.nodes[a].op, Op::Mul(..)) {
                                 self.tie_of_product(&starts, a, shift, target, chosen);
                             }
@@ -145,11 +144,7 @@ impl Search<'_> {
                     let table = &self.program.program().sine_tables[number];
                     let dropped = table.phase_bits - table.address_bits;
                     if (1..=62).contains(&dropped) {
-                        let half = if table.half_step {
-                            1i128 << (dropped - 1)
-                        } else {
-                            0
-                        };
+                        let half = half_step(table);
                         for target in [-half - 1, -half] {
                             self.tie(&starts, phase, dropped, target, None, chosen);
                         }
@@ -214,8 +209,10 @@ impl Search<'_> {
     ) {
         let modulus = 1i128 << bits;
         let mut found = 0;
-        let step = (starts.len() / STARTS).max(1);
-        for start in starts.iter().step_by(step) {
+        for (tried, start) in spread(starts).enumerate() {
+            if found > 2 * STARTS || (found > 0 && tried >= SPREAD) {
+                return;
+            }
             let mut words = start.clone();
             let values = self.values(&words);
             let value = values[node];
@@ -252,9 +249,6 @@ impl Search<'_> {
                     }
                 }
                 words[k] = start[k];
-            }
-            if found > 2 * STARTS {
-                return;
             }
         }
     }
@@ -366,12 +360,13 @@ impl Search<'_> {
             return;
         }
         let dropped = table.phase_bits - table.address_bits;
+        let half = half_step(table);
         let mut lcg = stimulus::Lcg(seed + 6);
         for address in 0..1i128 << table.address_bits {
             let mut words: Vec<i128> = self.model.inputs.iter().map(|r| lcg.word(*r)).collect();
             let is = self.values(&words)[phase];
             let inside = i128::from(lcg.draw() >> 1) & ((1 << dropped) - 1);
-            let due = (address << dropped) + inside;
+            let due = low_bits((address << dropped) + inside - half, table.phase_bits);
             // The first word that moves the phase by as much.
             for k in 0..words.len() {
                 let before = words[k];
@@ -384,68 +379,21 @@ impl Search<'_> {
             chosen.push(words);
         }
     }
+}
 
-    /// Vectors that tell damage, of which the others do not tell enough.
-    fn telling(&self, chosen: &mut Vec<Vec<i128>>, seed: u64) {
-        let work: usize = self.function.nodes.len()
-            + self
-                .function
-                .loops
-                .iter()
-                .map(|l| (l.end - l.start) * l.count as usize)
-                .sum::<usize>();
-        let count = (OPERATIONS / work.max(1)).clamp(256, CANDIDATES);
-        let mut candidates = stimulus::random(&self.model.inputs, count / 2, seed + 4);
-        candidates.extend(self.shaken(chosen, count / 2, seed + 8));
-        candidates
-            .iter_mut()
-            .for_each(|words| self.model.repair(words));
-        let outcome = |damage: Option<Damage>, words: &Vec<i128>| {
-            let (inputs, state) = self.split(words);
-            let mut state = state.to_vec();
-            let mut outputs = Vec::new();
-            let program = self.program;
-            let fault = program.damaged(self.number, damage, inputs, &mut state, &mut outputs);
-            (outputs, state, fault)
-        };
-        let known: Vec<_> = chosen.iter().map(|words| outcome(None, words)).collect();
-        let others: Vec<_> = candidates
-            .iter()
-            .map(|words| outcome(None, words))
-            .collect();
-        let mut more: Vec<Vec<i128>> = Vec::new();
-        for damage in self.program.damages(self.number) {
-            let tells = |(words, due): &(&Vec<i128>, &_)| outcome(Some(damage), words) != **due;
-            let told = chosen.iter().zip(&known).filter(tells).take(EACH).count();
-            let lacking = EACH - told;
-            if lacking > 0 {
-                let found = candidates.iter().zip(&others).filter(tells).take(lacking);
-                more.extend(found.map(|(words, _)| words.clone()));
-            }
-        }
-        chosen.extend(more);
+/// What is added to a phase before its low bits are dropped.
+fn half_step(table: &SineTable) -> i128 {
+    let dropped = table.phase_bits - table.address_bits;
+    match table.half_step && dropped > 0 {
+        true => 1 << (dropped - 1),
+        false => 0,
     }
 }
 
-impl Search<'_> {
-    /// Vectors in which some words are those of a chosen one, so that it may stay on its branch or tie, and the
-    /// others ends or random words.
-    fn shaken(&self, chosen: &[Vec<i128>], count: usize, seed: u64) -> Vec<Vec<i128>> {
-        let mut lcg = stimulus::Lcg(seed);
-        let mut shake = |words: &Vec<i128>| {
-            let ranges = words.iter().zip(&self.model.inputs);
-            let moved = ranges.map(|(word, range)| match lcg.draw() >> 62 {
-                0 => lcg.word(*range),
-                1 => [range.low, range.high][(lcg.draw() >> 63) as usize],
-                _ => *word,
-            });
-            moved.collect()
-        };
-        let step = |k: usize| k * chosen.len() / count.max(1);
-        (0..count)
-            .filter_map(|k| chosen.get(step(k)).map(&mut shake))
-            .collect()
-    }
+/// Vectors far from each other first.
+fn spread(starts: &[Vec<i128>]) -> impl Iterator<Item = &Vec<i128>> {
+    let step = (starts.len() / SPREAD).max(1);
+    (0..step).flat_map(move |first| starts.iter().skip(first).step_by(step))
 }
 
 /// The inverse of an odd number modulo 2^127.

@@ -1,14 +1,22 @@
 //! Damages emitted C one token at a time, and asks the bundle's own harness whether it notices.
 
+#[path = "../common/compiler.rs"]
+mod compiler;
+mod damage;
+mod limited;
 mod prover;
+mod slice;
 
-use prover::{Answer, Prover};
+use compiler::cc;
+pub use damage::mutants;
+use limited::limited;
+pub use prover::Answer;
+use prover::Prover;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
+use std::process::Stdio;
 
-/// A harness that runs longer has been noticed.
-const LIMIT: Duration = Duration::from_secs(30);
+/// Seconds of processor time; a harness that takes more has been noticed.
+const LIMIT_S: u32 = 10;
 
 /// One damaged line.
 #[derive(Clone, Debug)]
@@ -32,117 +40,6 @@ pub enum Fate {
     Proved,
     /// With words at which it differs, where the model checker finds some.
     Alive(Answer),
-}
-
-/// Every mutant of a source: operators, constants by one, comparisons, shifts, entries of tables, lost
-/// assignments and calls.
-pub fn mutants(file: &str, text: &str) -> Vec<Mutant> {
-    let mut all = Vec::new();
-    let mut depth = 0;
-    for (line, whole) in text.lines().enumerate() {
-        let inside = depth > 0;
-        let code = whole.split("/*").next().unwrap_or("");
-        depth += code.matches('{').count();
-        depth -= code.matches('}').count();
-        if !inside || whole.starts_with(" *") || code.trim().is_empty() {
-            continue;
-        }
-        let rest = &whole[code.len()..];
-        all.extend(of_line(code).into_iter().map(|after| Mutant {
-            file: file.to_owned(),
-            line,
-            before: whole.to_owned(),
-            after: after + rest,
-        }));
-    }
-    all
-}
-
-const OPERATORS: [(&str, &[&str]); 16] = [
-    (" + ", &[" - "]),
-    (" - ", &[" + "]),
-    (" * ", &[" + "]),
-    (" & ", &[" | "]),
-    (" | ", &[" & "]),
-    (" << ", &[" >> "]),
-    (" >> ", &[" << "]),
-    (" < ", &[" <= ", " >= "]),
-    (" > ", &[" >= ", " <= "]),
-    (" <= ", &[" < "]),
-    (" >= ", &[" > "]),
-    (" == ", &[" != "]),
-    (" != ", &[" == "]),
-    (" && ", &[" || "]),
-    (" || ", &[" && "]),
-    ("_add(", &["_sub("]),
-];
-
-fn of_line(code: &str) -> Vec<String> {
-    let mut all = Vec::new();
-    let replaced =
-        |at: usize, from: usize, to: &str| format!("{}{to}{}", &code[..at], &code[at + from..]);
-    for (from, to) in OPERATORS {
-        for (at, _) in code.match_indices(from) {
-            all.extend(to.iter().map(|to| replaced(at, from.len(), to)));
-        }
-    }
-    for (at, _) in code.match_indices(" ? ") {
-        let start = code[..at].rfind("= ").map_or(0, |k| k + 2);
-        all.push(format!(
-            "{}!({}){}",
-            &code[..start],
-            &code[start..at],
-            &code[at..]
-        ));
-    }
-    for (at, len) in numbers(code) {
-        if let Ok(value) = code[at..at + len].parse::<u128>() {
-            all.push(replaced(at, len, &(value + 1).to_string()));
-            if value > 0 {
-                all.push(replaced(at, len, &(value - 1).to_string()));
-            }
-        }
-    }
-    let trimmed = code.trim();
-    let is_state =
-        trimmed.starts_with("s->") || trimmed.starts_with("out.") || trimmed.starts_with("g->");
-    let is_carried = trimmed.starts_with('t') && trimmed.contains(" = ");
-    let is_call = !trimmed.contains('=')
-        && trimmed.contains("_")
-        && trimmed.ends_with(");")
-        && !trimmed.starts_with("return");
-    if let (true, Some((target, _))) = (trimmed.starts_with("out."), trimmed.split_once(" = ")) {
-        all.push(format!("    {target} = 0;"));
-    } else if (is_state && trimmed.contains(" = ")) || is_carried || is_call {
-        all.push(String::new());
-    }
-    all
-}
-
-/// Decimal numbers that stand for themselves: in a constant macro, with a suffix, as an entry or an index.
-fn numbers(code: &str) -> Vec<(usize, usize)> {
-    let bytes = code.as_bytes();
-    let mut all = Vec::new();
-    let mut k = 0;
-    while k < bytes.len() {
-        if !bytes[k].is_ascii_digit() {
-            k += 1;
-            continue;
-        }
-        let start = k;
-        while k < bytes.len() && bytes[k].is_ascii_digit() {
-            k += 1;
-        }
-        let before = start.checked_sub(1).map_or(b' ', |b| bytes[b]);
-        let after = bytes.get(k).copied().unwrap_or(b' ');
-        let in_name =
-            before.is_ascii_alphabetic() || before == b'_' || after == b'_' || after == b'x';
-        // The width of an exact type is in a name; a digit that follows another name is too.
-        if !in_name {
-            all.push((start, k - start));
-        }
-    }
-    all
 }
 
 /// A bundle ready for mutants.
@@ -217,7 +114,7 @@ impl Bundle {
 
     /// Compiles a source with headers from `before`, then from the bundle.
     fn compile(&self, source: &Path, object: &Path, before: &[&Path]) -> bool {
-        let mut command = Command::new("cc");
+        let mut command = cc();
         command.args(["-std=c99", "-O1", "-w", "-c"]);
         command.args(
             before
@@ -236,7 +133,7 @@ impl Bundle {
 
     /// The instructions that the compiler makes of a source.
     fn instructions(&self, source: &Path, before: &[&Path]) -> Vec<u8> {
-        let mut command = Command::new("cc");
+        let mut command = cc();
         command.args(["-std=c99", "-O2", "-w", "-S", "-o", "-"]);
         command.args(
             before
@@ -282,22 +179,32 @@ impl Bundle {
         fate
     }
 
-    fn fate_in(&self, mutant: &Mutant, place: &Path) -> Fate {
-        let text = std::fs::read_to_string(self.folder.join(&mutant.file)).expect("a source");
-        let lines = text.lines().enumerate();
-        let damaged: Vec<&str> = lines
-            .map(|(k, line)| {
-                if k == mutant.line {
-                    mutant.after.as_str()
-                } else {
-                    line
-                }
-            })
-            .collect();
-        let damaged_text = damaged.join("\n") + "\n";
-        std::fs::write(place.join(&mutant.file), &damaged_text).expect("written");
+    /// The harness, or the compiler, notices the mutant.
+    pub fn is_noticed(&self, mutant: &Mutant, number: usize) -> bool {
+        !self.noticed_by(mutant, number, &self.checks).is_empty()
+    }
+
+    /// The checks, of these, that notice the mutant; all, where it does not compile.
+    pub fn noticed_by(
+        &self,
+        mutant: &Mutant,
+        number: usize,
+        checks: &[Vec<String>],
+    ) -> Vec<Vec<String>> {
+        let place = self.build.join(format!("n{number}"));
+        std::fs::create_dir_all(&place).expect("a folder");
+        let program = self.built(mutant, &place);
+        let passes = |check: &[String]| program.as_ref().is_some_and(|p| self.passes(p, check));
+        let noticed = checks.iter().filter(|check| !passes(check)).cloned();
+        let noticed = noticed.collect();
+        let _ = std::fs::remove_dir_all(&place);
+        noticed
+    }
+
+    /// The harness with the mutant; none where it does not compile.
+    fn built(&self, mutant: &Mutant, place: &Path) -> Option<PathBuf> {
+        std::fs::write(place.join(&mutant.file), self.damaged(mutant)).expect("written");
         let is_header = mutant.file.ends_with(".h");
-        let main = format!("{}.c", self.prefix);
         // All that a damaged header goes into is compiled with it: copies beside it.
         let damaged: Vec<&String> = match is_header {
             true => self.names.iter().collect(),
@@ -315,50 +222,87 @@ impl Bundle {
         let object = |name: &String| place.join(format!("{name}.o"));
         for name in &damaged {
             if !self.compile(&place.join(name), &object(name), &[place]) {
-                return Fate::Killed;
+                return None;
             }
         }
-        let name = if is_header { &main } else { &mutant.file };
-        let source = place.join(name);
         let program = place.join("harness");
-        let mut link = Command::new("cc");
+        let mut link = cc();
         link.args(self.names.iter().map(|n| match damaged.contains(&n) {
             true => object(n),
             false => self.object(n),
         }));
         let linked = link.arg("-o").arg(&program).stderr(Stdio::null()).status();
-        if !linked.expect("a C compiler").success() {
+        let is_linked = linked.expect("a C compiler").success();
+        is_linked.then_some(program)
+    }
+
+    fn fate_in(&self, mutant: &Mutant, place: &Path) -> Fate {
+        let program = self.built(mutant, place);
+        let passes = |check| program.as_ref().is_some_and(|p| self.passes(p, check));
+        if !self.checks.iter().all(|check| passes(check)) {
             return Fate::Killed;
         }
-        if self
-            .checks
-            .iter()
-            .any(|check| !self.passes(&program, check))
-        {
-            return Fate::Killed;
-        }
+        let text = std::fs::read_to_string(self.folder.join(&mutant.file)).expect("a source");
         if self.is_exhausted(mutant, &text) {
             return Fate::Exhausted;
         }
-        let original = self.source(name);
-        if self.instructions(&original, &[]) == self.instructions(&source, &[place]) {
+        let main = format!("{}.c", self.prefix);
+        let name = match mutant.file.ends_with(".h") {
+            true => &main,
+            false => &mutant.file,
+        };
+        let [original, damaged] = [self.source(name), place.join(name)];
+        if self.instructions(&original, &[]) == self.instructions(&damaged, &[place]) {
             return Fate::SameInstructions;
         }
-        match self.proved(mutant, &damaged_text, place) {
+        match self.proved(mutant, place) {
             Answer::Equal => Fate::Proved,
             answer => Fate::Alive(answer),
         }
     }
 
+    /// There is a model checker.
+    pub fn has_prover(&self) -> bool {
+        self.prover.is_some()
+    }
+
+    /// What the model checker says of the mutant, whatever the vectors say.
+    pub fn asked(&self, mutant: &Mutant, number: usize) -> Answer {
+        let place = self.build.join(format!("q{number}"));
+        std::fs::create_dir_all(&place).expect("a folder");
+        let answer = self.proved(mutant, &place);
+        let _ = std::fs::remove_dir_all(&place);
+        answer
+    }
+
+    /// The whole text of the source with the damaged line.
+    fn damaged(&self, mutant: &Mutant) -> String {
+        let text = std::fs::read_to_string(self.folder.join(&mutant.file)).expect("a source");
+        let lines = text
+            .lines()
+            .enumerate()
+            .map(|(k, line)| match k == mutant.line {
+                true => mutant.after.as_str(),
+                false => line,
+            });
+        lines.collect::<Vec<_>>().join("\n") + "\n"
+    }
+
     /// What the model checker says of the mutant.
-    fn proved(&self, mutant: &Mutant, damaged: &str, place: &Path) -> Answer {
+    fn proved(&self, mutant: &Mutant, place: &Path) -> Answer {
         let Some(prover) = &self.prover else {
             return Answer::Unknown;
         };
         let question = place.join("question");
         std::fs::create_dir_all(&question).expect("a folder");
         let file = (mutant.file.as_str(), mutant.line);
-        prover.compare(&question, &self.folder, &self.prefix, file, damaged)
+        prover.compare(
+            &question,
+            &self.folder,
+            &self.prefix,
+            file,
+            &self.damaged(mutant),
+        )
     }
 
     /// The mutant is in a function of which every input has just been run.
@@ -389,7 +333,7 @@ impl Bundle {
             [_, name] => read(name),
             _ => Vec::new(),
         };
-        let mut child = Command::new(program)
+        let mut child = limited(program, LIMIT_S)
             .args(check)
             .stdin(Stdio::piped())
             .stdout(Stdio::null())
@@ -402,18 +346,7 @@ impl Bundle {
                 let _ = std::io::Write::write_all(&mut stdin, &input);
             }
         });
-        let started = Instant::now();
-        let passed = loop {
-            if let Some(status) = child.try_wait().expect("a child") {
-                break status.success();
-            }
-            if started.elapsed() > LIMIT {
-                let _ = child.kill();
-                let _ = child.wait();
-                break false;
-            }
-            std::thread::sleep(Duration::from_millis(1));
-        };
+        let passed = child.wait().expect("a child").success();
         let _ = feeder.join();
         passed
     }
@@ -421,7 +354,7 @@ impl Bundle {
     /// The undamaged program.
     pub fn whole(&self) -> PathBuf {
         let program = self.build.join("whole");
-        let mut link = Command::new("cc");
+        let mut link = cc();
         link.args(self.names.iter().map(|n| self.object(n)))
             .arg("-o")
             .arg(&program);

@@ -4,11 +4,15 @@
 //!
 //! `GYROGEN_ESBMC` names the program (else `esbmc` of the PATH). Without one nothing is proved.
 
+use super::limited::limited;
+use super::slice;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// Seconds after which a question counts as not answered.
-const LIMIT_S: u32 = 15;
+/// Seconds of processor time after which a question counts as not answered.
+const LIMIT_S: u32 = 20;
+/// The same of the smaller questions.
+const SLICE_LIMIT_S: u32 = 4;
 /// Memory after which it does.
 const LIMIT_MIB: u32 = 3000;
 
@@ -31,11 +35,11 @@ pub struct Prover {
 
 /// A function as its head says.
 #[derive(Debug)]
-struct Signature {
+pub struct Signature {
     result: String,
     name: String,
     /// Type, whether it is a pointer, name.
-    parameters: Vec<(String, bool, String)>,
+    pub parameters: Vec<(String, bool, String)>,
 }
 
 /// A scalar inside a value: its place, and its range where one is declared.
@@ -95,8 +99,24 @@ impl Prover {
         let name = enclosing(&original, line);
         let declared = [header.as_str(), &main, &arith].concat();
         if file.ends_with(".c") && !file.ends_with("_tables.c") {
-            let signature = name.and_then(|name| signature(&main, &name));
-            return signature.map_or(Answer::Unknown, |s| self.ask(place, prefix, &declared, &s));
+            let Some(signature) = name.and_then(|name| signature(&main, &name)) else {
+                return Answer::Unknown;
+            };
+            let lines: Vec<&str> = original.lines().collect();
+            let start = lines[..line].iter().rposition(|l| *l == "{");
+            let end = lines.iter().skip(line).position(|l| *l == "}");
+            if let (Some(start), Some(end)) = (start, end) {
+                let body = &lines[start + 1..line + end];
+                let changed = damaged.lines().nth(line).unwrap_or("");
+                let of = (prefix, declared.as_str());
+                for question in slice::questions(of, &signature, body, line - start - 1, changed) {
+                    std::fs::write(place.join("question.c"), question).expect("written");
+                    if self.answer(place, SLICE_LIMIT_S) == Answer::Equal {
+                        return Answer::Equal;
+                    }
+                }
+            }
+            return self.ask(place, prefix, &declared, &signature);
         }
         // A helper is the same for all words, or in all functions that use it.
         let helper = name
@@ -123,19 +143,14 @@ impl Prover {
     fn ask(&self, place: &Path, prefix: &str, declared: &str, signature: &Signature) -> Answer {
         let text = question(prefix, declared, signature);
         std::fs::write(place.join("question.c"), text).expect("written");
-        self.answer(place)
+        self.answer(place, LIMIT_S)
     }
 
-    fn answer(&self, place: &Path) -> Answer {
-        let mut command = Command::new(&self.program);
+    fn answer(&self, place: &Path, limit_s: u32) -> Answer {
+        let mut command = limited(&self.program, limit_s);
         command.current_dir(place).arg("question.c");
         command.args(["-I", ".", "--overflow-check", "--ub-shift-check"]);
-        command.args([
-            "--timeout",
-            &format!("{LIMIT_S}s"),
-            "--memlimit",
-            &format!("{LIMIT_MIB}m"),
-        ]);
+        command.args(["--memlimit", &format!("{LIMIT_MIB}m")]);
         let output = command
             .stdin(Stdio::null())
             .output()
@@ -273,7 +288,7 @@ fn leaves(declared: &str, ty: &str, place: &str) -> Vec<Leaf> {
 }
 
 /// `low .. high` of a comment.
-fn range(comment: &str) -> Option<(String, String)> {
+pub fn range(comment: &str) -> Option<(String, String)> {
     let (before, after) = comment.split_once(" .. ")?;
     let is_number = |text: &&str| {
         text.trim_start_matches('-')
@@ -300,7 +315,7 @@ fn constant(number: &str) -> Option<String> {
 }
 
 /// The ranges that a function's comment declares of the inputs that it does not limit for itself.
-fn input_range(
+pub fn input_range(
     declared: &str,
     prefix: &str,
     signature: &Signature,

@@ -549,6 +549,7 @@ pub fn nco(s: &mut Oscillator) -> NcoOut {
     let phase: u32 = s.phase;
     let tuning_word: u32 = s.tuning_word;
     let new_phase: u32 = phase.wrapping_add(tuning_word);
+    s.phase = new_phase;
     let sum: u32 = new_phase.wrapping_add(1073741824_u32);
     let half_step_on: u32 = new_phase.wrapping_add(524288_u32);
     let top_bits: u32 = half_step_on >> 20;
@@ -558,7 +559,6 @@ pub fn nco(s: &mut Oscillator) -> NcoOut {
     let top_bits_2: u32 = half_step_on_2 >> 20;
     let address_2: u32 = top_bits_2 & 4095_u32;
     let cosine: i32 = SINE_0.get(address_2 as usize).copied().unwrap_or(0) as i32; // -32767 .. 32767
-    s.phase = new_phase;
     NcoOut {
         sine,
         cosine,
@@ -592,10 +592,10 @@ pub fn integrate(s: &mut Cic, product: i32) {
     let integrator_1: u64 = s.integrator[1];
     let integrator_2: u64 = s.integrator[2];
     let new_integrator_0: u64 = integrator_0.wrapping_add(product as u64);
-    let new_integrator_1: u64 = integrator_1.wrapping_add(new_integrator_0);
-    let new_integrator_2: u64 = integrator_2.wrapping_add(new_integrator_1);
     s.integrator[0] = new_integrator_0;
+    let new_integrator_1: u64 = integrator_1.wrapping_add(new_integrator_0);
     s.integrator[1] = new_integrator_1;
+    let new_integrator_2: u64 = integrator_2.wrapping_add(new_integrator_1);
     s.integrator[2] = new_integrator_2;
 }
 
@@ -628,17 +628,17 @@ pub fn sample(s: &mut Chain, drive: i16, sense: i16) {
 pub fn decimate(s: &mut Cic) -> i32 {
     let integrator_2: u64 = s.integrator[2];
     let delay_1: u64 = s.delay_1;
+    s.delay_1 = integrator_2;
     let delay_2: u64 = s.delay_2;
     let delay_3: u64 = s.delay_3;
     let new_delay_2: u64 = integrator_2.wrapping_sub(delay_1);
+    s.delay_2 = new_delay_2;
     let new_delay_3: u64 = new_delay_2.wrapping_sub(delay_2);
+    s.delay_3 = new_delay_3;
     let difference: u64 = new_delay_3.wrapping_sub(delay_3);
     let comb_sum: i64 = (difference.wrapping_shl(25) as i64) >> 25; // -137434759168 .. 137434759168
     let biased: i64 = comb_sum.wrapping_add(16384_i64);
     let rounded: i64 = biased >> 15; // -4194176 .. 4194176
-    s.delay_1 = integrator_2;
-    s.delay_2 = new_delay_2;
-    s.delay_3 = new_delay_3;
     rounded as i32
 }
 
@@ -752,11 +752,11 @@ pub fn amplitude_loop(s: &mut AmplitudeLoop, magnitude: i32) -> i32 {
     let error: i32 = 1048576_i32.wrapping_sub(magnitude_in_range); // -4882885 .. 1048576
     let integrated: i32 = integrator.wrapping_add(error); // -4882885 .. 135262208
     let new_integrator: i32 = integrated.max(0_i32).min(134213632_i32); // 0 .. 134213632
+    s.integrator = new_integrator;
     let proportional: i32 = error >> 7; // 2^0 units, floor; -38148 .. 8192
     let integral: i32 = new_integrator >> 12; // 2^0 units, floor; 0 .. 32767
     let unlimited_gain: i32 = proportional.wrapping_add(integral); // -38148 .. 40959
     let gain: i32 = unlimited_gain.max(0_i32).min(32767_i32); // 0 .. 32767
-    s.integrator = new_integrator;
     gain
 }
 
