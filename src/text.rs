@@ -113,12 +113,13 @@ pub fn away_from_zero(value: f64, digits: usize) -> f64 {
 pub fn away_from_zero_decimals(value: f64, decimals: usize) -> String {
     let nearest = format!("{:.decimals$}", value.abs());
     let sign = if value < 0.0 { "-" } else { "" };
-    let is_below = nearest.parse::<f64>().is_ok_and(|n| n < value.abs());
-    if !is_below {
-        return format!("{sign}{nearest}");
+    match nearest.parse::<f64>() {
+        Ok(below) if below < value.abs() => {
+            let step = 10f64.powi(decimals as i32).recip();
+            format!("{sign}{:.decimals$}", below + step)
+        }
+        _ => format!("{sign}{nearest}"),
     }
-    let step = 10f64.powi(decimals as i32).recip();
-    format!("{sign}{:.decimals$}", value.abs() + 0.5 * step)
 }
 
 /// [`shown`] line by line: of a text that has lines of its own.
