@@ -29,7 +29,7 @@ mod otherwise;
 mod pairs;
 mod polish;
 mod proven;
-mod reading;
+pub mod reading;
 pub mod refine;
 mod reported;
 mod rounding;
