@@ -21,7 +21,7 @@ use crate::thermal::close;
 use crate::thermal::close::Closed;
 use crate::thermal::firmware::emitted;
 use crate::thermal::firmware::emitted::{Emitted, Told};
-use crate::thermal::search::Effort;
+use crate::thermal::search::{Effort, Method};
 use crate::timing;
 use crate::verdict::{Closure, Verdict};
 use std::path::{Path, PathBuf};
@@ -50,6 +50,9 @@ pub struct Arguments {
     /// Take a temperature correction off again that an autopilot had applied, where its log has the coefficients.
     #[arg(long, conflicts_with = "capture")]
     pub(super) undo_correction: bool,
+    /// Which search names the causes of a thermal record: for comparisons of the two.
+    #[arg(long, value_enum, hide = true, default_value = "stepwise")]
+    search: Naming,
     /// Not a way to give a record; says which one is.
     #[arg(value_name = "FILE", hide = true)]
     stray: Option<PathBuf>,
@@ -68,6 +71,13 @@ pub struct Arguments {
     pub(super) format: OutputFormat,
     #[command(flatten)]
     pub(super) test: super::self_test::Options,
+}
+
+/// Searches to choose from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Naming {
+    Stepwise,
+    Evidence,
 }
 
 /// Where results go.
@@ -129,7 +139,13 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
             warnings,
             &design,
             &recorded.command,
-            Effort::default(),
+            Effort {
+                method: match arguments.search {
+                    Naming::Stepwise => Method::Stepwise,
+                    Naming::Evidence => Method::Evidence,
+                },
+                ..Effort::default()
+            },
         )?;
         watch.stage("emitting and verifying");
         let prefix = correction::prefix(&design.name);

@@ -7,8 +7,9 @@ mod remarks;
 use super::baseline;
 use super::channels::Channels;
 use super::effects::{Candidate, user};
+use super::evidence::posterior;
 use super::intake::{Intake, refused};
-use super::search::{Effort, Found, Model, Search};
+use super::search::{Effort, Found, Method, Model, Search};
 use crate::correction::Correction;
 use crate::design::Design;
 use crate::error::Result;
@@ -132,7 +133,11 @@ pub fn close(
             )));
         }
         let unusable = |e: crate::statistics::Unusable| refuse(e.to_string());
-        let found = search.run().map_err(unusable)?;
+        let found = match effort.method {
+            Method::Stepwise => search.run(),
+            Method::Evidence => posterior::answer(&search),
+        };
+        let found = found.map_err(unusable)?;
         let before = search.model(&[]).map_err(unusable)?;
         let after = search.model(&found.terms).map_err(unusable)?;
         let accidents = search.accidents([&before, &after]);

@@ -6,12 +6,15 @@ use super::dice::{Dice, seed_of};
 use super::form::{Form, Plan, Planted, plant};
 use super::judge::Bench;
 use super::linear::{Span, rms, sum};
-use super::noise::{self, Flavour};
-use super::outside::{OUTSIDERS, Outsider};
+use super::noise::{self, Flavour, Noise};
+use super::outside::{self, OUTSIDERS, Outsider};
 use super::programs::RateProgram;
 use super::rng::Rng;
 use super::world::{Protocol, World};
 use super::{BlindRecord, Class, Scenario, Truth, sheet, traps};
+
+/// An effect in a sensor's noise has a whitened t of this at least: below, nobody could name it.
+const SIGNIFICANT: f64 = 6.0;
 
 /// What is to be planted, and in which experiment.
 struct Cast {
@@ -29,17 +32,21 @@ fn cast(s: &Scenario, rng: &mut Rng) -> Cast {
         Class::Triple => 3,
         _ => 0,
     };
+    let count = s.setting.effects.unwrap_or(count);
     let mut known: Vec<&Entry> = s.effects.iter().map(|id| catalogue::of(id)).collect();
     let may_hide = |e: &Entry| e.channel.is_some_and(|c| c != "rate_dps");
     while known.len() < count {
         let e = &CATALOGUE[rng.range(0, CATALOGUE.len() as i64 - 1) as usize];
         let hides = s.class != Class::HiddenChannel || may_hide(e);
-        if hides && !known.iter().any(|k| k.id == e.id) {
+        let no_line = s.setting.lines == 0 || e.id != "periodic_pickup";
+        if hides && no_line && !known.iter().any(|k| k.id == e.id) {
             known.push(e);
         }
     }
-    let outsider = (s.class == Class::Outside)
-        .then(|| &OUTSIDERS[rng.range(0, OUTSIDERS.len() as i64 - 1) as usize]);
+    let outsider = (s.class == Class::Outside).then(|| match s.setting.outsider {
+        Some(id) => outside::of(id),
+        None => &OUTSIDERS[rng.range(0, OUTSIDERS.len() as i64 - 1) as usize],
+    });
     let mut needs: Vec<Need> = known.iter().flat_map(|e| e.needs).copied().collect();
     needs.extend(outsider.iter().flat_map(|o| o.needs));
     if known.iter().any(|e| e.id == "output_saturation") && rng.odds(0.3) {
@@ -75,10 +82,17 @@ fn cast(s: &Scenario, rng: &mut Rng) -> Cast {
             Protocol { rate, ..p }
         }
     };
+    let protocol = match s.setting.rows {
+        Some((least, most)) => Protocol {
+            rows: rng.range(least, most) as usize,
+            ..protocol
+        },
+        None => protocol,
+    };
     Cast {
         known,
         outsider,
-        covariate: s.class == Class::Covariate,
+        covariate: s.class == Class::Covariate || s.setting.unrecorded,
         protocol,
     }
 }
@@ -105,9 +119,34 @@ fn ratio(s: &Scenario, rng: &mut Rng) -> f64 {
     })
 }
 
-/// The noise of the record's rows: (all but outliers, its short-term size). A repeated row has its own white noise.
-fn noise_of(w: &World, flavour: Flavour, rng: &mut Rng) -> (Vec<f64>, f64) {
-    let noise = noise::make(w.protocol.rows, w.sigma_dps, flavour, rng);
+/// The noise of the record's rows.
+struct RowNoise {
+    /// All but outliers; deg/s.
+    values: Vec<f64>,
+    /// Short-term size, deg/s, lines left out.
+    short_term: f64,
+    /// Rows with a spike of the sensor's own.
+    spike: Vec<bool>,
+    /// Amplitudes of the lines, deg/s.
+    lines: Vec<f64>,
+}
+
+/// The noise of the class, or what the scenario has in its place. A repeated row has its own white noise.
+fn noise_of(s: &Scenario, w: &World, flavour: Flavour, rng: &mut Rng) -> RowNoise {
+    let made = s.setting.noise.as_ref();
+    let made = made.map(|n| n.make(w.protocol.rows, w.sigma_dps, rng));
+    let spike = made.as_ref().map(|m| m.spike.clone());
+    let spike = spike.map_or(vec![false; w.len()], |all| {
+        w.grid.iter().map(|k| all[*k]).collect()
+    });
+    let noise = match made {
+        Some(m) => Noise {
+            short_term: w.sigma_dps,
+            slow: m.values.clone(),
+            values: m.values,
+        },
+        None => noise::make(w.protocol.rows, w.sigma_dps, flavour, rng),
+    };
     let mut last = usize::MAX;
     let values = w
         .grid
@@ -122,7 +161,22 @@ fn noise_of(w: &World, flavour: Flavour, rng: &mut Rng) -> (Vec<f64>, f64) {
             }
         })
         .collect();
-    (values, noise.short_term)
+    let lines: Vec<(f64, f64)> = (0..s.setting.lines)
+        .map(|_| {
+            let size = noise.short_term * rng.spread(0.5, 4.0);
+            (size, w.protocol.row_s / rng.between(0.03, 0.47))
+        })
+        .collect();
+    let with_lines = lines.iter().fold(values, |v: Vec<f64>, (size, period_s)| {
+        let sine = w.sine(*period_s, rng.unit());
+        v.iter().zip(sine).map(|(v, x)| v + size * x).collect()
+    });
+    RowNoise {
+        values: with_lines,
+        short_term: noise.short_term,
+        spike,
+        lines: lines.iter().map(|l| l.0).collect(),
+    }
 }
 
 /// Plans in the order in which they act: what moves the thermometer first, what clips the total last.
@@ -183,7 +237,8 @@ pub fn attempt(s: &Scenario, attempt: u64) -> Option<BlindRecord> {
     let c = cast(s, &mut rng);
     let mut w = World::run(c.protocol, &mut rng);
     let flavour = flavour(s.class, &mut rng);
-    let (noise, short_term) = noise_of(&w, flavour, &mut rng);
+    let made = noise_of(s, &w, flavour, &mut rng);
+    let (noise, short_term) = (made.values, made.short_term);
     let mut planted: Vec<Planted> = Vec::new();
     let mut cause = None;
     if s.class == Class::Unexcited {
@@ -202,6 +257,13 @@ pub fn attempt(s: &Scenario, attempt: u64) -> Option<BlindRecord> {
     for p in &mut planted {
         p.orthogonal_rms = rms(&declared.residual(&p.contribution));
     }
+    if let Some(n) = &s.setting.noise {
+        let t = |p: &Planted| n.significance(&declared.residual(&p.contribution), short_term);
+        if planted.iter().any(|p| t(p) < SIGNIFICANT) {
+            return None;
+        }
+    }
+    let cause = cause.filter(|_| !s.setting.unrecorded);
     let auxiliaries = auxiliary_columns(s.class, &w, cause, &mut rng);
     let (channels, hidden) = channels(s.class, &c, &w, &mut rng);
     let nearest = c.outsider.map_or(&[][..], |o| o.nearest);
@@ -215,7 +277,11 @@ pub fn attempt(s: &Scenario, attempt: u64) -> Option<BlindRecord> {
     };
     let judged = bench.judge(&planted)?;
     let dictionary = bench.best(&sum(&noise, &contributions(&planted, w.len())));
-    let (output, noise, outlier) = output(&w, &planted, noise, short_term, &mut rng);
+    let (output, noise, mut outlier) = output(&w, &planted, noise, short_term, &mut rng);
+    outlier
+        .iter_mut()
+        .zip(&made.spike)
+        .for_each(|(o, s)| *o |= s);
     let truth = Truth {
         class: s.class,
         effects: named(s.class, &planted),
@@ -238,6 +304,7 @@ pub fn attempt(s: &Scenario, attempt: u64) -> Option<BlindRecord> {
             .iter()
             .map(|p| p.orthogonal_rms / short_term)
             .collect(),
+        lines: made.lines.iter().map(|a| a / short_term).collect(),
         hidden,
         outside_channel: c
             .outsider

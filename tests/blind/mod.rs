@@ -7,7 +7,7 @@
 //! Read in this order: `chamber` and `programs` (what is done to the gyro), `world` (what is then true of it),
 //! `heat_effects`, `loop_effects`, `rate_effects`, `field_effects`, `covariates`, `outside` (one function an
 //! effect), `form` (how large it is made), `catalogue` (id, needs, channel), `rivals` (what else would explain it), `judge`, `build`
-//! (the classes), `sheet` (the CSV), `score` and `tally` (what an answer is worth).
+//! (the classes), `sensor` (noise like a real sensor's), `sheet` (the CSV), `score` and `tally` (what an answer is worth).
 #![allow(dead_code)]
 
 pub mod build;
@@ -31,12 +31,15 @@ pub mod rivals;
 #[path = "../oracle/rng.rs"]
 pub mod rng;
 pub mod score;
+pub mod sensor;
 pub mod sheet;
 pub mod tally;
 pub mod traps;
 pub mod world;
 
 use form::Planted;
+use sensor::SensorNoise;
+use std::sync::Arc;
 
 /// Correlation after projection above which two causes count as one.
 pub const INSEPARABLE: f64 = 0.97;
@@ -93,6 +96,24 @@ pub struct Scenario {
     pub effects: Vec<&'static str>,
     /// Size of each effect over the short-term noise; None = drawn.
     pub ratio: Option<f64>,
+    pub setting: Setting,
+}
+
+/// What a scenario asks for beyond its class; the default changes nothing.
+#[derive(Clone, Debug, Default)]
+pub struct Setting {
+    /// Number of rows, from and to.
+    pub rows: Option<(i64, i64)>,
+    /// Number of effects to draw, in place of the class's.
+    pub effects: Option<usize>,
+    /// The cause outside the catalogue.
+    pub outsider: Option<&'static str>,
+    /// `HiddenChannel` only: the cause is an auxiliary column that is not in the record.
+    pub unrecorded: bool,
+    /// Spectral lines in the noise, 0.5 to 4 times the short-term noise each.
+    pub lines: usize,
+    /// Noise in place of the class's; each effect then has a whitened t of 6 at least.
+    pub noise: Option<Arc<SensorNoise>>,
 }
 
 impl Scenario {
@@ -103,6 +124,7 @@ impl Scenario {
             class,
             effects: Vec::new(),
             ratio: None,
+            setting: Setting::default(),
         }
     }
 
@@ -113,6 +135,7 @@ impl Scenario {
             class: Class::Single,
             effects: vec![id],
             ratio: None,
+            setting: Setting::default(),
         }
     }
 }
@@ -152,6 +175,8 @@ pub struct Truth {
     pub short_term: f64,
     /// For each planted effect: orthogonal rms over `short_term`.
     pub ratios: Vec<f64>,
+    /// Amplitudes of the noise's lines over `short_term`, where the scenario asks for lines.
+    pub lines: Vec<f64>,
     /// Columns besides time, output and auxiliaries.
     pub channels: Vec<&'static str>,
     /// Channel of the effect that was left out of the record.

@@ -106,6 +106,39 @@ pub const OUTSIDERS: [Outsider; 11] = [
     },
 ];
 
+/// Levels that jump at times of their own: only on request, so that the draws of [`OUTSIDERS`] stay what they are.
+const LEVEL_JUMPS: Outsider = Outsider {
+    id: "outside:level_jumps",
+    draw: level_jumps,
+    needs: &[],
+    channel: None,
+    nearest: &[],
+};
+
+/// The cause of an id.
+pub fn of(id: &str) -> &'static Outsider {
+    OUTSIDERS
+        .iter()
+        .chain([&LEVEL_JUMPS])
+        .find(|o| o.id == id)
+        .unwrap_or_else(|| panic!("no cause {id}"))
+}
+
+/// One to four jumps in time, of sizes within a factor of three of each other.
+fn level_jumps(w: &World, r: &mut Rng) -> Plan {
+    let all = w.length_s();
+    let jumps: Vec<(f64, f64)> = (0..r.range(1, 4))
+        .map(|_| (all * r.between(0.1, 0.9), r.sign() * r.spread(0.6, 1.8)))
+        .collect();
+    let level = |t: &f64| jumps.iter().filter(|j| j.0 <= *t).map(|j| j.1).sum();
+    let unit = w.time_s.iter().map(level).collect();
+    Plan::with(
+        "outside:level_jumps",
+        Form::Linear(unit),
+        &[("jumps", jumps.len() as f64)],
+    )
+}
+
 /// (V - V_middle)^2.
 fn supply_squared(w: &World, _: &mut Rng) -> Plan {
     let u = centred(&w.supply_v);

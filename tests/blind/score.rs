@@ -107,7 +107,7 @@ pub struct Mark {
 impl Mark {
     /// The mark of an answer that never came.
     pub fn crashed(truth: &Truth, why: String) -> Self {
-        let mut mark = mark(&Answer::default(), truth);
+        let mut mark = marked(&Answer::default(), truth);
         mark.violations = vec![why];
         mark
     }
@@ -125,7 +125,7 @@ fn hits(step: &(String, Vec<String>), id: &str, truth: &Truth) -> bool {
 }
 
 /// Names against truth, without figures.
-fn mark(a: &Answer, truth: &Truth) -> Mark {
+pub fn marked(a: &Answer, truth: &Truth) -> Mark {
     let wanted = &truth.effects;
     let found = wanted
         .iter()
@@ -196,7 +196,7 @@ fn mark(a: &Answer, truth: &Truth) -> Mark {
 /// were taken; empty if the answer does not say (then there is no comparison with the oracle).
 pub fn score(record: &BlindRecord, answer: &Value, heldout: &[bool]) -> Mark {
     let a = read(answer);
-    let mut m = mark(&a, &record.truth);
+    let mut m = marked(&a, &record.truth);
     if heldout.len() == record.truth.reading.len() && heldout.iter().any(|h| *h) {
         let oracle = oracle_rms(record, heldout);
         m.over_oracle = a.after_rms.map(|x| x / oracle);

@@ -29,7 +29,7 @@ mod otherwise;
 mod pairs;
 mod polish;
 mod proven;
-mod reading;
+pub mod reading;
 pub mod refine;
 mod reported;
 mod rounding;
@@ -66,6 +66,16 @@ use rounds::Known;
 use std::cell::RefCell;
 use std::sync::Arc;
 
+/// Which search names the causes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Method {
+    /// The passes of this module.
+    #[default]
+    Stepwise,
+    /// The set of the greatest evidence ([`super::evidence`]), for comparison.
+    Evidence,
+}
+
 /// How hard to search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effort {
@@ -75,6 +85,8 @@ pub struct Effort {
     pub surrogates: usize,
     /// Most named steps.
     pub steps: usize,
+    /// How.
+    pub method: Method,
 }
 
 impl Default for Effort {
@@ -83,6 +95,7 @@ impl Default for Effort {
             rows: 700,
             surrogates: 100,
             steps: 5,
+            method: Method::Stepwise,
         }
     }
 }

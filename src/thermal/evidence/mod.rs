@@ -1,0 +1,35 @@
+//! One method for the causes of a thermal record: the set of effects with the greatest evidence.
+//!
+//! A hypothesis is a *set* of terms: effects of the catalogue, effects of the design's user, nonparametric terms (smooth functions,
+//! products and histories of channels, changes in time) and spectral lines. The error of the fitted rows is
+//!
+//! y = B b + Z c + n,  b flat,  c ~ N(0, n s0^2),  n ~ N(0, sigma^2 V),  p(sigma) ~ 1 / sigma
+//!
+//! with B the declared bias and what the thermometer's readings err by (errors in variables), Z the columns of the terms,
+//! orthonormal beyond B, s0^2 the mean square that the declared model leaves, and V white, 1/f and random-walk noise. With the
+//! coefficients and sigma integrated out the likelihood is in closed form ([`score`]); a term's non-linear parameters have a prior over
+//! their grid, which costs it its Occam factor; and every term costs the same prior odds ([`PRIOR_ODDS`]).
+//!
+//! The search ([`beam`]) keeps the best few sets of each size, looks beside each of them at every shape of every
+//! candidate, and ends with the nearest exchanges. The answer ([`posterior`]) is the best set: a name stands where its posterior
+//! odds are [`NAMED_ODDS`] or more, and whatever replaces it at less is its rival. No step depends on the order of an earlier one, and
+//! nothing is kept between calls: all functions are of record, rows and options.
+//!
+//! Rows have one of two roles so far: *fit* (training blocks; everything here sees them alone) and *judge* (held-out blocks: the
+//! error that is reported). No row chooses, since the score does.
+
+pub mod beam;
+pub mod columns;
+pub mod lines;
+pub mod posterior;
+pub mod refine;
+pub mod score;
+
+/// Prior odds of any one term (convention): of some fifty hypotheses that a record has one is expected to be true.
+pub const PRIOR_ODDS: f64 = 0.02;
+
+/// Posterior odds from which on a name is given, and below which an exchange is a rival (convention: "decisive" in Jeffreys 1961).
+pub const NAMED_ODDS: f64 = 100.0;
+
+/// Most terms of a set, spectral lines apart (of `design`: more have not been seen in one record).
+pub const MOST_TERMS: usize = 5;
