@@ -1,15 +1,15 @@
 //! JSON Schemas of the design and of everything that is written as JSON, from the types themselves.
 
 use crate::{
-    check, design, equivalence, firmware, job, selftest, simulation, study, tabulate, timing,
-    verdict, verify,
+    check, design, equivalence, firmware, job, record, selftest, simulation, study, tabulate,
+    timing, verdict, verify,
 };
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde_json::Value;
 
 /// Every name, and what it is the schema of.
-pub const NAMES: [(&str, &str); 12] = [
+pub const NAMES: [(&str, &str); 13] = [
     ("design", "the design file, its TOML as JSON"),
     ("run", "summary.json of `run`"),
     ("simulate", "simulate.json"),
@@ -19,6 +19,7 @@ pub const NAMES: [(&str, &str); 12] = [
     ("approx", "approx.json"),
     ("close", "closure.json"),
     ("selftest", "selftest.json"),
+    ("replay", "what `replay --format json` prints"),
     ("bundle", "manifest.json of a bundle"),
     ("verify", "verify.json"),
     ("timing", "timing.json, the wall times of any command"),
@@ -36,6 +37,7 @@ pub fn schema(name: &str) -> Option<Value> {
         "approx" => of::<tabulate::outcome::Outcome>(),
         "close" => of::<verdict::Closure>(),
         "selftest" => of::<selftest::outcome::Outcome>(),
+        "replay" => of::<record::replayed::Replayed>(),
         "bundle" => of::<firmware::manifest::Manifest>(),
         "verify" => of::<verify::bundle::Verification>(),
         "timing" => of::<timing::Timing>(),

@@ -1,6 +1,6 @@
 //! `gyrogen schema NAME` against what is really written.
 
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::path::Path;
 use std::process::Command;
 
@@ -76,6 +76,23 @@ fn what_check_approx_and_emit_write_fits_and_damage_does_not() {
         "a",
     ];
     holds("approx", &approx, dir, "a/approx.json");
+    std::fs::write(dir.join("capture.csv"), "drive_code,sense_code\n1,2\n").unwrap();
+    let replay = [
+        "replay",
+        "--capture",
+        "capture.csv",
+        "--format",
+        "json",
+        "--out",
+        "rows.csv",
+    ];
+    let replayed: Value = serde_json::from_slice(&gyrogen(&replay, dir).stdout).unwrap();
+    assert!(errors(&schema("replay"), &replayed).is_empty());
+    assert_eq!(
+        (&replayed["samples"], &replayed["rows"]),
+        (&json!(1), &json!(0))
+    );
+    assert_eq!(replayed["warnings"].as_array().map(Vec::len), Some(1));
     let emit = [
         "emit",
         "--lang",

@@ -2,10 +2,13 @@
 
 use super::recorded::Recorded;
 use super::stages::Stages;
+use super::terminal::OutputFormat;
 use crate::circuit::engine::{self, ArithmeticKind, Rows};
 use crate::design::Design;
 use crate::error::{Error, Result};
+use crate::output::name_of;
 use crate::record::capture::{CaptureReader, mismatch_warnings};
+use crate::record::replayed::Replayed;
 use crate::record::rows::{Kind, RowWriter};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -24,6 +27,9 @@ pub struct Arguments {
     /// Whose words are written: the bit-accurate circuit, or its float twin.
     #[arg(long, value_enum, default_value = "fixed")]
     arith: Arith,
+    /// What is printed on stdout: nothing, or what was done as JSON.
+    #[arg(long, value_enum, default_value = "text")]
+    format: OutputFormat,
 }
 
 /// Which arithmetic's words are written.
@@ -59,7 +65,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let kind = ArithmeticKind::from(arguments.arith);
     crate::output::refuse_inputs(&arguments.out, &recorded.inputs)?;
     let mut capture = CaptureReader::open(&arguments.capture, design.circuit.adc.format)?;
-    warn_of_mismatches(&design, &capture);
+    let mut warnings = warn_of_mismatches(&design, &capture);
 
     let columns = engine::columns(&design);
     let mut header = vec!["index"];
@@ -93,12 +99,36 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     }
     writer.finish()?;
     stages.over();
+    let period = design.circuit.decimator.ratio;
+    if index == 0 {
+        warnings.push(format!(
+            "the capture has {samples} samples, and a row takes {period}. The file has no row. Capture longer"
+        ));
+        talk!("warning: {}", warnings[warnings.len() - 1]);
+    }
     talk!(
         "replayed {samples} samples into {index} rows: {:.1} M samples/s in the circuit, \
          {:.1} M/s with reading and writing, one thread",
         rate(samples, busy),
         rate(samples, started.elapsed()),
     );
+    if arguments.format == OutputFormat::Json {
+        let replayed = Replayed {
+            schema: "gyrogen.replay/1",
+            version: env!("CARGO_PKG_VERSION"),
+            design_sha256: design.source.sha256.clone(),
+            arithmetic: match kind {
+                ArithmeticKind::Fixed => "fixed",
+                ArithmeticKind::Float => "float",
+            },
+            samples,
+            rows: index,
+            columns: header.iter().map(|&c| c.to_owned()).collect(),
+            warnings,
+            file: name_of(&arguments.out),
+        };
+        super::terminal::give(&super::json(&replayed));
+    }
     Ok(())
 }
 
@@ -129,19 +159,22 @@ fn write(rows: &mut Rows, columns: usize, mut index: u64, writer: &mut RowWriter
     Ok(index)
 }
 
-pub(super) fn warn_of_mismatches(design: &Design, capture: &CaptureReader) {
+/// Says how the capture was read and where it contradicts the design; gives the contradictions.
+pub(super) fn warn_of_mismatches(design: &Design, capture: &CaptureReader) -> Vec<String> {
     for note in capture.notes() {
         talk!("read: {note}");
     }
     let nco = &design.circuit.nco;
     let circle = 1i128 << nco.phase_bits;
     let word = i128::from(nco.tuning_word).rem_euclid(circle) as u128;
-    for warning in mismatch_warnings(
+    let warnings = mismatch_warnings(
         capture.meta(),
         design.circuit.sample_rate_hz,
         (word, nco.phase_bits),
         design.circuit.adc.format.bits(),
-    ) {
+    );
+    for warning in &warnings {
         talk!("warning: {warning}");
     }
+    warnings
 }

@@ -35,9 +35,8 @@ pub(super) fn store_early(body: &mut Vec<Statement>) {
             continue;
         };
         let comes_first = |s: &Statement| {
-            let defines = matches!(v.value, Value::Temp(k) if defines(s, k));
-            let reads = Expr::Load(*slot, *element);
-            defines || matches!(s, Statement::Let(_, _, expr, _) if *expr == reads)
+            matches!(v.value, Value::Temp(k) if defines(s, k))
+                || reads(s, &Expr::Load(*slot, *element))
         };
         let place = body.iter().rposition(comes_first);
         after[place.unwrap_or(body.len())].push(store);
@@ -60,6 +59,15 @@ fn defines(statement: &Statement, temp: usize) -> bool {
         Statement::Loop(_, inner) => inner.iter().any(|s| defines(s, temp)),
         Statement::Next(values) => values.iter().any(|(k, _)| *k == temp),
         Statement::Store(..) => false,
+    }
+}
+
+/// The statement takes this expression, in a loop too.
+fn reads(statement: &Statement, load: &Expr) -> bool {
+    match statement {
+        Statement::Let(_, _, expr, _) => expr == load,
+        Statement::Loop(_, inner) => inner.iter().any(|s| reads(s, load)),
+        _ => false,
     }
 }
 

@@ -331,12 +331,13 @@ mod tests {
                             + rows[k][0] * a
                             + rows[k][1] * b
                     };
-                    let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{k} {n}: {a} {b}");
+                    let most = 1e-12 * (1.0 + w.norm());
+                    let near = |a: f64, b: f64| assert!((a - b).abs() < most, "{k} {n}: {a} {b}");
                     near(d[n], seen(0, w[0], w[1]));
                     near(s[n], seen(1, w[2], w[3]));
                 }
                 for (a, b) in free.iter().zip(w.iter()) {
-                    assert!((a - b).abs() < 1e-12, "{k}");
+                    assert!((a - b).abs() < 1e-12 * (1.0 + w.norm()), "{k}");
                 }
             }
         }

@@ -36,6 +36,7 @@ mod log_gyros;
 mod log_rows;
 mod npy_header;
 mod plausibility;
+pub mod replayed;
 pub mod rows;
 mod scale;
 mod shorten;
