@@ -332,10 +332,13 @@ pub fn input_range(
 /// A program of which every assertion holds just if the two functions do the same.
 fn question(prefix: &str, declared: &str, signature: &Signature) -> String {
     let renamed = |text: &str| renamed(text, prefix);
-    let body = declared
-        .split(&format!("{}(", signature.name))
-        .last()
-        .unwrap_or("");
+    // Where it is defined, and not where it is declared or called.
+    let is_definition = |rest: &&str| {
+        let head = rest.split_once(')');
+        head.is_some_and(|(_, after)| after.starts_with("\n{"))
+    };
+    let mut mentions = declared.split(&format!("{}(", signature.name)).skip(1);
+    let body = mentions.find(is_definition).unwrap_or("");
     let body = body.split("\n}").next().unwrap_or("");
     let (mut before, mut after, mut arguments) =
         (String::new(), String::new(), [Vec::new(), Vec::new()]);
