@@ -337,7 +337,8 @@ fn question(prefix: &str, declared: &str, signature: &Signature) -> String {
         let head = rest.split_once(')');
         head.is_some_and(|(_, after)| after.starts_with("\n{"))
     };
-    let mut mentions = declared.split(&format!("{}(", signature.name)).skip(1);
+    let mention = format!("{}(", signature.name);
+    let mut mentions = declared.split(&mention).skip(1);
     let body = mentions.find(is_definition).unwrap_or("");
     let body = body.split("\n}").next().unwrap_or("");
     let (mut before, mut after, mut arguments) =
