@@ -44,7 +44,7 @@ pub trait Engine {
     ) -> Result<(), Box<Overflowed>>;
     /// The same for ADC inputs in LSB. The bit-accurate engine quantises them as an ideal ADC does
     /// (nearest, ties up, saturating); the one without quantisation takes them as they are, and a whole
-    /// period at once by [`super::float_kernel`], which rounds elsewhere than its samples one by one.
+    /// period at once by `float_kernel`, which rounds elsewhere than its samples one by one.
     ///
     /// # Errors
     /// As [`Engine::process`].
