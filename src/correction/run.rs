@@ -12,6 +12,7 @@ use crate::numeric::format::{Format, pow2};
 use crate::numeric::trace::Trace;
 use crate::numeric::trace::ir::Program;
 use crate::record::thermal::ThermalRecord;
+use crate::vectors::rows::WordRows;
 
 /// Most steps that one reading takes, whatever the gap before it.
 pub const MOST_STEPS: u64 = 1 << 16;
@@ -180,8 +181,9 @@ impl Correction {
 
     /// What the emitted function is called with for these readings: restart, inputs, rate; and for each
     /// reading the number of its last call.
-    pub fn calls(&self, readings: &[Reading]) -> (Vec<Vec<i128>>, Vec<usize>) {
-        let (mut calls, mut last) = (Vec::new(), Vec::new());
+    pub fn calls(&self, readings: &[Reading]) -> (WordRows, Vec<usize>) {
+        let mut calls = WordRows::new(self.plan.inputs.len() + 2);
+        let mut last = Vec::new();
         let mut held = vec![0; self.plan.inputs.len()];
         for (reading, steps) in readings.iter().zip(schedule(&self.plan, readings)) {
             for (k, (word, value)) in held.iter_mut().zip(&reading.inputs).enumerate() {
@@ -190,10 +192,14 @@ impl Correction {
                 }
             }
             for restart in steps.restarts() {
-                let mut words = vec![i128::from(restart)];
-                words.extend(&held);
-                words.push(self.rate_raw(reading.rate_out_dps));
-                calls.push(words);
+                let rate = self.rate_raw(reading.rate_out_dps);
+                let restart = i128::from(restart);
+                calls.push(
+                    [restart]
+                        .into_iter()
+                        .chain(held.iter().copied())
+                        .chain([rate]),
+                );
             }
             last.push(calls.len().saturating_sub(1));
         }
@@ -201,9 +207,15 @@ impl Correction {
     }
 
     /// The model's output word for each call, from the state before the first reading.
-    pub fn run_words(&self, calls: &[Vec<i128>]) -> Vec<i128> {
+    pub fn run_words(&self, calls: &WordRows) -> Vec<i64> {
         let mut stepper = self.stepper();
-        calls.iter().map(|words| stepper.corrected(words)).collect()
+        let mut words = Vec::new();
+        let one = |row: &[i64]| {
+            words.clear();
+            words.extend(row.iter().map(|word| i128::from(*word)));
+            stepper.corrected(&words) as i64
+        };
+        calls.iter().map(one).collect()
     }
 
     /// The bit-accurate model, call by call from the state before the first reading.

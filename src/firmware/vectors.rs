@@ -33,8 +33,8 @@ pub const LONG: u64 = 1_000_000;
 pub type Checked = (u64, u64);
 
 /// Integers between commas, as a line.
-pub fn csv_line(words: &[i128]) -> String {
-    let words: Vec<String> = words.iter().map(i128::to_string).collect();
+pub fn csv_line<T: ToString>(words: &[T]) -> String {
+    let words: Vec<String> = words.iter().map(T::to_string).collect();
     words.join(",") + "\n"
 }
 
@@ -43,7 +43,7 @@ pub fn csv_line(words: &[i128]) -> String {
 pub fn function(model: &Model, lowered: Option<&Lowered>, more: Vec<Vec<i128>>) -> EmittedFile {
     let mut inputs = search::vectors(model, SEED);
     if model.state == 0 {
-        let candidates = stimulus::inputs(&model.inputs, CANDIDATES, SEED + 4);
+        let candidates: Vec<_> = stimulus::inputs(&model.inputs, CANDIDATES, SEED + 4).collect();
         inputs.extend(model.near_ties(&candidates));
         inputs.extend(model.fault_edges(&candidates));
     }
@@ -69,7 +69,7 @@ pub fn of_design(design: &Design, bundle: &Bundle, models: &[Model]) -> Vec<Emit
         let mut more = calibrated::about_the_ends(design, model);
         if model.name == "bias" {
             let candidates = stimulus::inputs(&model.inputs, SEARCHED, SEED + 1);
-            let candidates: Vec<i128> = candidates.into_iter().flatten().collect();
+            let candidates: Vec<i128> = candidates.flatten().collect();
             let sensitive = model::sensitive_inputs(design, &candidates);
             more.extend(sensitive.into_iter().map(|x| vec![x]));
         }
@@ -112,8 +112,8 @@ fn of_chain(design: &Design, bundle: &Bundle) -> [EmittedFile; 2] {
         input += &format!("{},{}\n", given(n, *d), given(n, *s));
     }
     let mut output = chain::columns(design).join(",") + ",fault\n";
-    for row in chain::rows(design, &drive, &sense) {
-        output += &csv_line(&row);
+    for row in chain::rows(design, &drive, &sense).iter() {
+        output += &csv_line(row);
     }
     [
         EmittedFile {

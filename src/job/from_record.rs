@@ -1,7 +1,7 @@
 //! A measured record through the compensation alone: the thermometer's and the rate's words as
 //! firmware would read them.
 
-use super::outcome::Point;
+use super::points::{Point, Points};
 use super::{clamped_bias, compensation, thermometer_raw};
 use crate::design::{Compensation, CompensationInput, Design};
 use crate::emit::views::Language;
@@ -11,82 +11,91 @@ use crate::record::ThermalRecord;
 use crate::thermal::BaselineFit;
 use crate::vectors::model;
 use crate::vectors::model::Model;
+use crate::vectors::rows::WordRows;
 use crate::verify::firmware::{Built, Firmware};
+use std::collections::BTreeMap;
 
-/// Every usable row through every path.
+/// Every usable row of a record through every path.
 ///
 /// # Errors
 /// A rate that the firmware's word cannot hold; a driver that cannot be run.
 pub fn points(
     design: &Design,
     fit: &BaselineFit,
-    record: &ThermalRecord,
+    mut record: ThermalRecord,
     firmware: &Firmware,
-) -> Result<Vec<Point>> {
+) -> Result<Points> {
     let c = compensation(design)?;
-    let thermometer = record.column(&fit.thermometer).unwrap_or(&[]);
-    let rate_out = record.column("rate_out_dps").unwrap_or(&[]);
-    let applied = record.column("rate_dps");
-    // A rate that was not measured counts as none, as in the fit.
-    let applied_at = |row: usize| {
-        applied
-            .map(|a| a[row])
-            .filter(|v| v.is_finite())
-            .unwrap_or(0.0)
-    };
     let format = rate_format(design, c);
-    check_range(design, c, format, record, rate_out)?;
-
-    let mut thermometer_words = Vec::new();
+    let rate_out = record.column("rate_out_dps").unwrap_or(&[]);
+    check_range(design, c, format, &record, rate_out)?;
+    let thermometer = record.column(&fit.thermometer).unwrap_or(&[]);
+    let mut thermometer_words = WordRows::new(1);
     let mut rate_words = Vec::new();
     for &row in &fit.rows {
-        thermometer_words.push(vec![thermometer_raw(design, c, thermometer[row])]);
+        thermometer_words.push([thermometer_raw(design, c, thermometer[row])]);
         let raw = (rate_out[row] / (c.rate_full_scale_dps * format.lsb()) + 0.5).floor() as i128;
-        rate_words.push(raw.clamp(format.min_raw(), format.max_raw()));
+        rate_words.push(raw.clamp(format.min_raw(), format.max_raw()) as i64);
     }
     let models = model::models(design, &firmware.bundle.program);
     let fixed = through_model(&models, &thermometer_words, &rate_words);
-    let emitted = |built: &Built| -> Result<Vec<i128>> {
-        let bias = built.call("bias", &thermometer_words, 1)?;
-        let inputs: Vec<Vec<i128>> = rate_words
-            .iter()
-            .zip(&bias)
-            .map(|(rate, bias)| vec![*rate, bias[0]])
-            .collect();
-        Ok(built
-            .call("rate", &inputs, 1)?
-            .into_iter()
-            .map(|r| r[0])
-            .collect())
+    let emitted = |built: &Built| -> Result<BTreeMap<usize, i64>> {
+        let bias = built.call("bias", &thermometer_words)?;
+        let mut inputs = WordRows::new(2);
+        for (rate, bias) in rate_words.iter().zip(bias) {
+            inputs.push([i128::from(*rate), i128::from(bias)]);
+        }
+        let words = built.call("rate", &inputs)?;
+        let others = words.into_iter().zip(&fixed).enumerate();
+        let differs = others.filter(|(_, (word, due))| word != *due);
+        Ok(differs.map(|(k, (word, _))| (k, word)).collect())
     };
     let of = |language| firmware.built(language).map(emitted).transpose();
-    let (c_words, rust_words) = (of(Language::C)?, of(Language::Rust)?);
-    let temperature = ["die_degc", "chamber_degc"]
-        .iter()
-        .find_map(|name| record.column(name));
+    let other_words = [of(Language::C)?, of(Language::Rust)?];
+    drop((thermometer_words, rate_words));
+
+    let heating = trend(&fit.rows, thermometer);
+    let bias: Vec<f64> = (fit.rows.iter())
+        .map(|row| clamped_bias(fit, thermometer[*row]))
+        .collect();
+    let rows = (fit.rows.len() < record.len()).then(|| fit.rows.clone());
     let lsb = c.output.format.lsb();
-    let word = |words: &[i128], k: usize| words.get(k).map_or(f64::NAN, |w| *w as f64 * lsb);
-    let heating = trend(&fit.rows.iter().map(|r| thermometer[*r]).collect::<Vec<_>>());
-    Ok(fit
-        .rows
-        .iter()
-        .enumerate()
-        .map(|(k, &row)| Point {
-            time_s: record.time_s[row],
+    let degc = ["die_degc", "chamber_degc"];
+    let degc = degc.into_iter().find(|name| record.column(name).is_some());
+    let degc_is_thermometer = degc == Some(fit.thermometer.as_str());
+    let mut taken = |name: &str| record.columns.remove(name).unwrap_or_default();
+    let (rate_out, applied) = (taken("rate_out_dps"), taken("rate_dps"));
+    let thermometer = taken(&fit.thermometer);
+    let other_degc = degc.filter(|_| !degc_is_thermometer).map(taken);
+    let time_s = record.time_s;
+    Ok(Points::new(fit.rows.len(), move |k| {
+        let row = rows.as_ref().map_or(k, |rows| rows[k]);
+        // A rate that was not measured counts as none, as in the fit.
+        let is_measured = |v: &&f64| v.is_finite();
+        let applied_dps = *applied.get(row).filter(is_measured).unwrap_or(&0.0);
+        let word_dps =
+            |word: Option<&i64>| word.map_or(f64::NAN, |w| *w as f64 * lsb) - applied_dps;
+        let emitted_dps = |others: &Option<BTreeMap<usize, i64>>| {
+            let others = others.as_ref()?;
+            Some(word_dps(others.get(&k).or(fixed.get(k))))
+        };
+        let before_dps = rate_out[row] - applied_dps;
+        Point {
+            time_s: time_s[row],
             thermometer: thermometer[row],
-            temperature_degc: temperature.map_or(f64::NAN, |t| t[row]),
+            temperature_degc: match &other_degc {
+                Some(degc) => degc[row],
+                None if degc_is_thermometer => thermometer[row],
+                None => f64::NAN,
+            },
             heating: heating[k],
-            before_dps: rate_out[row] - applied_at(row),
-            float_dps: rate_out[row] - applied_at(row) - clamped_bias(fit, thermometer[row]),
-            fixed_dps: word(&fixed, k) - applied_at(row),
-            c_dps: c_words
-                .as_ref()
-                .map(|words| word(words, k) - applied_at(row)),
-            rust_dps: rust_words
-                .as_ref()
-                .map(|words| word(words, k) - applied_at(row)),
-        })
-        .collect())
+            before_dps,
+            float_dps: before_dps - bias[k],
+            fixed_dps: word_dps(fixed.get(k)),
+            c_dps: emitted_dps(&other_words[0]),
+            rust_dps: emitted_dps(&other_words[1]),
+        }
+    }))
 }
 
 /// The word in which firmware reads the uncompensated rate.
@@ -125,7 +134,7 @@ fn check_range(
 }
 
 /// The bit-accurate compensation of each row, raw.
-fn through_model(models: &[Model], thermometer: &[Vec<i128>], rate: &[i128]) -> Vec<i128> {
+fn through_model(models: &[Model], thermometer: &WordRows, rate: &[i64]) -> Vec<i64> {
     let named = |name: &str| models.iter().find(|m| m.name == name);
     let (Some(bias), Some(subtract)) = (named("bias"), named("rate")) else {
         return Vec::new();
@@ -133,21 +142,20 @@ fn through_model(models: &[Model], thermometer: &[Vec<i128>], rate: &[i128]) -> 
     let rows = thermometer.iter().zip(rate);
     rows.map(|(thermometer, rate)| {
         let (mut b, mut r) = ([0], [0]);
-        bias.call(thermometer, &mut b);
-        subtract.call(&[*rate, b[0]], &mut r);
-        r[0]
+        bias.call(&[i128::from(thermometer[0])], &mut b);
+        subtract.call(&[i128::from(*rate), b[0]], &mut r);
+        r[0] as i64
     })
     .collect()
 }
 
 /// For each reading, whether the thermometer has been rising over the last readings; a thermometer
 /// that falls when heated (a phase, a frequency) counts by its own sign.
-fn trend(readings: &[f64]) -> Vec<bool> {
+fn trend(rows: &[usize], readings: &[f64]) -> Vec<bool> {
     const SPAN: usize = 5;
-    (0..readings.len())
-        .map(|k| {
-            let (from, to) = (k.saturating_sub(SPAN), (k + SPAN).min(readings.len() - 1));
-            readings[to] >= readings[from]
-        })
-        .collect()
+    let rises = |k: usize| {
+        let (from, to) = (k.saturating_sub(SPAN), (k + SPAN).min(rows.len() - 1));
+        readings[rows[to]] >= readings[rows[from]]
+    };
+    (0..rows.len()).map(rises).collect()
 }

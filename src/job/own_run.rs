@@ -1,7 +1,7 @@
 //! The design's own thermal run: plant and circuit in closed loop, in one stream without a break.
 
 use super::formats;
-use super::outcome::Point;
+use super::points::{Point, Points};
 use super::{clamped_bias, compensation, warning};
 use crate::circuit::engine::{self, ArithmeticKind, Rows};
 use crate::cosim::scale::{full_scale_dps, nominal_full_scale_dps};
@@ -184,7 +184,7 @@ impl OwnRun {
         design: &Design,
         fit: &BaselineFit,
         firmware: &Firmware,
-    ) -> Result<Vec<Point>> {
+    ) -> Result<Points> {
         let float = self.float_dps(design, fit)?;
         let fixed = self.fixed_dps(design)?;
         let (columns, rate, lsb) = rate_column(design)?;
@@ -218,7 +218,8 @@ impl OwnRun {
                 c_dps: c.as_ref().map(|dps| at(dps, k)),
                 rust_dps: rust.as_ref().map(|dps| at(dps, k)),
             })
-            .collect())
+            .collect::<Vec<_>>()
+            .into())
     }
 
     /// Every reading's rate through the float circuit and the fit's own coefficients, deg/s.

@@ -1,9 +1,9 @@
 //! Readings through every path, and figures over them.
 
-use serde::Serialize;
+use std::fmt;
 
 /// One reading: the same rate through every path, deg/s. The applied rate is subtracted.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {
     /// s.
     pub time_s: f64,
@@ -39,8 +39,54 @@ impl Point {
     }
 }
 
+/// Readings, each put together when it is asked for: those of a long record would be several times the record.
+pub struct Points {
+    count: usize,
+    at: Box<dyn Fn(usize) -> Point + Send + Sync>,
+}
+
+impl Points {
+    /// So many, from their numbers.
+    pub fn new(count: usize, at: impl Fn(usize) -> Point + Send + Sync + 'static) -> Self {
+        let at = Box::new(at);
+        Points { count, at }
+    }
+
+    /// How many.
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// There is none.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// One of them.
+    pub fn get(&self, k: usize) -> Option<Point> {
+        (k < self.count).then(|| (self.at)(k))
+    }
+
+    /// All in order of time.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = Point> + Clone {
+        (0..self.count).map(|k| (self.at)(k))
+    }
+}
+
+impl From<Vec<Point>> for Points {
+    fn from(points: Vec<Point>) -> Self {
+        Points::new(points.len(), move |k| points[k])
+    }
+}
+
+impl fmt::Debug for Points {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_list().entries(self.iter()).finish()
+    }
+}
+
 /// Points' drift: greatest minus least of the means over bins of the thermometer.
-pub fn drift_pp(points: &[Point], of: impl Fn(&Point) -> f64) -> f64 {
+pub fn drift_pp(points: &Points, of: impl Fn(&Point) -> f64) -> f64 {
     /// Bins over the thermometer's range.
     const BINS: usize = 24;
     let readings = || points.iter().map(|p| p.thermometer);
@@ -48,9 +94,9 @@ pub fn drift_pp(points: &[Point], of: impl Fn(&Point) -> f64) -> f64 {
     let high = readings().fold(f64::NEG_INFINITY, f64::max);
     let width = (high - low).max(f64::MIN_POSITIVE) / BINS as f64;
     let mut sums = [(0.0, 0usize); BINS];
-    for point in points {
+    for point in points.iter() {
         let bin = (((point.thermometer - low) / width) as usize).min(BINS - 1);
-        sums[bin].0 += of(point);
+        sums[bin].0 += of(&point);
         sums[bin].1 += 1;
     }
     // Bins with a third of the usual number of points and more: the others are noise.
@@ -71,7 +117,7 @@ pub fn drift_pp(points: &[Point], of: impl Fn(&Point) -> f64) -> f64 {
 }
 
 /// Root mean square.
-pub fn rms(points: &[Point], of: impl Fn(&Point) -> f64) -> f64 {
-    let sum: f64 = points.iter().map(|p| of(p).powi(2)).sum();
+pub fn rms(points: &Points, of: impl Fn(&Point) -> f64) -> f64 {
+    let sum: f64 = points.iter().map(|p| of(&p).powi(2)).sum();
     (sum / points.len().max(1) as f64).sqrt()
 }

@@ -2,8 +2,6 @@
 //!
 //! Coefficients are lowest order first, everywhere.
 
-use nalgebra::DMatrix;
-
 /// The polynomial at `x` (Horner, fused).
 pub fn evaluate(coefficients: &[f64], x: f64) -> f64 {
     coefficients
@@ -34,24 +32,18 @@ pub fn substitute(coefficients: &[f64], a: f64, b: f64) -> Vec<f64> {
 
 /// 1, x, .., x^order.
 pub fn powers(x: f64, order: usize) -> Vec<f64> {
-    let mut row = Vec::with_capacity(order + 1);
-    let mut power = 1.0;
-    for _ in 0..=order {
-        row.push(power);
-        power *= x;
-    }
+    let mut row = vec![0.0; order + 1];
+    fill_powers(x, &mut row);
     row
 }
 
-/// The matrix with rows 1, x, .., x^order.
-pub fn vandermonde(x: &[f64], order: usize) -> DMatrix<f64> {
-    let mut m = DMatrix::from_element(x.len(), order + 1, 1.0);
-    for k in 1..=order {
-        for (i, x) in x.iter().enumerate() {
-            m[(i, k)] = m[(i, k - 1)] * x;
-        }
+/// The same for as many powers as `row` has places.
+pub fn fill_powers(x: f64, row: &mut [f64]) {
+    let mut power = 1.0;
+    for place in row {
+        *place = power;
+        power *= x;
     }
-    m
 }
 
 /// A weighted least-squares problem in powers of x, factored: the solutions of all orders.
@@ -64,49 +56,46 @@ pub struct LeastSquares {
 }
 
 impl LeastSquares {
-    /// Factors the problem for orders up to `order`: columns w^(1/2) x^k, made orthonormal by
-    /// Gram-Schmidt, twice (as accurate as Householder's reflections, and nested in the order).
+    /// Factors the problem for orders up to `order`: columns w^(1/2) x^k, made orthonormal by Householder's reflections,
+    /// some rows at a time below the triangle of those before (Golub and Van Loan, Matrix Computations, section 5.2,
+    /// sequential QR), so that the memory does not grow with the rows.
     ///
     /// x should lie within [-1, 1]; up to order 8 its powers are then well conditioned, below
     /// 1e4. `weights` below 0 count as 0. All slices have one length. Columns that the points with
     /// weight do not determine end the factorisation: see [`LeastSquares::order`].
     pub fn new(x: &[f64], y: &[f64], weights: &[f64], order: usize) -> Self {
-        let mut next: Vec<f64> = weights.iter().map(|w| w.max(0.0).sqrt()).collect();
-        let rhs: Vec<f64> = y.iter().zip(&next).map(|(y, w)| y * w).collect();
-        let mut basis: Vec<Vec<f64>> = Vec::with_capacity(order + 1);
-        let mut out = LeastSquares {
-            r: Vec::with_capacity(order + 1),
-            z: Vec::with_capacity(order + 1),
-        };
-        for _ in 0..=order {
-            let mut column = next.clone();
-            let before = dot(&column, &column).sqrt();
-            let mut r = vec![0.0; basis.len() + 1];
-            for _ in 0..2 {
-                for (q, r) in basis.iter().zip(&mut r) {
-                    let part = dot(q, &column);
-                    *r += part;
-                    for (c, q) in column.iter_mut().zip(q) {
-                        *c -= part * q;
-                    }
-                }
+        /// Rows that are taken at once: their columns fit into the first cache (convention).
+        const ROWS: usize = 256;
+        let powers = order + 1;
+        // Row j of the triangle with the right-hand side behind it, and the columns of the rows at hand.
+        let mut triangle = vec![vec![0.0; powers + 1]; powers];
+        let mut columns = vec![Vec::with_capacity(ROWS); powers + 1];
+        for ((x, y), w) in x.chunks(ROWS).zip(y.chunks(ROWS)).zip(weights.chunks(ROWS)) {
+            let root: Vec<f64> = w.iter().map(|w| w.max(0.0).sqrt()).collect();
+            let scaled = |values: &[f64], by: &[f64]| -> Vec<f64> {
+                values.iter().zip(by).map(|(a, b)| a * b).collect()
+            };
+            columns[powers] = scaled(y, &root);
+            let mut next = root;
+            for column in &mut columns[..powers] {
+                *column = next;
+                next = scaled(column, x);
             }
-            let norm = dot(&column, &column).sqrt();
-            if norm <= 1e-9 * before || norm.is_nan() {
+            for (k, row) in triangle.iter_mut().enumerate() {
+                reflect(row, &mut columns, k);
+            }
+        }
+        let mut out = LeastSquares {
+            r: Vec::with_capacity(powers),
+            z: Vec::with_capacity(powers),
+        };
+        for k in 0..powers {
+            let r: Vec<f64> = triangle[..=k].iter().map(|row| row[k]).collect();
+            if r[k].abs() <= 1e-9 * dot(&r, &r).sqrt() || r[k].is_nan() {
                 break;
             }
-            for c in &mut column {
-                *c /= norm;
-            }
-            if let Some(last) = r.last_mut() {
-                *last = norm;
-            }
-            out.z.push(dot(&column, &rhs));
             out.r.push(r);
-            basis.push(column);
-            for (n, x) in next.iter_mut().zip(x) {
-                *n *= x;
-            }
+            out.z.push(triangle[k][powers]);
         }
         out
     }
@@ -135,6 +124,30 @@ impl LeastSquares {
     }
 }
 
+/// The reflection that takes column `k` of some rows into row `k` of the triangle, for the columns from it on.
+fn reflect(row: &mut [f64], columns: &mut [Vec<f64>], k: usize) {
+    let Some((first, rest)) = columns[k..].split_first_mut() else {
+        return;
+    };
+    let below = dot(first, first);
+    if below == 0.0 {
+        return;
+    }
+    let norm = row[k].hypot(below.sqrt());
+    let pivot = if row[k] > 0.0 { -norm } else { norm };
+    // The reflection's vector is (head, first).
+    let head = row[k] - pivot;
+    let scale = 2.0 / (head * head + below);
+    for (value, column) in row[k + 1..].iter_mut().zip(rest) {
+        let part = scale * (head * *value + dot(first, column));
+        *value -= part * head;
+        for (c, v) in column.iter_mut().zip(first.iter()) {
+            *c -= part * v;
+        }
+    }
+    row[k] = pivot;
+}
+
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
@@ -158,6 +171,22 @@ mod tests {
         let found = least_squares(&x, &y, &w, 8);
         for (a, b) in found.iter().zip(&truth) {
             assert!((a - b).abs() < 1e-10, "{found:?}");
+        }
+    }
+
+    /// The first rows alone, a long dwell, determine one coefficient.
+    #[test]
+    fn rows_at_one_place_before_all_others_lose_nothing() {
+        let truth = [0.7, -1.5, 0.25, 2.0];
+        let dwell = std::iter::repeat_n(0.3, 700);
+        let x: Vec<f64> = dwell
+            .chain((0..900).map(|k| f64::from(k) / 449.5 - 1.0))
+            .collect();
+        let y: Vec<f64> = x.iter().map(|x| evaluate(&truth, *x)).collect();
+        let found = least_squares(&x, &y, &vec![1.0; x.len()], 3);
+        assert_eq!(found.len(), 4);
+        for (a, b) in found.iter().zip(&truth) {
+            assert!((a - b).abs() < 1e-12, "{found:?}");
         }
     }
 

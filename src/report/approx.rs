@@ -253,7 +253,7 @@ fn error(made: &Approximation, sampled: &[(f64, f64)], width: f64) -> Figure {
     svg.add(&frame);
     let mut frame = svg.frame(280.0, left, x, below);
     frame.level("zero", 0.0);
-    frame.cloud("fixed", &errors);
+    frame.cloud("fixed", errors.iter().copied());
     frame.level("bound", bound);
     frame.level("bound", -bound);
     let at = o.error.at_input_raw as f64 * made.settled.form.codes().format.lsb();

@@ -33,7 +33,7 @@ pub fn is_crowded(points: usize, area: f64) -> bool {
 }
 
 /// The cells with at least one of the points (px), column by column from the top.
-pub fn cells(points: &[(f64, f64)]) -> Vec<Cell> {
+pub fn cells(points: impl Iterator<Item = (f64, f64)>) -> Vec<Cell> {
     let mut counts: BTreeMap<(i64, i64), u64> = BTreeMap::new();
     for (x, y) in points {
         let place = ((x / CELL).floor() as i64, (y / CELL).floor() as i64);
@@ -80,7 +80,7 @@ mod tests {
     fn every_point_is_counted_once_and_shades_follow_the_counts() {
         let mut points = vec![(1.0, 1.0); 64];
         points.extend([(1.5, 4.0), (1.5, 7.0), (100.0, 7.0)]);
-        let cells = cells(&points);
+        let cells = cells(points.into_iter());
         assert_eq!(cells.iter().map(|c| c.count).sum::<u64>(), 67);
         assert_eq!((cells[0].x, cells[0].y, cells[0].count), (1.5, 1.5, 64));
         let paths = paths(&cells);

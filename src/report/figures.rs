@@ -70,9 +70,13 @@ impl Scene<'_> {
             ("heating", Shape::Up, true),
             ("cooling", Shape::Down, false),
         ] {
-            let chosen = self.shown.points.iter().filter(|p| p.heating == heating);
-            let places: Vec<_> = chosen.map(|p| (p.thermometer, p.before_dps)).collect();
-            self.readings(&mut frame, class, shape, &places);
+            let chosen = self
+                .shown
+                .points
+                .iter()
+                .filter(move |p| p.heating == heating);
+            let places = chosen.map(|p| (p.thermometer, p.before_dps));
+            self.readings(&mut frame, class, shape, places);
         }
         frame.line("fit", &line);
         svg.add(&frame);
@@ -126,9 +130,6 @@ impl Scene<'_> {
             quantity: quantity.to_owned(),
             unit: unit.to_owned(),
         };
-        let scaled = |points: Vec<(f64, f64)>| -> Vec<(f64, f64)> {
-            points.into_iter().map(|(t, v)| (t / seconds, v)).collect()
-        };
         let before = rate_axis("before", self.interval(&[|p| p.before_dps], &[]));
         let after = rate_axis("residual", self.residual_interval());
         let left = before.room().max(after.room());
@@ -149,12 +150,14 @@ impl Scene<'_> {
         };
         let mut upper = svg.frame(120.0, left, time(""), before);
         shade(&mut upper);
-        let raw = scaled(self.xy(|p| p.time_s, |p| p.before_dps));
+        let raw = self.shown.points.iter();
+        let raw = raw.map(|p| (p.time_s / seconds, p.before_dps));
         if self.has_markers {
+            let raw: Vec<_> = raw.collect();
             upper.line("before", &raw);
             upper.markers("before-dot", Shape::Circle, 0.4 * self.radius, &raw);
         } else {
-            upper.cloud("before", &raw);
+            upper.cloud("before", raw);
         }
         svg.add(&upper);
         let mut lower = svg.frame(270.0, left, time("time"), after);
@@ -183,7 +186,7 @@ impl Scene<'_> {
     fn fixed_minus_float(&self, width: f64) -> Figure {
         let lsb = self.shown.output_lsb;
         let bound = self.shown.summary.budget.bound_dps / lsb;
-        let apart = |p: &Point| (p.fixed_dps - p.float_dps) / lsb;
+        let apart = |p: Point| (p.fixed_dps - p.float_dps) / lsb;
         let all = self.shown.points.iter().map(apart);
         let interval = Interval::of(all.chain([bound, -bound])).padded(0.1);
         let y = Axis {
@@ -217,8 +220,8 @@ impl Scene<'_> {
         frame.level("bound", bound);
         frame.level("bound", -bound);
         let all = self.shown.points.iter();
-        let places: Vec<_> = all.map(|p| (p.thermometer, apart(p))).collect();
-        self.readings(&mut frame, "fixed", Shape::Circle, &places);
+        let places = all.map(|p| (p.thermometer, apart(p)));
+        self.readings(&mut frame, "fixed", Shape::Circle, places);
         svg.add(&frame);
         let title = "What fixed point costs: fixed minus float, in LSB of the output";
         svg.figure(
@@ -229,12 +232,12 @@ impl Scene<'_> {
 
     /// Whether the readings stay within the bound, and what it is about.
     fn bound_sentence(&self, lsb: f64, bound: f64) -> String {
-        let apart = |p: &Point| ((p.fixed_dps - p.float_dps) / lsb).abs();
+        let apart = |p: Point| ((p.fixed_dps - p.float_dps) / lsb).abs();
         let beyond = self
             .shown
             .points
             .iter()
-            .filter(|p| apart(p) > bound)
+            .filter(|p| apart(*p) > bound)
             .count();
         let largest = self.shown.points.iter().map(apart).fold(0.0, f64::max);
         let about = if self.shown.summary.record.is_some() {

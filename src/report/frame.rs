@@ -162,12 +162,12 @@ impl Frame {
 
     /// Every point as it is, as a dot; where there are too many, how many fall into each cell of the frame. What lies
     /// above or below the frame is a triangle at its edge.
-    pub fn cloud(&mut self, class: &str, points: &[(f64, f64)]) {
-        let within = |p: &&(f64, f64)| p.1 >= self.y.low && p.1 <= self.y.high;
-        let inside: Vec<(f64, f64)> = points.iter().filter(within).copied().collect();
-        let places: Vec<(f64, f64)> = inside.iter().filter_map(|p| self.place(*p)).collect();
-        if density::is_crowded(places.len(), self.width * self.height) {
-            let cells = density::cells(&places);
+    pub fn cloud(&mut self, class: &str, points: impl Iterator<Item = (f64, f64)> + Clone) {
+        let (low, high) = (self.y.low, self.y.high);
+        let inside = || points.clone().filter(move |p| p.1 >= low && p.1 <= high);
+        let places = || inside().filter_map(|p| self.place(p));
+        if density::is_crowded(places().count(), self.width * self.height) {
+            let cells = density::cells(places());
             for (level, d) in density::paths(&cells).iter().enumerate() {
                 self.marks
                     .push_str(&path(&format!("{class} cell l{}", level + 1), d));
@@ -184,23 +184,22 @@ impl Frame {
             self.drawn
                 .push((class.to_owned(), "count", cells.iter().map(value).collect()));
         } else {
+            let inside: Vec<(f64, f64)> = inside().collect();
             let many = if inside.len() > 200 { " many" } else { "" };
             self.markers(&format!("{class} dots{many}"), Shape::Dot, 1.0, &inside);
         }
         let inset = 0.03 * (self.y.high - self.y.low);
         let edge = |beyond: &dyn Fn(f64) -> bool, at: f64| -> Vec<(f64, f64)> {
-            let beyond = points.iter().filter(|p| beyond(p.1));
+            let beyond = points.clone().filter(|p| beyond(p.1));
             beyond.map(|p| (p.0, at)).collect()
         };
-        let (low, high) = (self.y.low, self.y.high);
         let (above, below) = (
             edge(&|v| v > high, high - inset),
             edge(&|v| v < low, low + inset),
         );
         self.mark(class, Shape::Up, 4.0, &above);
         self.mark(class, Shape::Down, 4.0, &below);
-        let beyond = points.iter().filter(|p| p.1 > high || p.1 < low).copied();
-        let beyond: Vec<(f64, f64)> = beyond.collect();
+        let beyond: Vec<(f64, f64)> = points.filter(|p| p.1 > high || p.1 < low).collect();
         if !beyond.is_empty() {
             self.keep(class, &beyond);
         }

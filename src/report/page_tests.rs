@@ -4,7 +4,7 @@ use super::super::{Shown, render};
 use crate::compensation::certainty;
 use crate::design::Design;
 use crate::job::coefficients::{self, Rounded};
-use crate::job::outcome::{After, Drift, Emitted, Equivalence, FitSummary, Point, Summary};
+use crate::job::outcome::{After, Drift, Emitted, Equivalence, FitSummary, Point, Points, Summary};
 use crate::job::word_lengths::WordLengths;
 use crate::job::{budget, drift_pp, formats, rms};
 use crate::record::{self, Warning};
@@ -56,9 +56,10 @@ impl Made {
                 }
             })
             .collect();
+        let all = Points::from(points.clone());
         let drift = |of: fn(&Point) -> f64| Drift {
-            drift_pp_dps: drift_pp(&points, of),
-            rms_dps: rms(&points, of),
+            drift_pp_dps: drift_pp(&all, of),
+            rms_dps: rms(&all, of),
         };
         let fixed = drift(|p| p.fixed_dps);
         let compared = |language, mismatches, first: Option<&str>| Compared {
@@ -143,7 +144,7 @@ impl Made {
             fit: &self.fit,
             rounded: &self.rounded,
             chosen: &self.chosen,
-            points: &self.points,
+            points: &Points::from(self.points.clone()),
             toolchains: ["cc 1; -O2", "rustc 1; -O"],
             output_lsb: self
                 .design

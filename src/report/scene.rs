@@ -57,15 +57,16 @@ impl<'a> Scene<'a> {
         }
     }
 
-    /// The readings as (x, y).
-    pub fn xy(&self, x: Of, y: Of) -> Vec<(f64, f64)> {
-        self.shown.points.iter().map(|p| (x(p), y(p))).collect()
-    }
-
     /// Readings with a marker each, or all of them as a cloud.
-    pub fn readings(&self, frame: &mut Frame, class: &str, shape: Shape, places: &[(f64, f64)]) {
+    pub fn readings(
+        &self,
+        frame: &mut Frame,
+        class: &str,
+        shape: Shape,
+        places: impl Iterator<Item = (f64, f64)> + Clone,
+    ) {
         if self.has_markers {
-            frame.markers(class, shape, self.radius, places);
+            frame.markers(class, shape, self.radius, &places.collect::<Vec<_>>());
         } else {
             frame.cloud(class, places);
         }
@@ -74,7 +75,7 @@ impl<'a> Scene<'a> {
     /// An interval for what is drawn and some levels.
     pub fn interval(&self, of: &[Of], more: &[f64]) -> Interval {
         let points = self.shown.points.iter();
-        let values = points.flat_map(|p| of.iter().map(move |f| f(p)));
+        let values = points.flat_map(|p| of.iter().map(move |f| f(&p)));
         Interval::of(values.chain(more.iter().copied())).padded(0.07)
     }
 
@@ -122,7 +123,7 @@ impl<'a> Scene<'a> {
     pub fn paths(&self, frame: &mut Frame, x: Of, per: f64) {
         let series = |y: Of, is_shown: &dyn Fn(&Point) -> bool| -> Vec<(f64, f64)> {
             let points = self.shown.points.iter().filter(|p| is_shown(p));
-            points.map(|p| (x(p) / per, y(p))).collect()
+            points.map(|p| (x(&p) / per, y(&p))).collect()
         };
         let r = self.radius;
         let many = self.shown.points.len() > 150;
@@ -133,8 +134,9 @@ impl<'a> Scene<'a> {
                 &series(|p| p.float_dps, &|_| true),
             );
         }
-        let fixed = series(|p| p.fixed_dps, &|_| true);
-        self.readings(frame, class("fixed", "fixed many"), Shape::Circle, &fixed);
+        let points = self.shown.points.iter();
+        let fixed = points.map(|p| (x(&p) / per, p.fixed_dps));
+        self.readings(frame, class("fixed", "fixed many"), Shape::Circle, fixed);
         let shown = |p: &Point| self.has_markers || p.differs();
         let c = series(|p| p.c_dps.unwrap_or(f64::NAN), &shown);
         frame.markers(class("c", "c many"), Shape::Plus, 0.8 * r, &c);

@@ -2,7 +2,7 @@
 
 use crate::design::Design;
 use crate::job::coefficients::Rounded;
-use crate::job::outcome::{Point, Summary};
+use crate::job::outcome::{Points, Summary};
 use crate::thermal::BaselineFit;
 
 /// What the report is made from.
@@ -19,7 +19,7 @@ pub struct Shown<'a> {
     /// Formats that were chosen, with the reason.
     pub chosen: &'a [String],
     /// Readings.
-    pub points: &'a [Point],
+    pub points: &'a Points,
     /// Compilers with their flags: C, Rust.
     pub toolchains: [&'a str; 2],
     /// LSB of the output, deg/s.

@@ -119,52 +119,98 @@ impl NoiseModel {
     }
 }
 
-/// The covariance of weighted least-squares coefficients under `noise`:
-/// H (A' W C W A) H with H = (A' W A)^-1, for the design matrix A (a row a reading) and the
-/// weights W. One row and column a column of A; zero where the weights do not determine the
-/// coefficients.
-pub fn covariance(design: &DMatrix<f64>, weights: &[f64], noise: &NoiseModel) -> DMatrix<f64> {
-    let size = design.ncols();
-    let scores = weighted(design, weights);
-    let Some(normal) = scores.tr_mul(design).cholesky() else {
-        return DMatrix::zeros(size, size);
-    };
-    let inverse = normal.inverse();
-    let mut spread = scores.clone();
-    for k in 0..size {
-        let column: Vec<f64> = scores.column(k).iter().copied().collect();
-        for (i, value) in noise.times(&column).into_iter().enumerate() {
-            spread[(i, k)] = value;
+/// A least-squares problem's matrix A, a row a reading, of which a row is made whenever it is needed: as a whole it
+/// would be many times the record.
+#[derive(Debug, Clone, Copy)]
+pub struct Rows<F> {
+    /// How many.
+    pub count: usize,
+    /// Values of a row.
+    pub columns: usize,
+    /// Fills in a row.
+    pub row: F,
+}
+
+impl<F: Fn(usize, &mut [f64])> Rows<F> {
+    /// Each row with its number and its weight.
+    fn each(&self, weights: &[f64], mut take: impl FnMut(usize, f64, &[f64])) {
+        let mut row = vec![0.0; self.columns];
+        for (i, w) in weights.iter().enumerate().take(self.count) {
+            (self.row)(i, &mut row);
+            take(i, *w, &row);
         }
     }
-    let middle = scores.tr_mul(&spread);
-    let full = &inverse * middle * &inverse;
-    // Rounding leaves it a little asymmetric.
-    (&full + full.transpose()) * 0.5
-}
 
-/// Weighted least squares by the normal equations, for a few well-scaled columns; `None` if the
-/// weights do not determine the coefficients.
-pub fn solve(design: &DMatrix<f64>, y: &[f64], weights: &[f64]) -> Option<DVector<f64>> {
-    let scores = weighted(design, weights);
-    let normal = scores.tr_mul(design);
-    let scale = normal.diagonal().max();
-    let factor = normal.cholesky()?;
-    // Columns that are nearly combinations of others: no answer rather than a wild one.
-    let least = factor.l_dirty().diagonal().min();
-    if least * least < 1e-10 * scale {
-        return None;
+    /// A' W A.
+    fn normal(&self, weights: &[f64]) -> DMatrix<f64> {
+        let mut normal = DMatrix::zeros(self.columns, self.columns);
+        self.each(weights, |_, w, row| {
+            for (k, a) in row.iter().enumerate() {
+                for (j, b) in row.iter().enumerate().take(k + 1) {
+                    normal[(k, j)] += w * a * b;
+                }
+            }
+        });
+        normal.fill_upper_triangle_with_lower_triangle();
+        normal
     }
-    Some(factor.solve(&scores.tr_mul(&DVector::from_column_slice(y))))
-}
 
-/// W A.
-fn weighted(design: &DMatrix<f64>, weights: &[f64]) -> DMatrix<f64> {
-    let mut scores = design.clone();
-    for (mut row, w) in scores.row_iter_mut().zip(weights) {
-        row *= *w;
+    /// A' W v.
+    fn score(&self, weights: &[f64], v: &[f64]) -> DVector<f64> {
+        let mut score = DVector::zeros(self.columns);
+        self.each(weights, |i, w, row| {
+            let scaled = w * v[i];
+            for (sum, a) in score.iter_mut().zip(row) {
+                *sum += scaled * a;
+            }
+        });
+        score
     }
-    scores
+
+    /// A v.
+    pub fn times(&self, v: &DVector<f64>) -> Vec<f64> {
+        let mut product = Vec::with_capacity(self.count);
+        let mut row = vec![0.0; self.columns];
+        for i in 0..self.count {
+            (self.row)(i, &mut row);
+            product.push(row.iter().zip(v.iter()).map(|(a, v)| a * v).sum());
+        }
+        product
+    }
+
+    /// The covariance of weighted least-squares coefficients under `noise`: H (A' W C W A) H with H = (A' W A)^-1,
+    /// for the weights W. One row and column a column of A; zero where the weights do not determine the
+    /// coefficients.
+    pub fn covariance(&self, weights: &[f64], noise: &NoiseModel) -> DMatrix<f64> {
+        let size = self.columns;
+        let Some(normal) = self.normal(weights).cholesky() else {
+            return DMatrix::zeros(size, size);
+        };
+        let inverse = normal.inverse();
+        let mut middle = DMatrix::zeros(size, size);
+        let mut column = vec![0.0; self.count];
+        for k in 0..size {
+            self.each(weights, |i, w, row| column[i] = w * row[k]);
+            middle.set_column(k, &self.score(weights, &noise.times(&column)));
+        }
+        let full = &inverse * middle * &inverse;
+        // Rounding leaves it a little asymmetric.
+        (&full + full.transpose()) * 0.5
+    }
+
+    /// Weighted least squares by the normal equations, for a few well-scaled columns; `None` if the weights do not
+    /// determine the coefficients.
+    pub fn solve(&self, y: &[f64], weights: &[f64]) -> Option<DVector<f64>> {
+        let normal = self.normal(weights);
+        let scale = normal.diagonal().max();
+        let factor = normal.cholesky()?;
+        // Columns that are nearly combinations of others: no answer rather than a wild one.
+        let least = factor.l_dirty().diagonal().min();
+        if least * least < 1e-10 * scale {
+            return None;
+        }
+        Some(factor.solve(&self.score(weights, y)))
+    }
 }
 
 #[cfg(test)]

@@ -47,13 +47,16 @@ pub struct Sample {
 impl Sample {
     /// The weights of the rows that `used` marks, from those rows alone; 0 for the others.
     pub fn weights(&self, used: impl Fn(usize) -> bool) -> Vec<f64> {
-        let rows: Vec<usize> = (0..self.t.len()).filter(|i| used(*i)).collect();
-        let t: Vec<f64> = rows.iter().map(|i| self.t[*i]).collect();
-        let mut out = vec![0.0; self.t.len()];
-        for (i, w) in rows.into_iter().zip(weights::dwell(&t, self.bins)) {
-            out[i] = if self.limit_dwells { w } else { 1.0 } * self.spike[i];
-        }
-        out
+        let share = weights::dwell(
+            (0..self.t.len()).filter(|i| used(*i)).map(|i| self.t[i]),
+            self.bins,
+        );
+        let weight = |i: usize| match (used(i), self.limit_dwells) {
+            (false, _) => 0.0,
+            (true, true) => share(self.t[i]) * self.spike[i],
+            (true, false) => self.spike[i],
+        };
+        (0..self.t.len()).map(weight).collect()
     }
 
     /// The least-squares problem of the rows that `used` marks, for orders up to `order`.
@@ -69,11 +72,11 @@ impl Sample {
     }
 }
 
-/// What comes of predicting every block from the others.
+/// What comes of predicting every block from the others by a polynomial of one order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeldOut {
-    /// Of each row, deg/s: measured minus predicted.
-    pub errors: Vec<f64>,
+    /// What predicts each block.
+    coefficients: Vec<Vec<f64>>,
     /// Over all rows, spikes included, each counting once: comparable with figures that others
     /// publish for the same cut.
     pub rms_dps: f64,
@@ -85,49 +88,68 @@ pub struct HeldOut {
     pub block_mean_square: Vec<f64>,
 }
 
-/// Predicts each of the `blocks` from the other ones, with every order up to `highest`; the
-/// result is by order.
+/// The held-out errors of all orders up to `highest`: each block predicted from a fit to the
+/// others, whose weights never see the block.
 pub fn cross_validate(sample: &Sample, highest: usize, blocks: &[Range<usize>]) -> Vec<HeldOut> {
-    let mut errors = vec![vec![0.0; sample.e.len()]; highest + 1];
-    for block in blocks {
-        let problem = sample.problem(highest, |i| !block.contains(&i));
-        for (order, errors) in errors.iter_mut().enumerate() {
-            let c = problem.coefficients(order);
-            for i in block.clone() {
-                errors[i] = sample.e[i] - polynomial::evaluate(&c, sample.x[i]);
-            }
-        }
-    }
-    errors
-        .into_iter()
-        .map(|errors| held_out(sample, errors, blocks))
+    let problems: Vec<LeastSquares> = blocks
+        .iter()
+        .map(|block| sample.problem(highest, |i| !block.contains(&i)))
+        .collect();
+    (0..=highest)
+        .map(|order| {
+            let coefficients = problems.iter().map(|p| p.coefficients(order)).collect();
+            HeldOut::new(sample, coefficients, blocks)
+        })
         .collect()
 }
 
-/// The figures of the held-out errors of all rows.
-fn held_out(sample: &Sample, errors: Vec<f64>, blocks: &[Range<usize>]) -> HeldOut {
-    let mut block_mean_square = Vec::with_capacity(blocks.len());
-    let (mut sum, mut count) = (0.0, 0.0);
-    for block in blocks {
-        let clean = block.clone().filter(|i| sample.spike[*i] >= 0.5);
-        let (block_sum, block_count) =
-            clean.fold((0.0, 0.0), |(s, n), i| (s + errors[i] * errors[i], n + 1.0));
-        if block_count > 0.0 {
-            block_mean_square.push(block_sum / block_count);
+impl HeldOut {
+    /// No rows, no errors.
+    pub fn nothing() -> Self {
+        HeldOut {
+            coefficients: Vec::new(),
+            rms_dps: f64::NAN,
+            max_abs_dps: f64::NAN,
+            clean_rms_dps: f64::NAN,
+            block_mean_square: Vec::new(),
         }
-        sum += block_sum;
-        count += block_count;
     }
-    HeldOut {
-        rms_dps: stats::rms(&errors),
-        max_abs_dps: errors.iter().fold(0.0, |m, e| m.max(e.abs())),
-        clean_rms_dps: if count > 0.0 {
-            f64::sqrt(sum / count)
-        } else {
-            f64::NAN
-        },
-        errors,
-        block_mean_square,
+
+    /// The figures of blocks that are predicted by `coefficients`.
+    fn new(sample: &Sample, coefficients: Vec<Vec<f64>>, blocks: &[Range<usize>]) -> Self {
+        let mut out = HeldOut {
+            coefficients,
+            ..HeldOut::nothing()
+        };
+        let errors = out.errors(sample, blocks);
+        let (mut sum, mut count) = (0.0, 0.0);
+        for block in blocks {
+            let clean = block.clone().filter(|i| sample.spike[*i] >= 0.5);
+            let (block_sum, block_count) =
+                clean.fold((0.0, 0.0), |(s, n), i| (s + errors[i] * errors[i], n + 1.0));
+            if block_count > 0.0 {
+                out.block_mean_square.push(block_sum / block_count);
+            }
+            sum += block_sum;
+            count += block_count;
+        }
+        out.rms_dps = stats::rms(&errors);
+        out.max_abs_dps = errors.iter().fold(0.0, |m, e| m.max(e.abs()));
+        if count > 0.0 {
+            out.clean_rms_dps = f64::sqrt(sum / count);
+        }
+        out
+    }
+
+    /// Of each row, deg/s: measured minus predicted. `sample` and `blocks` are those of [`cross_validate`].
+    pub fn errors(&self, sample: &Sample, blocks: &[Range<usize>]) -> Vec<f64> {
+        let mut errors = vec![0.0; sample.e.len()];
+        for (block, c) in blocks.iter().zip(&self.coefficients) {
+            for i in block.clone() {
+                errors[i] = sample.e[i] - polynomial::evaluate(c, sample.x[i]);
+            }
+        }
+        errors
     }
 }
 

@@ -53,18 +53,16 @@ impl Bins {
     }
 }
 
-/// The weight of each reading by the occupancy of its bin: 1, or less where the bin holds more
-/// than [`DWELL_LIMIT`] times the rows of the median occupied bin.
-pub fn dwell(t: &[f64], bins: Bins) -> Vec<f64> {
+/// The weight of a reading by the occupancy of its bin: 1, or less where the bin holds more
+/// than [`DWELL_LIMIT`] times the rows of the median occupied bin. `t` are all readings.
+pub fn dwell(t: impl Iterator<Item = f64>, bins: Bins) -> impl Fn(f64) -> f64 {
     let mut count = [0.0f64; BINS];
     for t in t {
-        count[bins.index(*t)] += 1.0;
+        count[bins.index(t)] += 1.0;
     }
     let occupied: Vec<f64> = count.iter().copied().filter(|c| *c > 0.0).collect();
     let limit = DWELL_LIMIT * stats::median(&occupied);
-    t.iter()
-        .map(|t| (limit / count[bins.index(*t)]).min(1.0))
-        .collect()
+    move |t| (limit / count[bins.index(t)]).min(1.0)
 }
 
 /// The weight of each row as a possible spike: 1 for rows like their neighbours, 0 for rows far
@@ -187,6 +185,10 @@ mod tests {
     fn an_even_ramp_is_not_reweighted_and_a_soak_is() {
         let ramp: Vec<f64> = (0..200).map(f64::from).collect();
         let bins = Bins::new((0.0, 199.0));
+        let dwell = |t: &[f64], bins| -> Vec<f64> {
+            let share = dwell(t.iter().copied(), bins);
+            t.iter().map(|t| share(*t)).collect()
+        };
         assert!(dwell(&ramp, bins).iter().all(|w| *w == 1.0));
         let mut soak = ramp.clone();
         soak.extend(std::iter::repeat_n(199.0, 5000));

@@ -10,8 +10,7 @@ use crate::numeric::polynomial;
 use crate::record::columns::{self, THERMOMETERS};
 use crate::record::thermal::LEAST_ROWS;
 use crate::record::{ThermalRecord, Warning};
-use crate::statistics::correlation;
-use crate::statistics::correlation::NoiseModel;
+use crate::statistics::correlation::{NoiseModel, Rows};
 use crate::statistics::folds;
 use crate::statistics::folds::Sample;
 use crate::statistics::stats;
@@ -269,11 +268,12 @@ pub fn fit_with(
     }
     let residuals = sample.residuals(&coefficients_scaled);
     let noise = NoiseModel::of_residuals(&residuals, &sample.spike, order + 1);
-    let covariance = correlation::covariance(
-        &polynomial::vandermonde(&sample.x, order),
-        &row_weights,
-        &noise,
-    );
+    let powers = Rows {
+        count: sample.x.len(),
+        columns: order + 1,
+        row: |i: usize, row: &mut [f64]| polynomial::fill_powers(sample.x[i], row),
+    };
+    let covariance = powers.covariance(&row_weights, &noise);
     let drift = drift(&sample);
     let threshold = (0.1 * (range.1 - range.0)).max(6.0 * stats::curvature_noise(&sample.t));
     let directions = sweep::directions(&sample.t, threshold);
@@ -314,7 +314,7 @@ pub fn fit_with(
         drift_before_pp_dps: drift,
         drift_before_pp_plain_dps: stats::extremes(&sample.e).map_or(0.0, |(a, b)| b - a),
         residuals: spread_out(&residuals, f64::NAN),
-        heldout_errors: spread_out(&choice.heldout.errors, f64::NAN),
+        heldout_errors: spread_out(&choice.heldout.errors(&sample, &blocks), f64::NAN),
         weights: spread_out(&row_weights, 0.0),
         rows,
         blocks,

@@ -287,7 +287,9 @@ fn loop_warning(c: &Checked<'_>) -> Option<Warning> {
 
 /// Says so where dwells were held back.
 fn dwells(c: &Checked<'_>) -> Option<Warning> {
-    let weights = crate::statistics::weights::dwell(&c.sample.t, c.sample.bins);
+    let t = &c.sample.t;
+    let share = crate::statistics::weights::dwell(t.iter().copied(), c.sample.bins);
+    let weights: Vec<f64> = t.iter().map(|t| share(*t)).collect();
     let held = weights.iter().filter(|w| **w < 1.0).count();
     let share = held as f64 / weights.len().max(1) as f64;
     let left: f64 = weights.iter().filter(|w| **w < 1.0).sum();

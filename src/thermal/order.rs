@@ -115,13 +115,7 @@ pub fn choose(sample: &Sample, wanted: FitOrder, most: usize, blocks: &[Range<us
             t.heldout_clean_rms_dps
         ));
     }
-    let heldout = chosen.map(|(_, h)| h.clone()).unwrap_or(HeldOut {
-        errors: Vec::new(),
-        rms_dps: f64::NAN,
-        max_abs_dps: f64::NAN,
-        clean_rms_dps: f64::NAN,
-        block_mean_square: Vec::new(),
-    });
+    let heldout = chosen.map_or_else(HeldOut::nothing, |(_, h)| h.clone());
     Choice {
         order,
         trials: results.into_iter().map(|(t, _)| t).collect(),

@@ -1,11 +1,9 @@
 //! Rising against falling thermometer: the loop that no function of the reading can follow.
 
 use crate::numeric::polynomial;
-use crate::statistics::correlation;
-use crate::statistics::correlation::NoiseModel;
+use crate::statistics::correlation::{NoiseModel, Rows};
 use crate::statistics::folds::Sample;
 use crate::statistics::weights::{BINS, Bins};
-use nalgebra::DMatrix;
 
 /// Which way the thermometer goes on its way through the record: +1 rising, -1 falling, 0 where
 /// it never turns out to move by `threshold` (its unit).
@@ -124,24 +122,27 @@ pub fn measure_loop(
     let freedom = (compared.len() / 2).min(6);
     let shape = freedom - 1;
     let terms = order.max(shape) + 1;
-    let powers = polynomial::vandermonde(&sample.x, terms - 1);
-    let design = DMatrix::from_fn(sample.x.len(), terms + freedom, |i, k| {
-        if k < terms {
-            powers[(i, k)]
-        } else {
-            f64::from(directions[i]) * powers[(i, k - terms)]
-        }
-    });
+    let design = Rows {
+        count: sample.x.len(),
+        columns: terms + freedom,
+        row: |i: usize, row: &mut [f64]| {
+            let (plain, directed) = row.split_at_mut(terms);
+            polynomial::fill_powers(sample.x[i], plain);
+            for (signed, power) in directed.iter_mut().zip(plain.iter()) {
+                *signed = f64::from(directions[i]) * power;
+            }
+        },
+    };
     let weights = &sample.spike;
-    let c = correlation::solve(&design, residuals, weights)?;
-    let fitted = &design * &c;
+    let c = design.solve(residuals, weights)?;
+    let fitted = design.times(&c);
     let left: Vec<f64> = residuals
         .iter()
         .zip(fitted.iter())
         .map(|(r, f)| r - f)
         .collect();
     let model = NoiseModel::of_residuals(&left, weights, terms + freedom);
-    let covariance = correlation::covariance(&design, weights, &model);
+    let covariance = design.covariance(weights, &model);
     let ours = covariance
         .view((terms, terms), (freedom, freedom))
         .into_owned();

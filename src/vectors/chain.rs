@@ -2,6 +2,7 @@
 //! the columns of `replay`, the bias that stands behind the rate, and the state.
 
 use super::interpreter::{Interpreter, StateWord};
+use super::rows::WordRows;
 use crate::circuit::chain::{Chain, FastState, SlowState};
 use crate::circuit::decimator::Decimate;
 use crate::circuit::engine;
@@ -42,10 +43,14 @@ pub fn chain(design: &Design) -> Box<dyn ChainModel> {
 }
 
 /// The rows of whole periods.
-pub fn rows(design: &Design, drive: &[i32], sense: &[i32]) -> Vec<Vec<i128>> {
+pub fn rows(design: &Design, drive: &[i32], sense: &[i32]) -> WordRows {
     let mut chain = chain(design);
+    let mut rows = WordRows::new(columns(design).len() + 1);
     let pairs = drive.iter().zip(sense);
-    pairs.filter_map(|(d, s)| chain.push(*d, *s)).collect()
+    pairs
+        .filter_map(|(d, s)| chain.push(*d, *s))
+        .for_each(|row| rows.push(row));
+    rows
 }
 
 /// True for each word of [`ChainModel::state`] that takes two 64-bit words.
@@ -196,7 +201,8 @@ mod tests {
             let found = rows(&design, &drive, &sense);
             assert_eq!(found.len(), due.len() / columns);
             for (found, due) in found.iter().zip(due.chunks_exact(columns)) {
-                assert_eq!(&found[..columns], due);
+                let found = found[..columns].iter().map(|word| i128::from(*word));
+                assert!(found.eq(due.iter().copied().map(i128::from)));
             }
         }
     }
@@ -252,7 +258,7 @@ mod tests {
                 }
                 let (program, number) = model.recorded.clone().expect("recorded");
                 let vectors = crate::vectors::search::vectors(&model, 9);
-                let dense = stimulus::random(&model.inputs, 1 << 14, 77);
+                let dense: Vec<_> = stimulus::random(&model.inputs, 1 << 14, 77).collect();
                 let count = program.program().functions[number].inputs.len();
                 let call = |damage, words: &Vec<i128>| {
                     let (mut state, mut outputs) = (words[count..].to_vec(), Vec::new());

@@ -31,7 +31,7 @@ pub fn vectors(model: &Model, seed: u64) -> Vec<Vec<i128>> {
         0..MANY => RANDOM,
         _ => RANDOM_OF_MANY,
     };
-    let mut chosen = stimulus::inputs(&model.inputs, random, seed);
+    let mut chosen: Vec<_> = stimulus::inputs(&model.inputs, random, seed).collect();
     chosen.iter_mut().for_each(|words| model.repair(words));
     let Some((program, number)) = &model.recorded else {
         return chosen;

@@ -65,7 +65,7 @@ const COMBINED: usize = 3;
 
 /// Inputs of a function: its words at their ends, in every combination where they are few, else at random
 /// and one by one; then `random` draws.
-pub fn inputs(ranges: &[Interval], random: usize, seed: u64) -> Vec<Vec<i128>> {
+pub fn inputs(ranges: &[Interval], random: usize, seed: u64) -> impl Iterator<Item = Vec<i128>> {
     let mut all: Vec<Vec<i128>> = vec![Vec::new()];
     if ranges.len() <= COMBINED {
         for range in ranges {
@@ -92,14 +92,13 @@ pub fn inputs(ranges: &[Interval], random: usize, seed: u64) -> Vec<Vec<i128>> {
             }
         }
     }
-    all.extend(self::random(ranges, random, seed));
-    all
+    all.into_iter().chain(self::random(ranges, random, seed))
 }
 
 /// Random words; in a third of the draws small ones, for rounding near zero.
-pub fn random(ranges: &[Interval], count: usize, seed: u64) -> Vec<Vec<i128>> {
+pub fn random(ranges: &[Interval], count: usize, seed: u64) -> impl Iterator<Item = Vec<i128>> {
     let mut lcg = Lcg(seed);
-    let draw = |k: usize| {
+    let draw = move |k: usize| {
         let words = ranges.iter().map(|range| {
             let word = lcg.word(*range);
             match k % 3 {
@@ -109,7 +108,7 @@ pub fn random(ranges: &[Interval], count: usize, seed: u64) -> Vec<Vec<i128>> {
         });
         words.collect()
     };
-    (0..count).map(draw).collect()
+    (0..count).map(draw)
 }
 
 /// Drive and sense codes: tones beside the NCO with noise, full-scale squares, constants at the

@@ -35,7 +35,8 @@ impl Search<'_> {
                 .map(|l| (l.end - l.start) * l.count as usize)
                 .sum::<usize>();
         let count = (OPERATIONS / work.max(1)).clamp(256, CANDIDATES);
-        let mut candidates = stimulus::random(&self.model.inputs, count / 2, seed + 4);
+        let mut candidates: Vec<_> =
+            stimulus::random(&self.model.inputs, count / 2, seed + 4).collect();
         candidates.extend(self.shaken(chosen, count / 2, seed + 8));
         candidates
             .iter_mut()

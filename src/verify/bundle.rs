@@ -11,6 +11,7 @@ use crate::firmware::files::EmittedFile;
 use crate::firmware::folder::Folder;
 use crate::firmware::manifest::{self, Manifest};
 use crate::leftovers::TemporaryFolder;
+use crate::vectors::rows::WordRows;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -222,9 +223,6 @@ fn other_than(due: &[EmittedFile], folder: &Folder) -> Vec<String> {
         .collect()
 }
 
-/// Lines of vectors.
-type Lines = Vec<Vec<i128>>;
-
 /// The comparisons of one bundle.
 struct Run<'a> {
     language: Language,
@@ -307,19 +305,22 @@ impl Run<'_> {
     }
 
     /// The vectors of a function: inputs and outputs.
-    fn split(&self, function: &manifest::FunctionEntry) -> Result<(Lines, Lines)> {
+    fn split(&self, function: &manifest::FunctionEntry) -> Result<(WordRows, WordRows)> {
         let columns = function
             .inputs
             .saturating_add(function.outputs)
             .saturating_add(1);
-        Ok(split(self.words(&function.name, columns)?, function.inputs))
+        Ok(split(
+            &self.words(&function.name, columns)?,
+            function.inputs,
+        ))
     }
 
     /// Rows of integers under one header line, `columns` each.
-    fn words(&self, name: &str, columns: usize) -> Result<Vec<Vec<i128>>> {
+    fn words(&self, name: &str, columns: usize) -> Result<WordRows> {
         let name = format!("vectors/{name}.csv");
         let text = self.folder.read_text(&name)?;
-        let mut rows = Vec::new();
+        let mut rows = WordRows::new(columns);
         for (number, line) in text.lines().enumerate() {
             let cells = line.split(',');
             if number == 0 && cells.clone().count() == columns {
@@ -343,10 +344,10 @@ impl Run<'_> {
         Ok(rows)
     }
 
-    fn tables(&self) -> Result<BTreeMap<String, Vec<i128>>> {
+    fn tables(&self) -> Result<BTreeMap<String, Vec<i64>>> {
         let name = "vectors/tables.csv";
         let text = self.folder.read_text(name)?;
-        let mut tables: BTreeMap<String, Vec<i128>> = BTreeMap::new();
+        let mut tables: BTreeMap<String, Vec<i64>> = BTreeMap::new();
         for (number, line) in text.lines().enumerate().skip(1) {
             let cells: Vec<&str> = line.split(',').collect();
             let parsed = match cells.as_slice() {
@@ -354,7 +355,7 @@ impl Run<'_> {
                     let entries = tables.entry((*name).to_owned()).or_default();
                     let counted = entry.parse() == Ok(entries.len());
                     counted
-                        .then(|| value.parse::<i128>().ok())
+                        .then(|| value.parse::<i64>().ok())
                         .flatten()
                         .map(|v| entries.push(v))
                 }
@@ -375,10 +376,15 @@ impl Run<'_> {
 }
 
 /// Rows as inputs and outputs.
-fn split(rows: Vec<Vec<i128>>, inputs: usize) -> (Vec<Vec<i128>>, Vec<Vec<i128>>) {
-    let parts = rows.into_iter().map(|mut row| {
-        let outputs = row.split_off(inputs);
-        (row, outputs)
-    });
-    parts.unzip()
+fn split(rows: &WordRows, inputs: usize) -> (WordRows, WordRows) {
+    let mut parts = (
+        WordRows::new(inputs),
+        WordRows::new(rows.columns() - inputs),
+    );
+    for row in rows.iter() {
+        let (given, due) = row.split_at(inputs);
+        parts.0.push(given.iter().map(|word| i128::from(*word)));
+        parts.1.push(due.iter().map(|word| i128::from(*word)));
+    }
+    parts
 }

@@ -9,6 +9,7 @@ use crate::firmware::manifest::{EveryEntry, LongEntry};
 use crate::vectors::chain;
 use crate::vectors::model;
 use crate::vectors::model::Model;
+use crate::vectors::rows::WordRows;
 use crate::vectors::search;
 use crate::vectors::stimulus::{self, EXHAUSTIVE_BITS, SEED};
 use serde::Serialize;
@@ -51,8 +52,7 @@ pub fn with_model(
 ) -> Result<Vec<Compared>> {
     let mut all = Vec::new();
     for table in views::tables(bundle, language) {
-        let expected: Vec<i128> = table.entries.iter().map(|v| i128::from(*v)).collect();
-        all.push(self::table(language, harness, &table.name, &expected)?);
+        all.push(self::table(language, harness, &table.name, &table.entries)?);
     }
     for model in model::models(design, &bundle.program) {
         all.push(function(language, harness, &model)?);
@@ -94,12 +94,14 @@ impl Tally {
         }
     }
 
-    fn note(&mut self, got: &[u64], expected: &[i128], place: impl FnOnce() -> String) {
+    fn note(&mut self, got: &[u64], expected: &[i64], place: impl FnOnce() -> String) {
         self.outcome.inputs += 1;
         self.outcome.compared += expected.len() as u64;
-        let same =
-            got.len() == expected.len() && got.iter().zip(expected).all(|(g, e)| *g == *e as u64);
-        if !same {
+        if !got
+            .iter()
+            .map(|word| *word as i64)
+            .eq(expected.iter().copied())
+        {
             self.outcome.mismatches += 1;
             if self.outcome.first.is_none() {
                 let got: Vec<i64> = got.iter().map(|w| *w as i64).collect();
@@ -130,7 +132,7 @@ pub fn table(
     language: Language,
     harness: &Harness,
     name: &str,
-    expected: &[i128],
+    expected: &[i64],
 ) -> Result<Compared> {
     let mut tally = Tally::new(language, name);
     tally.outcome.exhaustive = true;
@@ -170,14 +172,16 @@ pub fn function(language: Language, harness: &Harness, model: &Model) -> Result<
         let mut tally = Tally::new(language, &model.name);
         tally.outcome.exhaustive = true;
         let mut input = range.low;
-        let mut expected = vec![0; model.outputs + 1];
+        let mut outputs = vec![0; model.outputs];
+        let mut expected = Vec::new();
         harness.run(
             &arguments,
             Vec::new(),
             (model.outputs + 1, count),
             &mut |words| {
-                expected[model.outputs] =
-                    i128::from(model.call(&[input], &mut expected[..model.outputs]));
+                let fault = i64::from(model.call(&[input], &mut outputs));
+                expected.clear();
+                expected.extend(outputs.iter().map(|word| *word as i64).chain([fault]));
                 tally.note(words, &expected, || format!("input {input}"));
                 input += 1;
             },
@@ -188,16 +192,22 @@ pub fn function(language: Language, harness: &Harness, model: &Model) -> Result<
         0 => RANDOM_INPUTS,
         _ => RANDOM_STATES,
     };
-    let mut inputs = stimulus::inputs(&model.inputs, count, SEED + 3);
-    inputs.iter_mut().for_each(|words| model.repair(words));
-    if model.state > 0 {
-        inputs.extend(search::vectors(model, SEED + 3));
+    let (columns, given) = model.columns();
+    let mut inputs = WordRows::new(given);
+    let mut expected = WordRows::new(columns.len() - given);
+    let mut take = |input: &[i128]| {
+        inputs.push(model.input_words(input));
+        expected.push(model.record(input));
+    };
+    for mut input in stimulus::inputs(&model.inputs, count, SEED + 3) {
+        model.repair(&mut input);
+        take(&input);
     }
-    let expected: Vec<Vec<i128>> = inputs.iter().map(|input| model.record(input)).collect();
-    let inputs: Vec<Vec<i128>> = inputs
-        .iter()
-        .map(|input| model.input_words(input))
-        .collect();
+    if model.state > 0 {
+        search::vectors(model, SEED + 3)
+            .iter()
+            .for_each(|input| take(input));
+    }
     calls(language, harness, &model.name, &inputs, &expected)
 }
 
@@ -209,8 +219,8 @@ pub fn calls(
     language: Language,
     harness: &Harness,
     name: &str,
-    inputs: &[Vec<i128>],
-    expected: &[Vec<i128>],
+    inputs: &WordRows,
+    expected: &WordRows,
 ) -> Result<Compared> {
     records(language, harness, "call", name, inputs, expected)
 }
@@ -224,8 +234,8 @@ pub fn sequence(
     language: Language,
     harness: &Harness,
     name: &str,
-    inputs: &[Vec<i128>],
-    expected: &[Vec<i128>],
+    inputs: &WordRows,
+    expected: &WordRows,
 ) -> Result<Compared> {
     records(language, harness, "sequence", name, inputs, expected)
 }
@@ -235,23 +245,18 @@ fn records(
     harness: &Harness,
     mode: &str,
     name: &str,
-    inputs: &[Vec<i128>],
-    expected: &[Vec<i128>],
+    inputs: &WordRows,
+    expected: &WordRows,
 ) -> Result<Compared> {
-    let words = inputs.iter().flatten().map(|w| *w as i64);
-    let bytes: Vec<u8> = words.flat_map(i64::to_ne_bytes).collect();
-    let record = expected.first().map_or(1, Vec::len);
     let mut tally = Tally::new(language, name);
     let mut k = 0;
     harness.run(
         &[mode.to_owned(), name.to_owned()],
-        bytes,
-        (record, expected.len() as u64),
+        inputs.to_bytes(),
+        (expected.columns(), expected.len() as u64),
         &mut |words| {
-            let due = expected.get(k).map_or(&[][..], Vec::as_slice);
-            tally.note(words, due, || {
-                let input = inputs.get(k).map_or(&[][..], Vec::as_slice);
-                let words: Vec<String> = input.iter().map(i128::to_string).collect();
+            tally.note(words, expected.row(k), || {
+                let words: Vec<String> = inputs.row(k).iter().map(i64::to_string).collect();
                 format!("input {}", words.join(", "))
             });
             k += 1;
@@ -346,20 +351,18 @@ pub fn chain_rows(
     harness: &Harness,
     drive: &[i32],
     sense: &[i32],
-    rows: &[Vec<i128>],
+    rows: &WordRows,
 ) -> Result<Compared> {
     let pairs = drive.iter().zip(sense);
     let bytes: Vec<u8> = pairs
         .flat_map(|(d, s)| [d.to_ne_bytes(), s.to_ne_bytes()])
         .flatten()
         .collect();
-    let record = rows.first().map_or(1, Vec::len);
     let mut tally = Tally::new(language, "chain");
     let mut k = 0;
-    let most = rows.len() as u64;
-    harness.run(&["chain".to_owned()], bytes, (record, most), &mut |words| {
-        let due = rows.get(k).map_or(&[][..], Vec::as_slice);
-        tally.note(words, due, || format!("row {k}"));
+    let size = (rows.columns(), rows.len() as u64);
+    harness.run(&["chain".to_owned()], bytes, size, &mut |words| {
+        tally.note(words, rows.row(k), || format!("row {k}"));
         k += 1;
     })?;
     Ok(tally.finish(rows.len() as u64))

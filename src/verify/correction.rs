@@ -7,6 +7,7 @@ use crate::error::Result;
 use crate::firmware::correction::{Origin, emit};
 use crate::firmware::files::EmittedFile;
 use crate::firmware::stepped;
+use crate::vectors::rows::WordRows;
 use crate::verify::compare::{self, Compared};
 
 /// Both languages' bundles, with the test drivers of those that were built.
@@ -50,14 +51,20 @@ impl Firmware {
     /// A driver that cannot be run.
     pub fn compare(&self, correction: &Correction, readings: &[Reading]) -> Result<Vec<Compared>> {
         let (calls, _) = correction.calls(readings);
-        let words = correction.run_words(&calls);
-        let expected: Vec<Vec<i128>> = words.into_iter().map(|word| vec![word, 0]).collect();
+        let mut expected = WordRows::new(2);
+        for word in correction.run_words(&calls) {
+            expected.push([i128::from(word), 0]);
+        }
         self.0.each(|built| {
             let (language, harness) = (built.language, &built.harness);
             let mut all = Vec::new();
             for table in views::tables(&self.0.bundle, language) {
-                let entries: Vec<i128> = table.entries.iter().map(|v| i128::from(*v)).collect();
-                all.push(compare::table(language, harness, &table.name, &entries)?);
+                all.push(compare::table(
+                    language,
+                    harness,
+                    &table.name,
+                    &table.entries,
+                )?);
             }
             let name = crate::correction::block::STEP;
             all.push(compare::sequence(

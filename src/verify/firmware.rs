@@ -9,6 +9,7 @@ use crate::firmware::files::EmittedFile;
 use crate::firmware::replace;
 use crate::leftovers::TemporaryFolder;
 use crate::parallel::both;
+use crate::vectors::rows::WordRows;
 use crate::verify::compare::{self, Compared};
 use crate::verify::toolchain::{self, Harness};
 use std::path::Path;
@@ -152,28 +153,18 @@ impl Built {
         })
     }
 
-    /// Outputs of a function for each input, the fault left out; `outputs` words each.
+    /// The output of a function of one output for each input, the fault left out.
     ///
     /// # Errors
     /// A driver that cannot be run.
-    pub fn call(&self, name: &str, inputs: &[Vec<i128>], outputs: usize) -> Result<Vec<Vec<i128>>> {
-        let words = inputs.iter().flatten().map(|w| *w as i64);
-        let bytes: Vec<u8> = words.flat_map(i64::to_ne_bytes).collect();
+    pub fn call(&self, name: &str, inputs: &WordRows) -> Result<Vec<i64>> {
         let mut results = Vec::with_capacity(inputs.len());
         let arguments = ["call".to_owned(), name.to_owned()];
-        self.harness.run(
-            &arguments,
-            bytes,
-            (outputs + 1, inputs.len() as u64),
-            &mut |words| {
-                results.push(
-                    words[..outputs]
-                        .iter()
-                        .map(|w| i128::from(*w as i64))
-                        .collect(),
-                );
-            },
-        )?;
+        let size = (2, inputs.len() as u64);
+        self.harness
+            .run(&arguments, inputs.to_bytes(), size, &mut |words| {
+                results.push(words[0] as i64);
+            })?;
         Ok(results)
     }
 

@@ -100,7 +100,7 @@ fn over_time(view: &View, width: f64) -> Figure {
         }
         frame.span_between("sigma", -floor, floor);
         frame.level("zero", 0.0);
-        frame.cloud(class, &pairs(&time, values));
+        frame.cloud(class, pairs(&time, values));
         svg.add(&frame);
     }
     let title = if view.has_steps() {
@@ -123,10 +123,9 @@ fn over_time(view: &View, width: f64) -> Figure {
 }
 
 /// Rows with a value, as points.
-fn pairs(x: &[f64], y: &[f64]) -> Vec<(f64, f64)> {
+fn pairs<'a>(x: &'a [f64], y: &'a [f64]) -> impl Iterator<Item = (f64, f64)> + Clone + 'a {
     let rows = x.iter().copied().zip(y.iter().copied());
     rows.filter(|(x, y)| x.is_finite() && y.is_finite())
-        .collect()
 }
 
 /// Residual before and after against every channel, one small plot each, a frame for each.
@@ -150,7 +149,7 @@ fn over_channels(view: &View) -> Option<Figure> {
             let x = if k == last { x.clone() } else { unlabelled(&x) };
             let mut frame = svg.frame(130.0, left, x, y.clone());
             frame.level("zero", 0.0);
-            frame.cloud(class, &pairs(readings, values));
+            frame.cloud(class, pairs(readings, values));
             svg.add(&frame);
         }
         svg.figure(format!("Residual against {name}"), "")
@@ -199,7 +198,7 @@ fn step(view: &View, k: usize, contribution: &Contribution, width: f64) -> Optio
     ]);
     let mut frame = svg.frame(280.0, left, abscissa.axis.clone(), y);
     frame.level("zero", 0.0);
-    frame.cloud("before", &pairs(&abscissa.values, &partial));
+    frame.cloud("before", pairs(&abscissa.values, &partial));
     draw_contribution(&mut frame, &abscissa, contribution, shown);
     svg.add(&frame);
     let title = format!("Step {}: {} over {}", k + 1, step.effect, abscissa.name);

@@ -295,7 +295,7 @@ fn oscillator(e: &Equivalence, design: &Design, width: f64) -> Figure {
         let strokes: Vec<_> = points.iter().map(|p| (p.0, y.interval.low, p.1)).collect();
         frame.bars("before", &strokes);
     }
-    frame.cloud("before", &points);
+    frame.cloud("before", points.into_iter());
     let carrier = (1e-3 * e.nco_spurs.carrier_hz, 0.0);
     frame.bars("cooling", &[(carrier.0, y.interval.low, 0.0)]);
     frame.markers("cooling", Shape::Down, 5.0, &[carrier]);
