@@ -187,6 +187,16 @@ pub struct Closure {
     pub warnings: Vec<Warning>,
 }
 
+impl Closure {
+    /// [`Closure::unit`] as sentences and tables have it.
+    pub fn unit_text(&self) -> &'static str {
+        match self.unit {
+            "lsb" => "LSB",
+            other => other,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::FirmwareErrors;
@@ -199,14 +209,14 @@ mod tests {
                 heldout_rms: Some(firmware),
                 heldout_max_abs: Some(1.0),
             };
-            errors.unless_useless(none, model, "lsb").err()
+            errors.unless_useless(none, model, "LSB").err()
         };
         let worse = told(0.35, 0.035, 0.5).unwrap();
         for part in [
             "worse than none",
-            "0.3500 lsb before",
-            "0.0350 lsb in the model",
-            "0.5000 lsb in firmware",
+            "0.3500 LSB before",
+            "0.0350 LSB in the model",
+            "0.5000 LSB in firmware",
         ] {
             assert!(worse.contains(part), "{worse}");
         }
@@ -220,6 +230,6 @@ mod tests {
         // Little beside the noise is a gain all the same.
         assert_eq!(told(1.01, 1.0, 1.002), None);
         let nothing = FirmwareErrors::default();
-        assert_eq!(nothing.unless_useless(1.0, 0.1, "lsb"), Ok(nothing));
+        assert_eq!(nothing.unless_useless(1.0, 0.1, "LSB"), Ok(nothing));
     }
 }

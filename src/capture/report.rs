@@ -413,7 +413,7 @@ fn firmware_errors(
     let without = firmware::corrected(capture, last, all, &effects, &none);
     let without = without.heldout_rms.unwrap_or(f64::NAN);
     firmware
-        .unless_useless(without, after.heldout_rms, "lsb")
+        .unless_useless(without, after.heldout_rms, "LSB")
         .unwrap_or_else(|told| {
             warnings.push(Warning::general("firmware_useless", told));
             FirmwareErrors::default()

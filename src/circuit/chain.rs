@@ -2,7 +2,7 @@
 
 use super::CHANNELS;
 use super::amplitude_loop::{AmplitudeLoop, AmplitudeLoopState};
-use super::compensation::{Bias, Rate};
+use super::compensation::{Bias, Rate, in_dps};
 use super::cordic::Vectoring;
 use super::decimator::{Cic, CicState, Decimate, Integrate};
 use super::demodulator::Mixer;
@@ -380,11 +380,9 @@ fn meanings(circuit: &Circuit, compensation: Option<&Compensation>) -> Vec<Port>
     let absent = Port::new("", "");
     match compensation {
         Some(c) => {
-            ports.push(Port::new("bias", format!("bias in deg/s, {}", c.output)));
-            ports.push(Port::new(
-                "rate",
-                format!("compensated rate in deg/s, {}", c.output),
-            ));
+            let shown = |what| in_dps(what, 0, c.output.format, &c.output);
+            ports.push(Port::new("bias", shown("bias")));
+            ports.push(Port::new("rate", shown("compensated rate")));
         }
         None => ports.extend([absent.clone(), absent.clone()]),
     }

@@ -10,7 +10,9 @@ use crate::approx::form::Form;
 use crate::design::{Circuit, Compensation, CompensationInput, Outside};
 use crate::numeric::arithmetic::{Arithmetic, Block, Port};
 use crate::numeric::cast::{Cast, Label, Target};
+use crate::numeric::format::Format;
 use crate::numeric::trace::ir::Interval;
+use std::fmt::Display;
 
 const ACCUMULATOR: Label = Label::of("compensation.accumulator");
 const OUTPUT: Label = Label::of("compensation.output");
@@ -102,7 +104,10 @@ impl Bias {
                         fraction_bits,
                         channel.offset_raw,
                         fraction_bits - channel.scale_bits as i32,
-                        format!("{}, {}", channel.column, channel.format),
+                        format!(
+                            "{} = raw * 2^-{fraction_bits}, {}",
+                            channel.column, channel.format
+                        ),
                     )
                 }
             };
@@ -120,7 +125,10 @@ impl Bias {
             offset,
             read_exponent,
             evaluation,
-            meanings: [meaning, format!("bias in deg/s, {}", compensation.output)],
+            meanings: [
+                meaning,
+                in_dps("bias", 0, compensation.output.format, &compensation.output),
+            ],
         }
     }
 }
@@ -298,6 +306,12 @@ fn by_form<A: Arithmetic>(ar: &A, form: &Form, p: A::Word) -> A::Word {
     bias
 }
 
+/// What a word is in deg/s: full scale is 2^`exponent` deg/s.
+pub(super) fn in_dps(what: &str, exponent: i32, format: Format, shown: &dyn Display) -> String {
+    let exponent = exponent - format.fraction_bits as i32;
+    format!("{what} = raw * 2^{exponent} deg/s, {shown}")
+}
+
 /// The subtraction's configuration.
 #[derive(Debug, Clone)]
 pub struct Rate {
@@ -333,12 +347,14 @@ impl Rate {
             ),
             output: Cast::to(OUTPUT, fraction_bits, 0, output),
             meanings: [
-                format!(
-                    "{what}, {format}, full scale {} deg/s",
-                    compensation.rate_full_scale_dps
+                in_dps(
+                    what,
+                    compensation.rate_full_scale_exponent(),
+                    format,
+                    &format,
                 ),
-                format!("bias in deg/s, {output}"),
-                format!("compensated rate in deg/s, {output}"),
+                in_dps("bias", 0, output.format, &output),
+                in_dps("compensated rate", 0, output.format, &output),
             ],
         }
     }

@@ -33,7 +33,7 @@ pub struct Arguments {
     domain: String,
     /// Degree of the polynomial or of the segments; of a table 0 plain, 1 linear, 2
     /// quadratic. This or --bound is needed.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     degree: Option<usize>,
     /// Which powers of x the polynomial has; all if left out, and with --bound whatever is cheapest.
     #[arg(long, value_enum)]

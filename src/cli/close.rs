@@ -359,11 +359,14 @@ fn print(c: &Closure, compared: Option<&Emitted>, controls: Option<&Controls>, o
         "held-out rms {:.5} -> {:.5} {}, noise floor {:.5}",
         c.before.heldout_rms,
         c.after.heldout_rms,
-        c.unit,
+        c.unit_text(),
         c.noise_floor_rms
     );
     if let Some(rms) = c.firmware.heldout_rms {
-        say!("firmware, bit for bit: held-out rms {rms:.5} {}", c.unit);
+        say!(
+            "firmware, bit for bit: held-out rms {rms:.5} {}",
+            c.unit_text()
+        );
     } else if c.unit == "deg/s" {
         say!("firmware cannot carry this: the warnings say why");
     }

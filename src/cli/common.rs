@@ -34,7 +34,8 @@ fn refuse_record(path: &std::path::Path) -> Result<()> {
         ))
         .in_file(path)
         .help(format!(
-            "give it with --record {}, and a design (TOML, as `gyrogen init` writes one) or none",
+            "`gyrogen run --record {0}` fits it, `gyrogen close --record {0}` looks for causes; a design is a TOML file, as \
+             `gyrogen init` writes one",
             path.display()
         ))
         .into()),
@@ -98,9 +99,14 @@ pub(super) fn bundle(
     results: &mut Results,
     force: bool,
 ) -> Result<()> {
-    let in_the_way = replace::collect(files, folder, results, force)?;
-    if !in_the_way.is_empty() {
-        talk!("in the way: {}", replace::listed(&in_the_way));
+    let replaced = replace::collect(files, folder, results, force)?;
+    if !replaced.in_the_way.is_empty() {
+        let files = replace::listed(&replaced.in_the_way);
+        talk!("edited files were replaced, others left: {files}");
+    }
+    if replaced.gone > 0 {
+        let count = replaced.gone;
+        talk!("note: the bundle that was here is gone, {count} of its files removed");
     }
     Ok(())
 }

@@ -10,7 +10,7 @@ use crate::job;
 use crate::job::bound::Line;
 use crate::job::outcome::{Drift, Outcome};
 use crate::output::Results;
-use crate::text::at_most;
+use crate::text::{at_most, number};
 use crate::timing;
 use std::path::PathBuf;
 
@@ -64,6 +64,11 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let mut results = Results::claim(&arguments.out, &PLANNED, &recorded.inputs)?;
     if !arguments.force {
         crate::verify::firmware::refuse_edited(&arguments.out)?;
+    }
+    if arguments.record.is_none() && !design.record.columns.is_empty() {
+        talk!(
+            "warning: without --record the firmware is that of the design's simulated gyro, and [record.columns] is not used"
+        );
     }
     let languages = super::common::languages(arguments.lang)?;
     let outcome = job::run(
@@ -178,9 +183,9 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
         );
     }
     say!(
-        "calibrated for {:.6} .. {:.6} {}",
-        s.fit.range.0,
-        s.fit.range.1,
+        "calibrated for {} .. {} {}",
+        number(s.fit.range.0, 7),
+        number(s.fit.range.1, 7),
         s.fit.unit
     );
     say!(

@@ -20,7 +20,12 @@ pub struct Arguments {
     /// Design file (TOML); the embedded default if left out.
     design: Option<PathBuf>,
     /// Simulate every ADC sample of the first S seconds of the design's thermal run, instead of its averaged readings.
-    #[arg(long, value_name = "S", conflicts_with = "profile")]
+    #[arg(
+        long,
+        value_name = "S",
+        conflicts_with = "profile",
+        allow_negative_numbers = true
+    )]
     duration: Option<f64>,
     /// A chamber of your own over time, in place of the design's thermal run (CSV: time_s, chamber_degc, and where wanted
     /// rate_dps, supply_v, accel_g).
@@ -223,8 +228,8 @@ fn print_sentences(outcome: &Outcome) {
     );
     if let Some(lock) = &s.lock {
         say!(
-            "The phase loop is {}. Its mean phase is within {} rad of the setpoint, its frequency within {} Hz of the resonance, \
-             and that frequency moves by {:.2} ppm/K.",
+            "The phase loop is {}. Its mean phase is within {} rad of the setpoint, its frequency within {} Hz of the \
+             resonance.{}",
             if lock.locked {
                 "locked everywhere"
             } else {
@@ -232,7 +237,9 @@ fn print_sentences(outcome: &Outcome) {
             },
             number(lock.phase_error_rad, 3),
             number(lock.freq_error_hz, 3),
-            lock.tempco_ppm_per_k
+            lock.tempco_ppm_per_k.map_or(String::new(), |t| format!(
+                " The frequency moves by {t:.2} ppm/K."
+            ))
         );
     }
     let time = |t: Option<f64>| t.map_or("not seen".to_owned(), |t| format!("{:.0} ms", 1e3 * t));

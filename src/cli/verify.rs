@@ -144,10 +144,16 @@ fn refuse_no_bundle(folder: &Path) -> Result<()> {
 }
 
 fn print(v: &Verification) {
-    super::terminal::show(&super::comparison_table(&v.functions));
+    if !v.functions.is_empty() {
+        super::terminal::show(&super::comparison_table(&v.functions));
+    }
+    let is_whole = v.changed_files.is_empty() && v.problems.is_empty();
     let selftest = match v.selftest {
         Some(true) => "pass",
         Some(false) => "FAIL",
+        None if !is_whole => {
+            "not run: the files are not those of the bundle, and nothing was built"
+        }
         None => "none in a bundle of tables alone; its files were compared with the manifest",
     };
     say!("self-test: {selftest}");
@@ -172,5 +178,11 @@ fn reasons(v: &Verification) -> Vec<String> {
         reasons.push(format!("files differ from the manifest: {files}"));
     }
     reasons.extend(v.problems.iter().cloned());
+    if !v.changed_files.is_empty() || !v.problems.is_empty() {
+        reasons.push(
+            "restore the files, or emit the bundle again (`--force` replaces edited files)"
+                .to_owned(),
+        );
+    }
     reasons
 }

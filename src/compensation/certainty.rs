@@ -323,9 +323,12 @@ pub fn sentences(design: &Design, bounds: &Bounds) -> Vec<String> {
     }
     if let Some(outside) = &bounds.outside {
         lines.push(format!(
-            "Outside the calibrated inputs the contract is {}: there the bias is up to {} deg/s from the polynomial, \
-             continued to every input.",
-            outside.contract,
+            "Outside the calibrated inputs {}. At some input word the bias is then {} deg/s from the continued polynomial.",
+            match outside.contract {
+                "clamp" => "the bias keeps its value at the nearer end (clamp)".to_owned(),
+                "hold_slope" => "the bias goes on with the nearer end's slope (hold_slope)".to_owned(),
+                other => format!("the contract is {other}"),
+            },
             at_most(outside.worst_dps, 3)
         ));
     }

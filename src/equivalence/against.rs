@@ -122,7 +122,9 @@ fn comparable(design: &Design, other: &Design) -> Result<()> {
     let (a, b) = (&design.circuit, &other.circuit);
     let refuse = |key: &str, a: String, b: String| {
         let help = "compare designs that take the same codes and put out the same columns";
-        let message = format!("the designs cannot be compared: {key} is {a} here and {b} there");
+        let message = format!(
+            "the designs cannot be compared: {key} is {a} in the design and {b} in the other (--against)"
+        );
         Err(InputError::new(message).help(help).into())
     };
     if a.adc.format != b.adc.format {

@@ -46,7 +46,13 @@ impl Folder {
         let path = self.confined(name)?;
         let failed =
             |e: std::io::Error| io_error(self.named.join(name), "read the bundle's file", &e);
-        let file = std::fs::File::open(&path).map_err(failed)?;
+        let file = std::fs::File::open(&path).map_err(|e| match e.kind() {
+            std::io::ErrorKind::NotFound => InputError::new("the bundle lacks this file")
+                .in_file(self.named.join(name))
+                .help("emit the bundle again")
+                .into(),
+            _ => failed(e),
+        })?;
         let mut bytes = Vec::new();
         file.take(MOST_BYTES + 1)
             .read_to_end(&mut bytes)

@@ -94,14 +94,23 @@ pub fn refuse(files: &[EmittedFile], folder: &Path) -> Result<()> {
     if in_the_way.is_empty() {
         return Ok(());
     }
-    Err(InputError::new(format!("this folder is no unedited bundle: {}", listed(&in_the_way)))
+    let what = "files here were edited, or are none of the bundle";
+    Err(InputError::new(format!("{what}: {}. Nothing was written", listed(&in_the_way)))
         .in_file(folder)
         .help("name another folder, or `--force`: it overwrites edited files and leaves what is not of the bundle")
         .into())
 }
 
-/// Adds a bundle's files to the results, in `folder` below theirs and in the place of the bundle that is there. Gives
-/// what was in the way, where that was `forced`.
+/// What a bundle took the place of.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub struct Replaced {
+    /// What was in the way, where that was forced.
+    pub in_the_way: Vec<String>,
+    /// Files of the bundle that was there which the new one does not have.
+    pub gone: usize,
+}
+
+/// Adds a bundle's files to the results, in `folder` below theirs and in the place of the bundle that is there.
 ///
 /// # Errors
 /// As [`refuse`] unless `forced`; a link where a file goes; a folder that cannot be written.
@@ -110,7 +119,7 @@ pub fn collect(
     folder: &str,
     results: &mut Results,
     forced: bool,
-) -> Result<Vec<String>> {
+) -> Result<Replaced> {
     let path = results.folder().join(folder);
     if !forced {
         refuse(files, &path)?;
@@ -134,7 +143,8 @@ pub fn collect(
             .map(|file| (below.join(&file.path), file.text.as_bytes())),
     )?;
     let gone = |name: &&String| !files.iter().any(|f| f.path == **name);
-    for name in found.old.iter().filter(gone) {
+    let gone: Vec<&String> = found.old.iter().filter(gone).collect();
+    for name in &gone {
         results.remove(below.join(name));
     }
     // Of another bundle, which is gone.
@@ -143,7 +153,10 @@ pub fn collect(
             results.remove(below.join(name));
         }
     }
-    Ok(found.in_the_way(files))
+    Ok(Replaced {
+        in_the_way: found.in_the_way(files),
+        gone: gone.len(),
+    })
 }
 
 /// The first of some names, and how many more there are.
@@ -190,9 +203,9 @@ mod tests {
 
     fn write(files: &[EmittedFile], folder: &Path, forced: bool) -> Result<Vec<String>> {
         let mut results = Results::claim(folder, &[], &[])?;
-        let in_the_way = collect(files, "", &mut results, forced)?;
+        let replaced = collect(files, "", &mut results, forced)?;
         results.finish()?;
-        Ok(in_the_way)
+        Ok(replaced.in_the_way)
     }
 
     #[test]

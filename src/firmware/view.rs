@@ -5,7 +5,9 @@ use super::vectors::{self, Checked};
 use crate::design::Design;
 use crate::emit::bundle::Bundle;
 use crate::emit::machine::{Type, Width, parameter_type};
-use crate::emit::views::{self, FunctionView, Language, StateView, StructView, TableView};
+use crate::emit::views::{
+    self, ExampleView, FunctionView, Language, StateView, StructView, TableView,
+};
 use crate::emit::{c, rust};
 use crate::numeric::trace::ir::Interval;
 use crate::text::{self, Place};
@@ -81,6 +83,7 @@ pub struct View {
     /// Calls between restarts.
     pub(super) long_restart: u64,
     pub(super) long_checksum: String,
+    pub(super) example: Option<ExampleView>,
 }
 
 impl View {
@@ -162,6 +165,7 @@ impl View {
             long_steps: 0,
             long_restart: stimulus::SEGMENT,
             long_checksum: String::new(),
+            example: views::example(bundle, models, language),
             functions,
             tables,
         }
@@ -178,6 +182,7 @@ impl View {
         self.states.clear();
         self.structs.clear();
         self.functions.clear();
+        self.example = None;
         self.checks.clear();
         self.tests.clear();
         self.chain = false;

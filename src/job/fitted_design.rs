@@ -7,13 +7,20 @@ use crate::design::{BiasBound, Compensation, CompensationInput, Design, Outside}
 use crate::numeric::format::Quantizer;
 use std::fmt::Write as _;
 
+/// Stands above a compensation that was fitted.
+const FITTED: &str = "# Fitted; the calibrated range is clamp_raw.";
+
 /// The text of the user's design (or of the default) with its `[compensation]` replaced by the one
 /// that was fitted.
 pub fn text(design: &Design) -> String {
     let mut text = without(&design.source.text, "compensation");
     if let Some(c) = &design.compensation {
-        text = text.trim_end().to_owned();
-        text += "\n\n# Fitted; the calibrated range is clamp_raw.\n";
+        text = text
+            .trim_end()
+            .trim_end_matches(FITTED)
+            .trim_end()
+            .to_owned();
+        text += &format!("\n\n{FITTED}\n");
         text += &compensation(c, design.bound);
     }
     text

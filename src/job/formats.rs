@@ -91,7 +91,17 @@ pub fn fill(design: &mut Design, fit: &BaselineFit, record: &ThermalRecord) -> R
     // Rate and bias, and their difference, with a factor of two to spare.
     let wanted = design.bound.map_or(f64::INFINITY, |b| b.bound_dps);
     let step = (fit.noise_floor_rms_dps / 64.0).min(wanted / 4.0);
-    let output = no_finer_than(4.0 * greatest, step, 16..=WORD_BITS)?;
+    let own = 4.0 * greatest;
+    // A record at rest does not say how fast the gyro turns.
+    let applied = record.column("rate_dps").unwrap_or(&[]);
+    let is_at_rest = applied.iter().all(|v| v.is_nan() || *v == 0.0);
+    let gyros = design.thermal_run.sense_full_scale_dps;
+    let wide = no_finer_than(own.max(gyros), step, 16..=WORD_BITS)?;
+    let is_wide = is_at_rest && own < gyros && wide.lsb() <= step;
+    let output = match is_wide {
+        true => wide,
+        false => no_finer_than(own, step, 16..=WORD_BITS)?,
+    };
     let (input, mut said) = match fit.thermometer.as_str() {
         "phase_rad" => (CompensationInput::Phase, Vec::new()),
         "freq_hz" if design.circuit.phase_loop.is_some() => tuning_word(design, fit),
@@ -134,10 +144,16 @@ pub fn fill(design: &mut Design, fit: &BaselineFit, record: &ThermalRecord) -> R
     said.push(format!(
         "accumulator {accumulator}: holds all terms at once, {sum:.4} deg/s"
     ));
-    said.push(format!(
-        "output {output}: it holds four times the largest rate, {greatest:.4} deg/s, and its LSB is at most a 64th of the \
-         noise floor"
-    ));
+    said.push(match is_wide {
+        true => format!(
+            "output {output}: it holds the gyro's full scale, {gyros} deg/s (thermal_run.sense_full_scale_dps), since a \
+             record at rest does not say how fast the gyro turns; its LSB is at most a 64th of the noise floor"
+        ),
+        false => format!(
+            "output {output}: it holds four times the largest rate, {greatest:.4} deg/s, and its LSB is at most a 64th of \
+             the noise floor"
+        ),
+    });
     design.compensation = Some(compensation);
     Ok(said)
 }

@@ -24,11 +24,12 @@ pub mod word_lengths;
 
 use crate::compensation::certainty;
 use crate::design::Design;
+use crate::digest::sha256;
 use crate::emit::views::Language;
 use crate::error::Result;
 use crate::record::{self};
 use outcome::Outcome;
-pub use points::{Point, drift_pp, rms};
+pub use points::{Point, Points, drift_pp, rms};
 use reading::{clamped_bias, compensation, no_compensation, thermometer_raw, warning};
 use std::path::Path;
 use word_lengths::WordLengths;
@@ -83,13 +84,17 @@ pub fn run(
     let budget = budget::budget(&design, &fit, &certainty);
 
     say("emitting the firmware, building and comparing it");
-    let firmware = crate::verify::firmware::Firmware::make(&design, command, languages)?;
+    // What is emitted names the design that it can be emitted from again.
+    let mut stamped = design.clone();
+    stamped.source.sha256 = sha256(fitted_design::text(&design).as_bytes());
+    let firmware = crate::verify::firmware::Firmware::make(&stamped, command, languages)?;
     let compared = firmware.compare(&design)?;
 
     say("running the record through float, fixed and emitted code");
+    let understood = record_path.map(|_| record.understood());
     let points = match &simulated {
         Some(run) => run.points(&design, &fit, &firmware)?,
-        None => from_record::points(&design, &fit, &record, &firmware)?,
+        None => from_record::points(&design, &fit, record, &firmware)?,
     };
     let word_lengths = {
         let (fixed, float): (Vec<f64>, Vec<f64>) =
@@ -101,7 +106,7 @@ pub fn run(
         design,
         command: command.to_owned(),
         record_path: record_path.map(Path::to_path_buf),
-        understood: record_path.map(|_| record.understood()),
+        understood,
         record_csv,
         fit,
         warnings,

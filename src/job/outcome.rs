@@ -3,15 +3,16 @@
 use super::bound::Kept;
 use super::budget::Budget;
 use super::coefficients::Rounded;
-pub use super::points::Point;
+pub use super::points::{Point, Points};
 use super::word_lengths::WordLengths;
-use super::{drift_pp, rms};
+use super::{drift_pp, reading::warning, rms};
 use crate::compensation::certainty;
 use crate::compensation::certainty::Certainty;
 use crate::design::Design;
 use crate::digest::sha256;
 use crate::output::name_of;
 use crate::record::Warning;
+use crate::text::number;
 use crate::thermal::BaselineFit;
 use crate::verify::compare::Compared;
 use crate::verify::firmware::Firmware;
@@ -50,7 +51,7 @@ pub struct Parts {
     /// Against the model.
     pub compared: Vec<Compared>,
     /// Readings.
-    pub points: Vec<Point>,
+    pub points: Points,
     /// What the word lengths do to them.
     pub word_lengths: WordLengths,
 }
@@ -198,6 +199,9 @@ pub struct Outcome {
     pub parts: Parts,
 }
 
+/// Share of drift and of rms from which on what is left is all that there was (convention).
+const NO_GAIN: f64 = 0.95;
+
 impl Outcome {
     /// Draws the conclusions.
     pub fn new(parts: Parts) -> Self {
@@ -207,7 +211,7 @@ impl Outcome {
         };
         let before = drift(&|p| p.before_dps);
         let built = |of: fn(&Point) -> Option<f64>| {
-            let is_built = parts.points.iter().any(|p| of(p).is_some());
+            let is_built = parts.points.iter().any(|p| of(&p).is_some());
             is_built.then(|| drift(&|p| of(p).unwrap_or(f64::NAN)))
         };
         let (c, rust) = (built(|p| p.c_dps), built(|p| p.rust_dps));
@@ -225,6 +229,22 @@ impl Outcome {
         let points = &parts.points;
         let apart = points.iter().map(|p| (p.fixed_dps - p.float_dps).abs());
         let on_record = points.iter().filter(|p| p.differs()).count() as u64;
+        let gains_nothing = after.emitted.drift_pp_dps > NO_GAIN * before.drift_pp_dps
+            && after.emitted.rms_dps > NO_GAIN * before.rms_dps;
+        let is_measured = parts.record_path.is_some();
+        let no_gain = (is_measured && gains_nothing).then(|| {
+            let rates = || parts.points.iter().map(|p| p.before_dps);
+            let (low, high) = (rates().fold(f64::INFINITY, f64::min), rates().fold(f64::NEG_INFINITY, f64::max));
+            let said = format!(
+                "the compensation takes nothing off: the rate runs from {} to {} deg/s before it and is no smaller after it. \
+                 Either it does not follow {}, or the gyro was turned. Cut the rows in which it turned, or give the applied \
+                 rate as rate_dps",
+                number(low, 4),
+                number(high, 4),
+                parts.fit.thermometer
+            );
+            warning("no_gain", said)
+        });
         let compensation = parts.design.compensation.as_ref();
         let fit = &parts.fit;
         let summary = Summary {
@@ -281,7 +301,7 @@ impl Outcome {
                     })
                 })
                 .collect(),
-            warnings: parts.warnings.clone(),
+            warnings: parts.warnings.iter().cloned().chain(no_gain).collect(),
         };
         Outcome { summary, parts }
     }
@@ -305,7 +325,7 @@ impl Outcome {
                 ))
             })
             .collect();
-        for p in &self.parts.points {
+        for p in self.parts.points.iter() {
             if lines.is_empty() && p.differs() {
                 let [c, rust] = p.emitted(|dps| dps.to_string());
                 lines.push(format!(

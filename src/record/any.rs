@@ -101,11 +101,12 @@ pub fn is_a_record(bytes: &[u8]) -> Option<&'static str> {
     let mut lines = text.ok()?.lines().map(str::trim);
     let header = lines.find(|l| !l.is_empty() && !l.starts_with('#'))?;
     let row = lines.next()?;
-    let count = header.split(',').count();
-    let numbers = row
-        .split(',')
-        .filter(|c| c.trim().parse::<f64>().is_ok())
-        .count();
-    (count >= 2 && numbers >= 2 && row.split(',').count() == count && !header.contains('='))
+    let is_table = |separator: char| {
+        let count = header.split(separator).count();
+        let cells = || row.split(separator);
+        let numbers = cells().filter(|c| c.trim().parse::<f64>().is_ok()).count();
+        count >= 2 && numbers >= 2 && cells().count() == count
+    };
+    ([',', ';', '\t'].into_iter().any(is_table) && !header.contains('='))
         .then_some("a record (CSV)")
 }

@@ -7,7 +7,7 @@
 use super::columns;
 use super::temperature::temperature;
 use super::thermal::ThermalRecord;
-use super::warning::{Warning, unit_in_design};
+use super::warning::Warning;
 use super::{scale, timing};
 use crate::statistics::stats;
 use crate::text::number;
@@ -44,7 +44,7 @@ pub(super) struct Column<'a> {
     pub(super) name: &'a str,
     values: &'a [f64],
     sorted: Vec<f64>,
-    record: &'a ThermalRecord,
+    pub(super) record: &'a ThermalRecord,
 }
 
 impl Column<'_> {
@@ -88,7 +88,12 @@ fn phase(c: &Column<'_>) -> Option<Warning> {
     let steps = c.values.windows(2).map(|w| (w[1] - w[0]).abs());
     let wraps = steps.filter(|d| (*d - TAU).abs() < 0.25 * TAU).count();
     let span = c.quantile(0.95) - c.quantile(0.05);
-    let said = |unit: &str| format!("If it is, say so: {}", unit_in_design("phase_rad", unit));
+    let said = |unit: &str| {
+        format!(
+            "If it is, say so: {}",
+            c.record.unit_in_design("phase_rad", unit)
+        )
+    };
     if largest > TAU {
         return c.warn(
             "phase_in_degrees",
@@ -144,7 +149,7 @@ fn rate(c: &Column<'_>) -> Option<Warning> {
                  the gyro's scale first",
                 c.min(),
                 c.max(),
-                unit_in_design(name, "mdps")
+                c.record.unit_in_design(name, "mdps")
             ),
         )
     })
@@ -189,7 +194,7 @@ fn at_rest(c: &Column<'_>) -> Option<Warning> {
                  like mdeg/s or raw codes. If it is mdeg/s, say so: {}. Multiply raw codes by the gyro's scale first. If the \
                  gyro was turning, give the rate in rate_dps",
                 c.name,
-                unit_in_design(c.name, "mdps")
+                c.record.unit_in_design(c.name, "mdps")
             ),
         );
     }
@@ -216,7 +221,7 @@ fn at_rest(c: &Column<'_>) -> Option<Warning> {
             format!(
                 "{} {why}. It looks like rad/s. If it is, say so: {}",
                 c.name,
-                unit_in_design(c.name, "rad/s")
+                c.record.unit_in_design(c.name, "rad/s")
             ),
         );
     }
@@ -243,7 +248,7 @@ fn frequency(c: &Column<'_>) -> Option<Warning> {
                 "freq_hz is about {:.6}, and no gyro resonates so low. It looks like kHz, or like an offset from a reference. \
                  If it is kHz, say so: {}. Add the reference to an offset",
                 c.median(),
-                unit_in_design(c.name, "kHz")
+                c.record.unit_in_design(c.name, "kHz")
             ),
         )
     })
@@ -276,7 +281,7 @@ fn supply(c: &Column<'_>) -> Option<Warning> {
                  like mV. If they are, say so: {}",
                 c.min(),
                 c.max(),
-                unit_in_design(c.name, "mV")
+                c.record.unit_in_design(c.name, "mV")
             ),
         )
     })
@@ -294,7 +299,7 @@ fn acceleration(c: &Column<'_>) -> Option<Warning> {
             format!(
                 "accel_g is about 9.8 in {gravity} of {measured} rows and hardly ever more. It looks like gravity in m/s^2. If \
                  it is, say so: {}",
-                unit_in_design(c.name, "m/s^2")
+                c.record.unit_in_design(c.name, "m/s^2")
             ),
         );
     }

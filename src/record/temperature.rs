@@ -1,7 +1,7 @@
 //! Temperatures that are unlikely to be in degC: other units, raw codes.
 
 use super::plausibility::Column;
-use super::warning::{Warning, unit_in_design};
+use super::warning::Warning;
 
 /// Hotter than a gyro is, as a rule, degC: industrial parts end at 85, and heat themselves by some kelvin.
 const HOTTEST_DEGC: f64 = 105.0;
@@ -11,7 +11,7 @@ const HOTTEST_DEGC: f64 = 105.0;
 pub(super) fn temperature(c: &Column<'_>) -> Option<Warning> {
     let name = c.name;
     let range = format!("{:.2} to {:.2}", c.min(), c.max());
-    let said = |unit: &str| format!("If it is, say so: {}", unit_in_design(name, unit));
+    let said = |unit: &str| format!("If it is, say so: {}", c.record.unit_in_design(name, unit));
     if (200.0..=450.0).contains(&c.median()) && c.quantile(0.05) > 150.0 {
         return c.warn(
             "temperature_in_kelvin",

@@ -27,6 +27,12 @@ impl ThermalRecord {
         self.time_s.len()
     }
 
+    /// How a column's unit is said in the design, with the file's own name of the column.
+    pub(super) fn unit_in_design(&self, column: &str, unit: &str) -> String {
+        let named = self.renamed.get(column).map_or(column, String::as_str);
+        format!("[record.columns] {column} = {{ column = {named:?}, unit = \"{unit}\" }}")
+    }
+
     /// True without rows; [`super::read`] gives no such record.
     pub fn is_empty(&self) -> bool {
         self.time_s.is_empty()

@@ -1,7 +1,7 @@
 //! Is the clock of a record in seconds since its start?
 
 use super::thermal::ThermalRecord;
-use super::warning::{Warning, unit_in_design};
+use super::warning::Warning;
 use crate::statistics::stats;
 
 /// No die moves faster over 10 K, K/s: a chamber's ramp makes 0.2, power-on and hot air 0.5. Ramps
@@ -45,7 +45,7 @@ fn too_long(record: &ThermalRecord, lasts_s: f64) -> Option<Warning> {
                 "the record lasts {days:.1} days with {step} s between rows. It looks like {name}: the rows are {} s apart \
                  then. If it is, divide by {per_s}, or say so: {}",
                 step / per_s,
-                unit_in_design("time_s", unit)
+                record.unit_in_design("time_s", unit)
             ),
         )
     })
@@ -141,7 +141,7 @@ fn too_short(record: &ThermalRecord) -> Option<Warning> {
             format!(
                 "die_degc moves by {LEAST_MOVE_K} K and more at {fastest:.2} K/s, faster than a die can. time_s looks like \
                  minutes. If it is, say so: {}",
-                unit_in_design("time_s", "min")
+                record.unit_in_design("time_s", "min")
             ),
         )
     })

@@ -13,11 +13,6 @@ pub struct Warning {
     pub message: String,
 }
 
-/// How a column's unit is said in the design.
-pub(super) fn unit_in_design(column: &str, unit: &str) -> String {
-    format!("[record.columns] {column} = {{ column = \"{column}\", unit = \"{unit}\" }}")
-}
-
 impl Warning {
     /// A remark on one column.
     pub fn on(code: &'static str, column: &str, message: impl Into<String>) -> Self {

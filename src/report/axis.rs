@@ -64,7 +64,7 @@ pub struct Ticks {
     pub exponent: i32,
 }
 
-/// At most about `most` ticks.
+/// At most about `most` ticks, and two at least.
 pub fn ticks(interval: Interval, most: usize) -> Ticks {
     let span = interval.high - interval.low;
     let least = span / most.max(1) as f64 * (1.0 - 1e-9);
@@ -73,6 +73,16 @@ pub fn ticks(interval: Interval, most: usize) -> Ticks {
     let mut mantissa = *[1, 2, 5].iter().find(reaches).unwrap_or(&10);
     if mantissa == 10 {
         (mantissa, power) = (1, power + 1);
+    }
+    let count = |step: f64| (interval.high / step).floor() - (interval.low / step).ceil() + 1.0;
+    // One tick is no scale.
+    while count(mantissa as f64 * 10f64.powi(power)) < 2.0 {
+        (mantissa, power) = match mantissa {
+            1 => (5, power - 1),
+            5 => (25, power - 1),
+            25 => (2, power + 1),
+            _ => (1, power),
+        };
     }
     let step = mantissa as f64 * 10f64.powi(power);
     let size = interval.low.abs().max(interval.high.abs());

@@ -83,8 +83,8 @@ pub struct Lock {
     pub phase_error_rad: f64,
     /// Largest distance of the mean frequency from the drive's resonance, Hz.
     pub freq_error_hz: f64,
-    /// Least-squares slope of the frequency over the chamber's temperature, relative, ppm/K.
-    pub tempco_ppm_per_k: f64,
+    /// Least-squares slope of the frequency over the chamber's temperature, relative, ppm/K; none where that stands.
+    pub tempco_ppm_per_k: Option<f64>,
 }
 
 /// The fit.
@@ -167,7 +167,7 @@ impl Outcome {
             before_pp_dps: before.fixed.drift_pp_dps,
             after_pp_dps: after.map(|a| a.fixed.drift_pp_dps),
             scale_factor_swing: swing,
-            frequency_tempco_per_k: lock.map(|l| l.tempco_ppm_per_k * 1e-6),
+            frequency_tempco_per_k: lock.and_then(|l| l.tempco_ppm_per_k).map(|t| t * 1e-6),
         };
         let own_run = !parts.run.continuous && parts.run.profile.is_none();
         let paper = if own_run {
@@ -283,14 +283,14 @@ fn lock(design: &Design, taken: &[Taken]) -> Option<Lock> {
         cross += (degc(t) - mean_degc) * (t.fixed.freq_hz - mean_hz);
         square += (degc(t) - mean_degc).powi(2);
     }
-    let slope = if square > 0.0 { cross / square } else { 0.0 };
+    let slope = (square > 0.0).then(|| cross / square);
     // Where the electronics' phase reaches the loop, or the setpoint is no resonance, the frequency is
     // pulled by design.
     Some(Lock {
         locked: phase_error_rad < 0.1f64.to_radians(),
         phase_error_rad,
         freq_error_hz,
-        tempco_ppm_per_k: 1e6 * slope / design.gyro.drive_frequency_hz,
+        tempco_ppm_per_k: slope.map(|s| 1e6 * s / design.gyro.drive_frequency_hz),
     })
 }
 

@@ -126,7 +126,7 @@ fn over_time(view: &View, width: f64) -> Figure {
         frame.level("zero", 0.0);
         if let Some((_, class, left)) = parts.get(k) {
             let points = left.over_time.iter().map(|p| (p.0 * per_row, p.1));
-            frame.cloud(class, &points.collect::<Vec<_>>());
+            frame.cloud(class, points);
         }
         frame
     });
@@ -177,7 +177,10 @@ fn against_code(view: &View, width: f64) -> Figure {
             let left = series(view, c).into_iter();
             let dots: Vec<f64> = left.flat_map(|(_, l)| of(c, l)).map(|p| p.1).collect();
             let around = curves[c].iter().flat_map(|p| [p.1 - p.2, p.1 + p.2]);
-            let all = dots.into_iter().chain(around).chain([0.0]);
+            let noise = of(c, &view.after[c])
+                .into_iter()
+                .flat_map(|p| [-2.0 * p.2, 2.0 * p.2]);
+            let all = dots.into_iter().chain(around).chain(noise).chain([0.0]);
             axis(Interval::of(all).padded(0.1), "mean residual", "LSB")
         })
         .collect();
@@ -233,8 +236,9 @@ fn against_code(view: &View, width: f64) -> Figure {
     svg.figure("Residual against code",
         format!(
             "Mean of the residual in {CELLS} cells of the signal that the model puts in (not of the noisy code, which would bend the \
-             mean by itself): the integral nonlinearity where it is the same at all phases. The fitted bend's band counts all that \
-             was estimated with it.{counted}"
+             mean by itself): the integral nonlinearity where it is the same at all phases. Where the capture does not declare the \
+             tone's amplitude, the fitted amplitude takes up the straight part of a bend: the means show the bend without it. The \
+             fitted bend's band counts all that was estimated with it.{counted}"
         ),
     )
 }
@@ -254,9 +258,11 @@ fn histogram(view: &View, width: f64) -> Figure {
     let y: Vec<Axis> = (0..2)
         .map(|c: usize| {
             let h = &view.after[c].histogram;
-            let counted = per_code(&h.counted, h.width).into_iter();
+            let expected = series(view, c).into_iter().map(|(_, l)| &l.histogram);
+            let expected = expected.flat_map(|h| per_code(&h.expected, h.width));
+            let shown = per_code(&h.counted, h.width).into_iter().chain(expected);
             axis(
-                Interval::of(counted.chain([0.0])).padded(0.06),
+                Interval::of(shown.chain([0.0])).padded(0.06),
                 "rows",
                 "per code",
             )

@@ -143,7 +143,7 @@ pub fn html_beside(closed: &Closed, beside: &Beside<'_>, name: &str) -> Result<S
         "Output less applied rate and less the model. Held-out rows are whole stretches of time that no estimate has \
          seen. The noise floor, from differences of neighbouring rows, is {} {} rms. {}",
         tables::value(c.noise_floor_rms),
-        c.unit,
+        c.unit_text(),
         tables::firmware(c)
     );
     let own = Own {
@@ -177,7 +177,7 @@ pub fn page(c: &Closure, name: &str, own: Own) -> Result<String> {
             Verdict::PartlyExplained => ["note", "partly explained"],
             Verdict::Unexplained => ["bad", "unexplained"],
         },
-        unit: c.unit,
+        unit: c.unit_text(),
         errors: tables::errors(c),
         evidence: tables::evidence(c),
         weighed: weighed::figure(c),

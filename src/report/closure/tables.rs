@@ -95,7 +95,7 @@ pub fn headline(c: &Closure) -> String {
     } else {
         "rises"
     };
-    let unit = c.unit;
+    let unit = c.unit_text();
     let change = if before == after {
         format!("the held-out error stays at {after} {unit} rms")
     } else {
@@ -123,7 +123,7 @@ pub fn finding(view: &View) -> String {
     let mut out = format!(
         "The noise floor is {} {} rms.",
         value(c.noise_floor_rms),
-        c.unit
+        c.unit_text()
     );
     if !c.residual_structure.left && c.after.heldout_rms > SLOW * c.noise_floor_rms {
         let rows = view.after.iter().zip(&view.closed.split.heldout);

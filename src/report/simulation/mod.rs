@@ -174,10 +174,10 @@ fn facts(outcome: &Outcome) -> Vec<[String; 2]> {
             "mean frequency off the resonance, at most",
             format!("{} Hz", significant(lock.freq_error_hz, 2)),
         );
-        add(
-            "frequency against temperature",
-            format!("{} ppm/K", significant(lock.tempco_ppm_per_k, 4)),
-        );
+        if let Some(tempco) = lock.tempco_ppm_per_k {
+            let text = format!("{} ppm/K", significant(tempco, 4));
+            add("frequency against temperature", text);
+        }
     }
     let time = |t: Option<f64>| {
         t.map_or("not seen".to_owned(), |t| {
