@@ -3,6 +3,7 @@
 //! [`OutputFile`] is one file, [`Results`] all those of a command; [`refuse_inputs`] keeps what a command reads, and
 //! [`standard`] is the standard output, whose failures are found at the end.
 
+mod known;
 mod results;
 mod same;
 pub mod standard;

@@ -4,7 +4,9 @@
 //! cannot be written. Files are collected in a temporary folder on the same disk; [`Results::finish`] moves them to their
 //! names. Until then nothing has changed, whatever fails or ends the process.
 
+use super::known::{self, Known};
 use super::{OutputFile, same, target, write_failed};
+use crate::digest::sha256;
 use crate::error::{Error, InputError, Result, io_error};
 use crate::leftovers::{TemporaryFolder, undisturbed};
 use std::fs;
@@ -26,6 +28,8 @@ pub struct Results {
     names: Vec<PathBuf>,
     /// Names of an earlier run's files that would contradict this one's.
     removed: Vec<PathBuf>,
+    /// What earlier commands have put there; none where results are not listed.
+    known: Option<Known>,
 }
 
 impl Results {
@@ -48,8 +52,10 @@ impl Results {
             same::refuse(&path, inputs)?;
             super::check_writable(&path)?;
         }
-        refuse_foreign(out, planned)?;
-        refuse_of_another(out, planned)?;
+        let known = known::are_listed(planned).then(|| Known::of(out));
+        if let Some(known) = &known {
+            known.refuse(out, planned)?;
+        }
         let staged = TemporaryFolder::new(&existing).map_err(|e| {
             let error = InputError::new(format!("cannot write into this folder: {e}"));
             error
@@ -70,6 +76,7 @@ impl Results {
             new,
             names: Vec::new(),
             removed: Vec::new(),
+            known,
         })
     }
 
@@ -132,14 +139,21 @@ impl Results {
         self.removed.push(name.as_ref().to_path_buf());
     }
 
-    /// Puts all files under their names, what tells of the others first: after an end in the middle the next run knows
-    /// them.
+    /// Puts all files under their names, and the list of them.
     ///
     /// # Errors
     /// A file that cannot be put there; then none is, but for a name that became unusable at this very moment.
     pub fn finish(mut self) -> Result<()> {
-        let is_told_by = |name: &PathBuf| RESULTS.iter().any(|r| name.as_os_str() == *r);
-        self.names.sort_by_key(|name| !is_told_by(name));
+        if let Some(known) = self.known.take() {
+            let digest = |name: &PathBuf| {
+                let bytes =
+                    fs::read(self.collected.join(name)).map_err(|e| write_failed(name, &e))?;
+                Ok((sha256(&bytes), name.clone()))
+            };
+            let written: Result<Vec<_>> = self.names.iter().map(digest).collect();
+            let list = known.after(&written?, &self.removed);
+            self.write(known::SUMS, list.as_bytes())?;
+        }
         if let Some((from, to)) = &self.new
             && to.symlink_metadata().is_err()
         {
@@ -187,64 +201,6 @@ impl Results {
             }
         }
         Ok(())
-    }
-}
-
-/// Files that tell that others beside them are results.
-const RESULTS: [&str; 6] = [
-    "summary.json",
-    "closure.json",
-    "simulate.json",
-    "equiv.json",
-    "selftest.json",
-    "approx.json",
-];
-
-/// Refuses to write over a design or a table that no earlier run has put there: a folder of the user's own files has such
-/// names as well.
-fn refuse_foreign(out: &Path, planned: &[&str]) -> Result<()> {
-    if !planned.iter().any(|name| RESULTS.contains(name))
-        || RESULTS.iter().any(|r| out.join(r).is_file())
-    {
-        return Ok(());
-    }
-    let is_likely = |name: &&&str| name.ends_with(".toml") || name.ends_with(".csv");
-    let foreign = planned.iter().filter(is_likely).map(|name| out.join(name));
-    match foreign.into_iter().find(|path| path.is_file()) {
-        None => Ok(()),
-        Some(path) => Err(InputError::new("this file would be written over, and it is no result of an earlier run: nothing beside it says so")
-            .in_file(path)
-            .help("move it away, or give another place with --out")
-            .into()),
-    }
-}
-
-/// The wall times of the last command, whichever it was.
-const WALL_TIMES: &str = "timing.json";
-
-/// Refuses to write over what another command has put there: `simulate` and `close` both have a `report.html`. Where this
-/// command's own results are there as well, files of such names are taken for its own.
-fn refuse_of_another(out: &Path, planned: &[&str]) -> Result<()> {
-    let is_there = |name: &&&str| out.join(name).is_file();
-    let mut own = planned
-        .iter()
-        .filter(|name| RESULTS.contains(name))
-        .peekable();
-    if own.peek().is_none() || own.any(|name| is_there(&name)) {
-        return Ok(());
-    }
-    let Some(other) = RESULTS.iter().find(is_there) else {
-        return Ok(());
-    };
-    let mut shared = planned.iter().filter(|name| **name != WALL_TIMES);
-    match shared.find(is_there) {
-        None => Ok(()),
-        Some(name) => Err(InputError::new(format!(
-            "this file would be written over, and it belongs to the results of another command: {other} lies beside it"
-        ))
-        .in_file(out.join(name))
-        .help("give these results a folder of their own with --out")
-        .into()),
     }
 }
 

@@ -142,11 +142,37 @@ fn a_users_own_design_is_not_taken_for_an_earlier_result() {
         error.to_string().contains("no result of an earlier run"),
         "{error}"
     );
-    // Beside the command's own result it is one; beside another's it belongs to that.
-    fs::write(top.path().join("closure.json"), "{}").unwrap();
+    // A report and a list of sums may be the user's as well.
+    fs::remove_file(top.path().join("design.toml")).unwrap();
+    fs::write(top.path().join("SHA256SUMS"), "0  holiday.jpg\n").unwrap();
     assert!(Results::claim(top.path(), &planned, &[]).is_err());
-    fs::write(top.path().join("summary.json"), "{}").unwrap();
-    assert!(Results::claim(top.path(), &planned, &[]).is_ok());
+    assert_eq!(
+        fs::read(top.path().join("SHA256SUMS")).unwrap(),
+        b"0  holiday.jpg\n"
+    );
+}
+
+#[test]
+fn a_result_that_was_edited_is_not_written_over() {
+    let top = tempfile::tempdir().unwrap();
+    let planned = ["summary.json", "design.toml", "timing.json"];
+    let write = || {
+        let mut results = Results::claim(top.path(), &planned, &[])?;
+        for name in planned {
+            results.write(name, name.as_bytes())?;
+        }
+        results.finish()
+    };
+    write().unwrap();
+    // Wall times are no result.
+    fs::write(top.path().join("timing.json"), "other").unwrap();
+    write().unwrap();
+    let sums = fs::read_to_string(top.path().join("SHA256SUMS")).unwrap();
+    assert!(sums.contains("  summary.json\n") && !sums.contains("timing.json"));
+    fs::write(top.path().join("design.toml"), "mine").unwrap();
+    let told = write().unwrap_err().to_string();
+    assert!(told.contains("edited since it was written"), "{told}");
+    assert_eq!(fs::read(top.path().join("design.toml")).unwrap(), b"mine");
 }
 
 #[test]
