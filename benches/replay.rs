@@ -2,30 +2,25 @@
 //! that does the same file work, in the same run.
 //!
 //! All take turns, and the fastest run of each counts, by wall time.
-//! All have to write the same bytes. Nothing is asserted of times.
+//! All have to write the same bytes: what the checksum is of. Nothing is asserted of times.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
-/// The tuning word of `opponents/chain.toml`.
-const TUNING_WORD: &str = "33554432";
+mod common;
+use common::Contestant;
 
-struct Contestant {
-    name: String,
+struct Run {
     program: PathBuf,
     arguments: Vec<String>,
-    seconds: f64,
+    /// The file that it writes.
+    written: String,
 }
 
 fn main() {
-    let numbers: Vec<u64> = std::env::args()
-        .skip(1)
-        .filter_map(|a| a.parse().ok())
-        .collect();
-    let samples = numbers.first().copied().unwrap_or(1 << 26) / 64 * 64;
-    let rounds = numbers.get(1).copied().unwrap_or(5);
-    let here = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/opponents");
+    let [samples, rounds] = common::numbers([1 << 26, 5]);
+    let samples = samples / 64 * 64;
     let folder = tempfile::tempdir().expect("a folder");
     let file = |name: &str| folder.path().join(name);
     let text = |path: PathBuf| path.to_string_lossy().into_owned();
@@ -34,84 +29,62 @@ fn main() {
         text(file("own.npy")),
         text(file("other.npy")),
     );
-    let mut contestants = vec![Contestant {
-        name: "gyrogen replay".into(),
-        program: env!("CARGO_BIN_EXE_gyrogen").into(),
-        arguments: [
-            "replay",
-            &text(here.join("chain.toml")),
-            "--capture",
-            &capture,
-            "--out",
-            &own,
-        ]
-        .map(String::from)
-        .to_vec(),
-        seconds: f64::INFINITY,
-    }];
-    for compiler in ["gcc", "clang", "clang-19"] {
-        let program = file(compiler);
-        let built = Command::new(compiler)
-            .args(["-O3", "-march=native"])
-            .arg(here.join("replay.c"))
-            .arg("-o")
-            .arg(&program)
-            .arg("-lm")
-            .status();
-        if !built.is_ok_and(|status| status.success()) {
-            continue;
-        }
+    let design = text(common::opponents().join("chain.toml"));
+    let run = |program: PathBuf, arguments: &[&str]| Run {
+        program,
+        arguments: arguments.iter().map(|a| (*a).to_owned()).collect(),
+        written: arguments
+            .last()
+            .map_or_else(String::new, |a| (*a).to_owned()),
+    };
+    let own_arguments = ["replay", &design, "--capture", &capture, "--out", &own];
+    let ours = run(env!("CARGO_BIN_EXE_gyrogen").into(), &own_arguments);
+    let mut contestants = vec![Contestant::new("gyrogen replay".into(), false, ours)];
+    let word = common::COHERENT_WORD.to_string();
+    let built = common::built(folder.path(), "replay.c", &[]);
+    for built in &built {
         for way in ["serial", "block"] {
-            contestants.push(Contestant {
-                name: format!("C {way}, {compiler} native"),
-                program: program.clone(),
-                arguments: [way, TUNING_WORD, &capture, &other]
-                    .map(String::from)
-                    .to_vec(),
-                seconds: f64::INFINITY,
-            });
+            let arguments = [way, &word, &capture, &other];
+            let run = run(built.program.clone(), &arguments);
+            let name = format!("C {way}, {}", built.name);
+            contestants.push(Contestant::new(name, true, run));
         }
     }
-    let Some(maker) = contestants.get(1).map(|c| c.program.clone()) else {
+    let Some(maker) = built.first() else {
         println!("no C compiler is here");
         return;
     };
-    run(
-        &maker,
-        &["make".into(), samples.to_string(), capture.clone()],
-    );
-    for _ in 0..rounds {
-        for contestant in &mut contestants {
-            let start = Instant::now();
-            run(&contestant.program, &contestant.arguments);
-            contestant.seconds = contestant.seconds.min(start.elapsed().as_secs_f64());
-        }
-    }
-    let of_c = contestants.iter().skip(1).map(|c| c.seconds);
-    let best = of_c.fold(f64::INFINITY, f64::min);
-    println!("{samples} samples, NPY to NPY");
-    for c in &contestants {
-        println!(
-            "  {:<28} {:>8.1} M samples/s   {:>5.2} of the best C",
-            c.name,
-            samples as f64 / c.seconds / 1e6,
-            best / c.seconds,
-        );
-    }
-    let bytes = |path: &str| std::fs::read(path).expect("the rows");
-    let alike = if bytes(&own) == bytes(&other) {
-        "alike"
-    } else {
-        "NOT ALIKE"
-    };
-    println!("  bytes: {alike}");
+    done(&run(
+        maker.program.clone(),
+        &["make", &samples.to_string(), &capture],
+    ));
+    common::take_turns(&mut contestants, rounds, |run| {
+        let start = Instant::now();
+        done(run);
+        let seconds = start.elapsed().as_secs_f64();
+        (seconds, checksum(&run.written))
+    });
+    common::report("replay from NPY to NPY", samples, &contestants);
 }
 
-fn run(program: &Path, arguments: &[String]) {
-    let status = Command::new(program)
-        .args(arguments)
+/// Of a file's bytes, in fours.
+fn checksum(path: &str) -> u64 {
+    let bytes = std::fs::read(path).expect("the rows");
+    let words = bytes.as_chunks::<4>().0.iter();
+    words.fold(common::NO_WORDS, |sum, word| {
+        common::with_word(sum, u32::from_le_bytes(*word))
+    })
+}
+
+fn done(run: &Run) {
+    let status = Command::new(&run.program)
+        .args(&run.arguments)
         .stderr(Stdio::null())
         .stdout(Stdio::null())
         .status();
-    assert!(status.is_ok_and(|s| s.success()), "{}", program.display());
+    assert!(
+        status.is_ok_and(|s| s.success()),
+        "{}",
+        run.program.display()
+    );
 }

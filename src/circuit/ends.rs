@@ -36,6 +36,10 @@ pub(super) trait Ends: Arithmetic {
     fn input(&self, lsb: f64, fraction_bits: i32, limits: [f64; 2]) -> Self::Word;
     /// A phase or step of a ring of `bits` in 2^-64 turn.
     fn turns(residue: Self::Residue, bits: u32) -> u64;
+    /// A residue as [`super::engine::Front`] holds it.
+    fn wide(residue: Self::Residue) -> i128;
+    /// The residue that it is of.
+    fn narrow(word: i128) -> Self::Residue;
     /// A drive gain, 0 to 1.
     fn gain(word: Self::Word, scale: &FloatScale) -> f64;
     /// The raw word of a row, in 64 bits; of no meaning without quantisation.
@@ -84,6 +88,14 @@ impl<W: HasKernel, R: Lane, const IDLE: bool> Ends for Fixed<W, R, IDLE> {
     }
     fn turns(residue: R, bits: u32) -> u64 {
         (residue.wide() as u64) << (64 - bits)
+    }
+    #[inline(always)]
+    fn wide(residue: R) -> i128 {
+        residue.wide()
+    }
+    #[inline(always)]
+    fn narrow(word: i128) -> R {
+        R::low(word)
     }
     fn gain(word: W, scale: &FloatScale) -> f64 {
         word.wide() as f64 * scale.gain_lsb
@@ -138,6 +150,12 @@ impl Ends for Float {
     fn turns(residue: i128, _bits: u32) -> u64 {
         // One turn is the whole 128-bit circle.
         (residue >> 64) as u64
+    }
+    fn wide(residue: i128) -> i128 {
+        residue
+    }
+    fn narrow(word: i128) -> i128 {
+        word
     }
     fn gain(word: f64, scale: &FloatScale) -> f64 {
         word * scale.gain_lsb

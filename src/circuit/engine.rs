@@ -54,6 +54,25 @@ pub trait Engine {
         sense_lsb: &[f64],
         rows: &mut Rows,
     ) -> Result<(), Box<Overflowed>>;
+    /// Processes codes at the sample rate alone, and appends what each complete period leaves there for circuits that
+    /// [`follow`](Engine::follow). No row is made and no loop acts.
+    ///
+    /// # Errors
+    /// As [`Engine::process`].
+    fn fronts(
+        &mut self,
+        drive: &[i32],
+        sense: &[i32],
+        fronts: &mut Vec<Front>,
+    ) -> Result<(), Box<Overflowed>>;
+    /// What the last complete period left at the sample rate.
+    fn front(&self) -> Front;
+    /// Takes what whole periods leave at the sample rate from another circuit that is alike up to there (see
+    /// [`super::ensemble`]), and appends their rows.
+    ///
+    /// # Errors
+    /// As [`Engine::process`].
+    fn follow(&mut self, fronts: &[Front], rows: &mut Rows) -> Result<(), Box<Overflowed>>;
     /// No rows, of the kind that this engine makes.
     fn no_rows(&self) -> Rows;
     /// What the circuit excites the drive with until the end of the next period.
@@ -61,6 +80,9 @@ pub trait Engine {
     /// Puts the loops at rest (see [`Chain::hold`]).
     fn hold(&mut self, held: Held);
 }
+
+/// What a period leaves at the sample rate: the last integrators by channel, all that the combs take.
+pub type Front = [i128; 4];
 
 /// The circuit's outputs to the drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -315,14 +337,14 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Runnin
         }
     }
 
-    /// Codes or inputs of any number of periods; `block` takes what is inside one.
+    /// Codes or inputs of any number of periods: `block` takes what is inside one, `end` comes after each.
     #[inline(always)]
     fn periods<T: Copy>(
         &mut self,
         drive: &[T],
         sense: &[T],
-        rows: &mut Rows,
         block: impl Fn(&mut Self, &[T], &[T]),
+        mut end: impl FnMut(&mut Self) -> Result<(), Box<Overflowed>>,
     ) -> Result<(), Box<Overflowed>> {
         let ratio = self.chain.cics[0].ratio as usize;
         let (mut drive, mut sense) = (drive, sense);
@@ -339,16 +361,23 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Runnin
             self.phase += count;
             if self.phase == ratio {
                 self.phase = 0;
-                self.end_of_period(rows);
-                if let Some(overflowed) = self.slow.stopped() {
-                    return Err(Box::new(overflowed));
-                }
+                end(self)?;
             }
         }
+        Ok(())
+    }
+
+    /// Appends the rows that wait.
+    fn put_waiting(&mut self, rows: &mut Rows) {
         if let (Some(batch), Rows::Integer(rows)) = (&mut self.batch, rows) {
             batch.put(&self.chain, rows);
         }
-        Ok(())
+    }
+
+    /// The row of a period whose samples are through.
+    fn row(&mut self, rows: &mut Rows) -> Result<(), Box<Overflowed>> {
+        self.end_of_period(rows);
+        self.slow.stopped().map_or(Ok(()), |o| Err(Box::new(o)))
     }
 
     fn end_of_period(&mut self, rows: &mut Rows) {
@@ -382,7 +411,38 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Engine
         sense: &[i32],
         rows: &mut Rows,
     ) -> Result<(), Box<Overflowed>> {
-        self.periods(drive, sense, rows, Self::codes)
+        self.periods(drive, sense, Self::codes, |running| running.row(rows))?;
+        self.put_waiting(rows);
+        Ok(())
+    }
+
+    fn fronts(
+        &mut self,
+        drive: &[i32],
+        sense: &[i32],
+        fronts: &mut Vec<Front>,
+    ) -> Result<(), Box<Overflowed>> {
+        self.periods(drive, sense, Self::codes, |running| {
+            fronts.push(running.front());
+            Ok(())
+        })
+    }
+
+    fn front(&self) -> Front {
+        let last = |k: usize| F::wide(self.fast_state.cics[k].integrators[N - 1]);
+        [last(0), last(1), last(2), last(3)]
+    }
+
+    fn follow(&mut self, fronts: &[Front], rows: &mut Rows) -> Result<(), Box<Overflowed>> {
+        for front in fronts {
+            for (cic, word) in self.fast_state.cics.iter_mut().zip(front) {
+                cic.integrators[N - 1] = F::narrow(*word);
+            }
+            self.samples += u64::from(self.chain.cics[0].ratio);
+            self.row(rows)?;
+        }
+        self.put_waiting(rows);
+        Ok(())
     }
 
     fn process_inputs(
@@ -394,7 +454,7 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Engine
         let fraction_bits = self.chain.code_fraction_bits;
         let range = self.chain.code_range;
         let limits = [range.low as f64, range.high as f64];
-        self.periods(drive_lsb, sense_lsb, rows, |running, drive, sense| {
+        let block = |running: &mut Self, drive: &[f64], sense: &[f64]| {
             let Running {
                 chain, fast_state, ..
             } = running;
@@ -405,7 +465,10 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Engine
                 }
                 _ => running.block(drive, sense, |ar, lsb| ar.input(lsb, fraction_bits, limits)),
             }
-        })
+        };
+        self.periods(drive_lsb, sense_lsb, block, |running| running.row(rows))?;
+        self.put_waiting(rows);
+        Ok(())
     }
 
     fn excitation(&self) -> Excitation {

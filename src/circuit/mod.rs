@@ -11,7 +11,8 @@
 //! ```
 //!
 //! [`chain`] wires the blocks; [`engine`] runs a chain in the arithmetic and the lanes that fit it,
-//! the sample rate by [`block_kernel`] where that applies, without quantisation by `float_kernel`.
+//! the sample rate by [`block_kernel`] where that applies, without quantisation by `float_kernel`; [`ensemble`] runs many designs
+//! over the same codes and does once what they share.
 //! The behaviour is that of `docs/manual.md`, step by step.
 
 pub mod amplitude_loop;
@@ -24,6 +25,7 @@ pub mod decimator;
 pub mod demodulator;
 mod ends;
 pub mod engine;
+pub mod ensemble;
 mod float_kernel;
 pub mod in_range;
 pub mod nco;

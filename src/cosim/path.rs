@@ -5,6 +5,7 @@ use super::rest::{self, Rest};
 use crate::circuit::engine::{self, ArithmeticKind, Engine, Rows};
 use crate::design::Design;
 use crate::error::{Error, Result};
+use crate::numeric::fixed::Overflowed;
 use crate::numeric::format::pow2;
 use crate::plant::Gyroscope;
 use crate::plant::converter::{Channel, Converter};
@@ -32,6 +33,8 @@ pub struct RealRow {
 /// A circuit in closed loop with a gyro. Both start at sample 0.
 pub struct Path {
     engine: Box<dyn Engine>,
+    /// Circuits that are alike in what is done at the sample rate and in how they excite the gyro.
+    others: Vec<Other>,
     kind: ArithmeticKind,
     /// The gyro.
     pub gyroscope: Gyroscope,
@@ -47,7 +50,16 @@ pub struct Path {
     noise: [Vec<f64>; 2],
     codes: [Vec<i32>; 2],
     rows: Rows,
+    /// What the last period's samples were taken under.
+    last_drive: Drive,
     sample: u64,
+}
+
+/// A circuit that takes its sample rate from another.
+struct Other {
+    engine: Box<dyn Engine>,
+    units: Units,
+    rows: Rows,
 }
 
 /// From a row's columns to physical units.
@@ -84,6 +96,38 @@ impl Units {
             rate_lsb_dps: unit(rate_lsb.unwrap_or(1.0), 1.0),
         }
     }
+
+    /// The row in physical units; `drive` is what its samples were taken under.
+    fn row(&self, rows: &Rows, drive: Drive) -> RealRow {
+        let mut row = [0.0; 9];
+        match rows {
+            Rows::Integer(words) => {
+                for (to, from) in row.iter_mut().zip(words.iter().take(self.columns)) {
+                    *to = real(*from);
+                }
+            }
+            Rows::Real(values) => {
+                for (to, from) in row.iter_mut().zip(values.iter().take(self.columns)) {
+                    *to = *from;
+                }
+            }
+        }
+        let [a, b, c, d, ..] = row;
+        RealRow {
+            channels: [a, b, c, d].map(|v| v * self.channel_lsb),
+            phase_rad: row[self.phase] * self.phase_lsb_rad,
+            magnitude: row[self.magnitude] * self.channel_lsb,
+            rate_dps: self.rate.map_or(f64::NAN, |k| row[k] * self.rate_lsb_dps),
+            freq_hz: drive.step as i64 as f64 * pow2(-64) * self.sample_rate_hz,
+            gain: drive.gain,
+        }
+    }
+}
+
+/// The nearest f64 of a word, most of which have at most 64 bits.
+#[inline]
+fn real(word: i128) -> f64 {
+    i64::try_from(word).map_or_else(|_| word as f64, |word| word as f64)
 }
 
 impl Path {
@@ -111,6 +155,7 @@ impl Path {
         Path {
             rows: engine.no_rows(),
             engine,
+            others: Vec::new(),
             kind,
             gyroscope: Gyroscope::new(&design.gyro, run, reference),
             converters: [Channel::Drive, Channel::Sense]
@@ -123,8 +168,30 @@ impl Path {
             sense_lsb: vec![0.0; ratio],
             noise: [vec![0.0; ratio], vec![0.0; ratio]],
             codes: [vec![0; ratio], vec![0; ratio]],
+            last_drive: Drive {
+                phase: 0,
+                step: 0,
+                gain: 0.0,
+            },
             sample: 0,
         }
+    }
+
+    /// Has another design's circuit make rows of the same run, before the first period: one that
+    /// [shares the closed loop](crate::circuit::ensemble::share_a_closed_loop) with this, around the same gyro.
+    pub fn share_with(&mut self, design: &Design) {
+        let engine = engine::engine(design, self.kind);
+        self.others.push(Other {
+            rows: engine.no_rows(),
+            engine,
+            units: Units::new(design, self.kind),
+        });
+    }
+
+    /// The rows of those circuits for the last period, in the order in which they came.
+    pub fn other_rows(&self) -> impl Iterator<Item = RealRow> {
+        let row = |o: &Other| o.units.row(&o.rows, self.last_drive);
+        self.others.iter().map(row)
     }
 
     /// Puts gyro, loops and decimator into the steady state under `conditions`: the loops are held at
@@ -142,13 +209,20 @@ impl Path {
         let rest = rest::rest(design, &self.gyroscope)?;
         let decimator = &design.circuit.decimator;
         for _ in 0..decimator.stages * decimator.differential_delay {
-            self.engine.hold(rest.held);
+            self.hold(rest);
             self.gyroscope.settle(self.drive());
             self.period(noise)?;
         }
-        self.engine.hold(rest.held);
+        self.hold(rest);
         self.gyroscope.settle(self.drive());
         Ok(rest)
+    }
+
+    fn hold(&mut self, rest: Rest) {
+        self.engine.hold(rest.held);
+        for other in &mut self.others {
+            other.engine.hold(rest.held);
+        }
     }
 
     /// Puts the gyro into the motion that the circuit as it starts excites; the loops act from there.
@@ -193,7 +267,7 @@ impl Path {
         );
         self.add_noise(noise);
         self.sample += self.drive_lsb.len() as u64;
-        self.clear_rows();
+        clear(&mut self.rows);
         match self.kind {
             ArithmeticKind::Float => {
                 self.engine
@@ -207,8 +281,17 @@ impl Path {
                 self.engine.process(d, s, &mut self.rows)
             }
         }
-        .map_err(|o| Error::Check(o.to_string()))?;
-        Ok(self.real_row(drive))
+        .map_err(stopped)?;
+        self.last_drive = drive;
+        if !self.others.is_empty() {
+            let front = [self.engine.front()];
+            for other in &mut self.others {
+                clear(&mut other.rows);
+                let followed = other.engine.follow(&front, &mut other.rows);
+                followed.map_err(stopped)?;
+            }
+        }
+        Ok(self.units.row(&self.rows, drive))
     }
 
     /// The codes of the last period, drive and sense (bit-accurate path only).
@@ -226,37 +309,15 @@ impl Path {
         drive_adc.front_end(&mut self.drive_lsb, drive_rms, drive_noise);
         sense_adc.front_end(&mut self.sense_lsb, sense_rms, sense_noise);
     }
+}
 
-    fn clear_rows(&mut self) {
-        match &mut self.rows {
-            Rows::Integer(words) => words.clear(),
-            Rows::Real(values) => values.clear(),
-        }
+fn clear(rows: &mut Rows) {
+    match rows {
+        Rows::Integer(words) => words.clear(),
+        Rows::Real(values) => values.clear(),
     }
+}
 
-    fn real_row(&self, drive: Drive) -> RealRow {
-        let u = &self.units;
-        let mut row = [0.0; 9];
-        match &self.rows {
-            Rows::Integer(words) => {
-                for (to, from) in row.iter_mut().zip(words.iter().take(u.columns)) {
-                    *to = *from as f64;
-                }
-            }
-            Rows::Real(values) => {
-                for (to, from) in row.iter_mut().zip(values.iter().take(u.columns)) {
-                    *to = *from;
-                }
-            }
-        }
-        let [a, b, c, d, ..] = row;
-        RealRow {
-            channels: [a, b, c, d].map(|v| v * u.channel_lsb),
-            phase_rad: row[u.phase] * u.phase_lsb_rad,
-            magnitude: row[u.magnitude] * u.channel_lsb,
-            rate_dps: u.rate.map_or(f64::NAN, |k| row[k] * u.rate_lsb_dps),
-            freq_hz: drive.step as i64 as f64 * pow2(-64) * u.sample_rate_hz,
-            gain: drive.gain,
-        }
-    }
+fn stopped(overflowed: Box<Overflowed>) -> Error {
+    Error::Check(overflowed.to_string())
 }

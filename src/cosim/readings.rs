@@ -8,7 +8,7 @@ use crate::circuit::engine::ArithmeticKind;
 use crate::design::Design;
 use crate::error::Result;
 use crate::parallel::in_parallel;
-use crate::plant::noise::Noise;
+use crate::plant::noise::{Noise, Pairs, Shared};
 use crate::plant::profile::{Profile, Reading};
 use serde::Serialize;
 
@@ -79,11 +79,13 @@ pub fn take(
 ) -> Result<Vec<Taken>> {
     let jobs: Vec<(&Reading, &Moment)> = readings.iter().zip(moments).collect();
     let taken = in_parallel(&jobs, options.threads, said, |(reading, moment)| {
+        let noise = Shared::new(Noise::new(design.thermal_run.seed, reading.index));
+        let by = |kind| mean_under(design, kind, moment, options.rows, &noise.walk());
         Ok(Taken {
             reading: **reading,
             moment: **moment,
-            fixed: mean(design, ArithmeticKind::Fixed, reading, moment, options.rows)?,
-            float: mean(design, ArithmeticKind::Float, reading, moment, options.rows)?,
+            fixed: by(ArithmeticKind::Fixed)?,
+            float: by(ArithmeticKind::Float)?,
         })
     });
     taken.into_iter().collect()
@@ -101,11 +103,21 @@ pub fn mean(
     rows: usize,
 ) -> Result<Mean> {
     let noise = Noise::new(design.thermal_run.seed, reading.index);
+    mean_under(design, kind, moment, rows, &noise)
+}
+
+fn mean_under(
+    design: &Design,
+    kind: ArithmeticKind,
+    moment: &Moment,
+    rows: usize,
+    noise: &impl Pairs,
+) -> Result<Mean> {
     let mut path = Path::new(design, kind);
-    path.warm_start(design, moment.conditions, &noise)?;
+    path.warm_start(design, moment.conditions, noise)?;
     let mut averager = Averager::new(design);
     for _ in 0..rows {
-        let row = path.period(&noise)?;
+        let row = path.period(noise)?;
         averager.add(&row, path.relative_gain(&row));
     }
     Ok(averager.mean())

@@ -5,7 +5,6 @@ use super::overflow::{self, Repair};
 use super::predicted;
 use super::{against, shrink};
 use crate::design::Design;
-use crate::emit::bundle::Bundle;
 use crate::emit::views::Language;
 use crate::error::Result;
 use crate::nodes::probe::Seen;
@@ -13,7 +12,7 @@ use crate::nodes::run;
 use crate::simulation::hunting::{Hunting, hunting};
 use crate::spectrum::{NcoSpurs, nco_spurs};
 use crate::verify::compare;
-use crate::verify::firmware::{Built, Firmware};
+use crate::verify::firmware::Firmware;
 
 /// Rows that are compared with emitted code; a decimator of small ratio makes as many rows as samples.
 const MOST_ROWS: usize = 1 << 20;
@@ -143,13 +142,7 @@ impl Beside {
         languages: &[Language],
     ) -> Result<Self> {
         let firmware = Firmware::make(design, command, languages)?;
-        let emitted = |language| {
-            let built = firmware.built(language);
-            built
-                .map(|built| compared(design, stimulus, built, &firmware.bundle))
-                .transpose()
-        };
-        let emitted = [emitted(Language::C)?, emitted(Language::Rust)?];
+        let emitted = compared(design, stimulus, &firmware)?;
         let mut notes = Vec::new();
         let loops = hunting(design).unwrap_or_else(|error| {
             notes.push(format!(
@@ -168,34 +161,38 @@ impl Beside {
 
     /// Does emitted code differ from the model on these codes?
     fn differs(&self, design: &Design, drive: &[i32], sense: &[i32]) -> bool {
-        self.firmware.all().iter().any(|b| {
-            let chain = compare::chain(design, b.language, &b.harness, drive, sense);
-            chain.is_ok_and(|c| c.mismatches > 0)
-        })
+        let chain = compare::chain(design, &self.firmware.drivers(), 1, drive, sense);
+        chain.is_ok_and(|all| all.iter().any(|c| c.mismatches > 0))
     }
 }
 
-/// Every table and function of a language, the chain on its own stimulus and on these codes.
+/// Every table and function, the chain on its own stimulus and on these codes: by C and Rust, where they were built.
 fn compared(
     design: &Design,
     stimulus: Stimulus,
-    built: &Built,
-    bundle: &Bundle,
-) -> Result<Emitted> {
+    firmware: &Firmware,
+) -> Result<[Option<Emitted>; 2]> {
     let limit = MOST_ROWS.saturating_mul(design.circuit.decimator.ratio as usize);
     let count = stimulus.drive.len().min(limit);
     let (drive, sense) = (
         stimulus.drive.get(..count).unwrap_or_default(),
         stimulus.sense.get(..count).unwrap_or_default(),
     );
-    let mut parts = compare::with_model(design, bundle, built.language, &built.harness)?;
+    let (bundle, drivers) = (&firmware.bundle, firmware.drivers());
+    // Beside the paired run, which has the other thread.
+    let mut parts = compare::with_model(design, bundle, &drivers, 1)?;
     if bundle.has_chain {
-        let harness = &built.harness;
-        let mut chain = compare::chain(design, built.language, harness, drive, sense)?;
-        chain.name = ON_STIMULUS.into();
-        parts.push(chain);
+        let chains = compare::chain(design, &drivers, 1, drive, sense)?;
+        for (parts, mut chain) in parts.iter_mut().zip(chains) {
+            chain.name = ON_STIMULUS.into();
+            parts.push(chain);
+        }
     }
-    Ok(Emitted::new(parts))
+    let mut emitted = [None, None];
+    for ((language, _), parts) in drivers.iter().zip(parts) {
+        emitted[usize::from(*language == Language::Rust)] = Some(Emitted::new(parts));
+    }
+    Ok(emitted)
 }
 
 /// Repairs overflow after overflow, running the design again after each, until nothing overflows.

@@ -13,7 +13,7 @@ use crate::emit::bundle::{Bundle, Part};
 use crate::emit::views::Language;
 use crate::error::{InputError, Result, io_error};
 use crate::vectors::chain;
-use crate::vectors::model;
+use crate::vectors::model::{self, Model};
 use askama::Template;
 use std::path::Path;
 
@@ -52,57 +52,129 @@ pub fn emit(
     language: Language,
     command: &str,
 ) -> Result<Vec<EmittedFile>> {
-    if part == Part::Compensation && design.compensation.is_none() {
-        return Err(InputError::new("the design has no [compensation] to emit")
-            .help("add a [compensation] table, or emit `--part chain`")
-            .into());
+    let emission = Emission::new(design, part, command)?;
+    let printed = emission.print(language)?;
+    Ok(emission.files(printed, &emission.vectors()))
+}
+
+/// A design's firmware before it is printed: what both languages share is made once.
+pub struct Emission<'a> {
+    design: &'a Design,
+    part: Part,
+    command: &'a str,
+    bundle: Bundle,
+    models: Vec<Model>,
+    /// Of each function over all its inputs.
+    every: Vec<Option<Checked>>,
+}
+
+/// The sources of one language.
+pub struct Printed {
+    language: Language,
+    view: View,
+    /// All that a build needs.
+    pub sources: Vec<EmittedFile>,
+}
+
+impl<'a> Emission<'a> {
+    /// Of a part of a design, for that command.
+    ///
+    /// # Errors
+    /// A design without what the part needs.
+    pub fn new(design: &'a Design, part: Part, command: &'a str) -> Result<Self> {
+        if part == Part::Compensation && design.compensation.is_none() {
+            return Err(InputError::new("the design has no [compensation] to emit")
+                .help("add a [compensation] table, or emit `--part chain`")
+                .into());
+        }
+        calibrated::refuse_flag_without_range(design)?;
+        let mut bundle = Bundle::new(design, part);
+        // Words so long that the polynomial cannot be enclosed have no such line.
+        if let Ok(Some(bounds)) = certainty::bounds(design) {
+            bundle.accuracy = certainty::sentences(design, &bounds);
+        }
+        let models = model::models(design, &bundle.program);
+        let every = match part {
+            Part::Tables => Vec::new(),
+            _ => models.iter().map(vectors::every_of).collect(),
+        };
+        Ok(Emission {
+            design,
+            part,
+            command,
+            bundle,
+            models,
+            every,
+        })
     }
-    calibrated::refuse_flag_without_range(design)?;
-    let mut bundle = Bundle::new(design, part);
-    // Words so long that the polynomial cannot be enclosed have no such line.
-    if let Ok(Some(bounds)) = certainty::bounds(design) {
-        bundle.accuracy = certainty::sentences(design, &bounds);
+
+    /// What begins every name.
+    pub fn prefix(&self) -> &str {
+        &self.bundle.prefix
     }
-    let models = model::models(design, &bundle.program);
-    let banner = manifest::banner(&design.source.sha256, command);
-    let facts = manifest::facts(design, &bundle);
-    let every: Vec<Option<Checked>> = match part {
-        Part::Tables => Vec::new(),
-        _ => models.iter().map(vectors::every_of).collect(),
-    };
-    let view = View::new(&bundle, &models, &every, language, banner, facts);
-    let view = match part {
-        Part::Tables => view.tables_alone(),
-        _ => view.with_chain(design, &bundle, language),
-    };
-    let mut files = sources(&view, part, language)?;
-    if part != Part::Tables {
-        files.extend(vectors::of_design(design, &bundle, &models));
+
+    /// Prints the sources in a language.
+    ///
+    /// # Errors
+    /// A template that cannot be filled.
+    pub fn print(&self, language: Language) -> Result<Printed> {
+        let (design, bundle) = (self.design, &self.bundle);
+        let banner = manifest::banner(&design.source.sha256, self.command);
+        let facts = manifest::facts(design, bundle);
+        let view = View::new(bundle, &self.models, &self.every, language, banner, facts);
+        let view = match self.part {
+            Part::Tables => view.tables_alone(),
+            _ => view.with_chain(design, bundle, language),
+        };
+        Ok(Printed {
+            sources: sources(&view, self.part, language)?,
+            language,
+            view,
+        })
     }
-    files.push(vectors::of_tables(&view.tables));
-    if part != Part::Tables {
-        files.push(sums(&files));
+
+    /// The vectors, which are those of every language; none of tables alone.
+    pub fn vectors(&self) -> Vec<EmittedFile> {
+        match self.part {
+            Part::Tables => Vec::new(),
+            _ => vectors::of_design(self.design, &self.bundle, &self.models),
+        }
     }
-    let header = Header {
-        design_sha256: &design.source.sha256,
-        command,
-        language,
-        part: match part {
-            Part::Chain if !bundle.has_chain => "compensation",
-            Part::Chain => "chain",
-            Part::Tables => "tables",
-            _ => "compensation",
-        },
-        has_code: part != Part::Tables,
-        columns: &chain::columns(design),
-    };
-    let mut manifest = Manifest::new(&header, &bundle, &view, &files);
-    manifest.calibrated = calibrated::Calibrated::of(design);
-    files.push(EmittedFile {
-        path: manifest::NAME.into(),
-        text: manifest.to_json(),
-    });
-    Ok(files)
+
+    /// All files of a language.
+    pub fn files(&self, printed: Printed, vectors: &[EmittedFile]) -> Vec<EmittedFile> {
+        let Printed {
+            language,
+            view,
+            sources: mut files,
+        } = printed;
+        let has_code = self.part != Part::Tables;
+        files.extend_from_slice(vectors);
+        files.push(vectors::of_tables(&view.tables));
+        if has_code {
+            files.push(sums(&files));
+        }
+        let header = Header {
+            design_sha256: &self.design.source.sha256,
+            command: self.command,
+            language,
+            part: match self.part {
+                Part::Chain if !self.bundle.has_chain => "compensation",
+                Part::Chain => "chain",
+                Part::Tables => "tables",
+                _ => "compensation",
+            },
+            has_code,
+            columns: &chain::columns(self.design),
+        };
+        let mut manifest = Manifest::new(&header, &self.bundle, &view, &files);
+        manifest.calibrated = calibrated::Calibrated::of(self.design);
+        files.push(EmittedFile {
+            path: manifest::NAME.into(),
+            text: manifest.to_json(),
+        });
+        files
+    }
 }
 
 /// The checksums of all files so far, for who has no gyrogen.

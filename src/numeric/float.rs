@@ -18,6 +18,30 @@ fn grid(ring: &Ring) -> f64 {
     pow2(127 - ring.reach)
 }
 
+/// The nearest integer, ties to even, of a value within [-2^127, 2^127): by its bits where it has no fraction.
+#[inline]
+fn nearest(value: f64) -> i128 {
+    const FRACTION_BITS: u32 = 52;
+    let bits = value.to_bits();
+    let exponent = (bits >> FRACTION_BITS) as i32 & 0x7ff;
+    let shift = exponent - 1023 - FRACTION_BITS as i32;
+    match shift {
+        ..0 => i128::from(value.round_ties_even() as i64),
+        0..76 => {
+            let mantissa = (bits & ((1 << FRACTION_BITS) - 1)) | (1 << FRACTION_BITS);
+            // Of -2^127 the magnitude does not fit, its negative does.
+            let magnitude = i128::from(mantissa).wrapping_shl(shift as u32);
+            if value.is_sign_negative() {
+                magnitude.wrapping_neg()
+            } else {
+                magnitude
+            }
+        }
+        // Not a number.
+        _ => 0,
+    }
+}
+
 impl Arithmetic for Float {
     type Word = f64;
     type Residue = i128;
@@ -72,7 +96,7 @@ impl Arithmetic for Float {
         let steps = a * grid(ring);
         let half = pow2(127);
         if (-half..half).contains(&steps) {
-            return steps.round_ties_even() as i128;
+            return nearest(steps);
         }
         let circle = pow2(128);
         let mut inside = steps % circle;
@@ -81,7 +105,7 @@ impl Arithmetic for Float {
         } else if inside < -half {
             inside += circle;
         }
-        inside.round_ties_even() as i128
+        nearest(inside)
     }
     fn residue_constant(&self, raw: i128, ring: &Ring) -> i128 {
         // One step of the ring is 2^-fraction_bits; exact wherever the grid is finer.

@@ -73,8 +73,15 @@ pub fn pow2(exponent: i32) -> f64 {
     match exponent {
         // Sign 0, the biased exponent, fraction 0.
         -1022..=1023 => f64::from_bits(((exponent + 1023) as u64) << 52),
-        _ => f64::powi(2.0, exponent),
+        _ => beyond_normal(exponent),
     }
+}
+
+/// By itself, because a power that is only sometimes needed is else made every time.
+#[cold]
+#[inline(never)]
+fn beyond_normal(exponent: i32) -> f64 {
+    f64::powi(2.0, exponent)
 }
 
 impl fmt::Display for Format {

@@ -107,6 +107,8 @@ pub struct Gyroscope {
     /// Steady state at the drive at hand.
     steady: Steady,
     drive: Drive,
+    /// Sine and cosine of a phase, 2^-64 turn: the last that was asked for.
+    carrier: (u64, (f64, f64)),
     /// Deviation from the steady state: x, u, y, v.
     deviation: [f64; 4],
 }
@@ -203,6 +205,7 @@ impl Gyroscope {
                 step: 0,
                 gain: 0.0,
             },
+            carrier: (0, turn::sin_cos(0)),
             deviation: [0.0; 4],
             device,
             reference,
@@ -268,7 +271,7 @@ impl Gyroscope {
 
     /// Stops all motion.
     pub fn stop(&mut self) {
-        let (sin, cos) = turn::sin_cos(self.drive.phase);
+        let (sin, cos) = self.carrier();
         self.deviation = self.steady.state.map(|p| -(p.re * sin + p.im * cos));
     }
 
@@ -284,7 +287,7 @@ impl Gyroscope {
         let rows = [self.steady.drive_row, self.steady.sense_row];
         let pieces = drive_lsb.chunks_mut(motion::PIECE);
         for (drive_lsb, sense_lsb) in pieces.zip(sense_lsb.chunks_mut(motion::PIECE)) {
-            let (sin, cos) = turn::sin_cos(self.drive.phase);
+            let (sin, cos) = self.carrier();
             // Re sin(theta + n step) + Im cos(theta + n step), by cosine and sine of n step.
             let carried = |p: &C| [p.re * sin + p.im * cos, p.re * cos - p.im * sin];
             let steady = self.steady.outputs.each_ref().map(carried);
@@ -303,12 +306,20 @@ impl Gyroscope {
         }
     }
 
+    /// Sine and cosine of the oscillator's phase at the sample before.
+    fn carrier(&mut self) -> (f64, f64) {
+        if self.carrier.0 != self.drive.phase {
+            self.carrier = (self.drive.phase, turn::sin_cos(self.drive.phase));
+        }
+        self.carrier.1
+    }
+
     /// Takes up the difference of two steady states, so that the motion is continuous.
     fn move_to(&mut self, drive: Drive) {
         let before = self.steady;
         self.drive = drive;
         self.steady = self.steady_at(drive);
-        let (sin, cos) = turn::sin_cos(drive.phase);
+        let (sin, cos) = self.carrier();
         for (k, w) in self.deviation.iter_mut().enumerate() {
             let change = before.state[k] - self.steady.state[k];
             *w += change.re * sin + change.im * cos;

@@ -11,6 +11,15 @@ use nalgebra::Matrix2;
 /// Samples that the tables reach over; a longer block is run in pieces.
 pub const PIECE: usize = 64;
 
+/// Samples that are made side by side.
+const WIDTH: usize = 8;
+
+/// Values of consecutive samples, as many as a piece has, in eights.
+type Values = [[f64; WIDTH]; PIECE / WIDTH];
+
+/// None yet.
+const NO_VALUES: Values = [[0.0; WIDTH]; PIECE / WIDTH];
+
 /// Both modes moved on by some time, for a state (x, u) of the drive and (y, v) of the sense mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Power {
@@ -103,12 +112,12 @@ pub struct Tables {
     made: usize,
     /// What the ADCs see after n samples: the drive's of x and u; the sense channel's of y and v, of x and u
     /// by the velocity, of x and u by the displacement.
-    outputs: [[f64; PIECE]; 8],
+    outputs: [Values; 8],
     /// What the excitation's phase advances by, 2^-64 turn, and for how many samples the next are made.
     carrier: (u64, usize),
     /// Sine and cosine of n steps.
-    sine: [f64; PIECE],
-    cosine: [f64; PIECE],
+    sine: Values,
+    cosine: Values,
 }
 
 impl Tables {
@@ -119,10 +128,10 @@ impl Tables {
             one,
             rows: [[0.0; 2]; 2],
             made: 0,
-            outputs: [[0.0; PIECE]; 8],
+            outputs: [NO_VALUES; 8],
             carrier: (0, 0),
-            sine: [0.0; PIECE],
-            cosine: [0.0; PIECE],
+            sine: NO_VALUES,
+            cosine: NO_VALUES,
         }
     }
 
@@ -157,16 +166,41 @@ impl Tables {
                     seen(&power.by_position, dy, dv),
                 ];
                 for (to, value) in self.outputs.iter_mut().zip(pairs.as_flattened()) {
-                    to[n] = *value;
+                    to.as_flattened_mut()[n] = *value;
                 }
             }
             (self.made, self.rows) = (samples, rows);
         }
         if self.carrier.0 != step || self.carrier.1 < samples {
-            let (sine, cosine) = (&mut self.sine[..samples], &mut self.cosine[..samples]);
+            let sine = &mut self.sine.as_flattened_mut()[..samples];
+            let cosine = &mut self.cosine.as_flattened_mut()[..samples];
             pulp::Arch::new().dispatch(Carrier { step, sine, cosine });
             self.carrier = (step, samples);
         }
+    }
+
+    /// What both ADCs see of eight samples: a place past [`PIECE`] has none.
+    #[inline(always)]
+    fn eight(
+        &self,
+        chunk: usize,
+        [drive, sense]: [[f64; 2]; 2],
+        [x, u, y, v, rx, ru, qx, qu]: [f64; 8],
+    ) -> ([f64; WIDTH], [f64; WIDTH]) {
+        let mut seen = ([0.0; WIDTH], [0.0; WIDTH]);
+        if chunk >= PIECE / WIDTH {
+            return seen;
+        }
+        let (sine, cosine) = (&self.sine[chunk], &self.cosine[chunk]);
+        let [a, b, c, d, e, f, g, h] = self.outputs.each_ref().map(|o| &o[chunk]);
+        for n in 0..WIDTH {
+            seen.0[n] = drive[0] * cosine[n] + drive[1] * sine[n] + (x * a[n] + u * b[n]);
+        }
+        for n in 0..WIDTH {
+            let free = (y * c[n] + v * d[n]) + (rx * e[n] + ru * f[n]) + (qx * g[n] + qu * h[n]);
+            seen.1[n] = sense[0] * cosine[n] + sense[1] * sine[n] + free;
+        }
+        seen
     }
 
     /// At most [`PIECE`] samples of what both ADCs see: `steady` are the amplitudes of cosine and sine of the
@@ -241,19 +275,16 @@ impl pulp::WithSimd for Piece<'_> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _simd: S) {
-        let samples = self.drive.len().min(self.sense.len()).min(PIECE);
-        let (drive, sense) = (&mut self.drive[..samples], &mut self.sense[..samples]);
-        let sine = &self.tables.sine[..samples];
-        let cosine = &self.tables.cosine[..samples];
-        let [a, b, c, d, e, f, g, h] = self.tables.outputs.each_ref().map(|o| &o[..samples]);
-        let [x, u, y, v, rx, ru, qx, qu] = self.weights;
-        let [[drive_cosine, drive_sine], [sense_cosine, sense_sine]] = self.steady;
-        for n in 0..samples {
-            drive[n] = drive_cosine * cosine[n] + drive_sine * sine[n] + (x * a[n] + u * b[n]);
+        let (drive, drive_rest) = self.drive.as_chunks_mut::<WIDTH>();
+        let (sense, sense_rest) = self.sense.as_chunks_mut::<WIDTH>();
+        let whole = drive.len();
+        for (chunk, (drive, sense)) in drive.iter_mut().zip(sense).enumerate() {
+            (*drive, *sense) = self.tables.eight(chunk, self.steady, self.weights);
         }
-        for n in 0..samples {
-            let free = (y * c[n] + v * d[n]) + (rx * e[n] + ru * f[n]) + (qx * g[n] + qu * h[n]);
-            sense[n] = sense_cosine * cosine[n] + sense_sine * sine[n] + free;
+        if !drive_rest.is_empty() {
+            let (drive, sense) = self.tables.eight(whole, self.steady, self.weights);
+            drive_rest.copy_from_slice(&drive[..drive_rest.len()]);
+            sense_rest.copy_from_slice(&sense[..sense_rest.len()]);
         }
     }
 }

@@ -9,6 +9,8 @@
 
 use crate::numeric::splitmix::{GOLDEN, mix};
 use crate::numeric::turn;
+use std::cell::RefCell;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// One stream of noise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -132,6 +134,94 @@ impl Pairs for Drawn {
     }
 }
 
+/// Pairs in a chunk of a [`Shared`] stream.
+const CHUNK: u64 = 1024;
+
+/// Chunks that a [`Shared`] stream keeps: who walks along it further apart than these draws for himself.
+const KEPT: u64 = 512;
+
+/// Pairs of consecutive indices from a multiple of [`CHUNK`] on: the firsts and the seconds.
+type Chunk = Arc<[[f64; CHUNK as usize]; 2]>;
+
+/// A chunk and its number, once there is one.
+type Slot = Option<(u64, Chunk)>;
+
+/// A stream that several circuits walk along at about the same pace, perhaps on threads of their own: its pairs
+/// are drawn once, in chunks, and kept for a while. They are a function of the index alone, so who draws
+/// them changes nothing.
+#[derive(Debug)]
+pub struct Shared {
+    noise: Noise,
+    /// A chunk and its number, at the number modulo [`KEPT`].
+    chunks: Box<[Mutex<Slot>]>,
+}
+
+impl Shared {
+    /// Of a stream; nothing is drawn yet.
+    pub fn new(noise: Noise) -> Self {
+        Shared {
+            noise,
+            chunks: (0..KEPT).map(|_| Mutex::default()).collect(),
+        }
+    }
+
+    /// Somebody who walks along it.
+    pub fn walk(&self) -> Walk<'_> {
+        Walk {
+            shared: self,
+            at_hand: RefCell::new(None),
+        }
+    }
+
+    fn chunk(&self, number: u64) -> Chunk {
+        let slot = &self.chunks[(number % KEPT) as usize];
+        // A panic elsewhere leaves a chunk that is whole or none.
+        let mut slot = slot.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((kept, chunk)) = &*slot
+            && *kept == number
+        {
+            return chunk.clone();
+        }
+        // Who reads the old chunk still keeps it; else its memory serves again.
+        let old = slot.take().map(|(_, chunk)| chunk);
+        let mut chunk = old.unwrap_or_else(|| Arc::new([[0.0; CHUNK as usize]; 2]));
+        let [firsts, seconds] = Arc::make_mut(&mut chunk);
+        let first = number.wrapping_mul(CHUNK);
+        self.noise.gaussian_pairs(first, [firsts, seconds]);
+        *slot = Some((number, chunk.clone()));
+        chunk
+    }
+}
+
+/// One who walks along a [`Shared`] stream.
+#[derive(Debug)]
+pub struct Walk<'a> {
+    shared: &'a Shared,
+    /// The last chunk that was read, and its number.
+    at_hand: RefCell<Slot>,
+}
+
+impl Pairs for Walk<'_> {
+    fn fill(&self, first: u64, [firsts, seconds]: [&mut [f64]; 2]) {
+        let mut at_hand = self.at_hand.borrow_mut();
+        let count = firsts.len().min(seconds.len());
+        let mut done = 0;
+        while done < count {
+            let index = first.wrapping_add(done as u64);
+            let (number, from) = (index / CHUNK, (index % CHUNK) as usize);
+            if at_hand.as_ref().is_none_or(|(n, _)| *n != number) {
+                *at_hand = Some((number, self.shared.chunk(number)));
+            }
+            let Some((_, chunk)) = &*at_hand else { return };
+            let length = (count - done).min(CHUNK as usize - from);
+            for (to, chunk) in [&mut *firsts, &mut *seconds].into_iter().zip(chunk.iter()) {
+                to[done..done + length].copy_from_slice(&chunk[from..from + length]);
+            }
+            done += length;
+        }
+    }
+}
+
 /// The quantile of the standard normal distribution at `p` in (0, 1): Wichura's PPND7, algorithm
 /// AS 241, Applied Statistics 37 (1988) 477. Rational functions for the middle 85 % and for two parts of the tails.
 #[inline(always)]
@@ -172,6 +262,25 @@ mod tests {
             for k in 0..count {
                 let pair = noise.gaussian_pair(first.wrapping_add(k as u64));
                 assert_eq!((a[k], b[k]), pair, "{first} + {k}");
+            }
+        }
+    }
+
+    #[test]
+    fn who_walks_along_a_shared_stream_sees_its_pairs() {
+        let noise = Noise::new(20_040_024, 4);
+        let shared = Shared::new(noise);
+        // One ahead of the other by more than is kept, and back.
+        let starts = [0u64, 5, 1000, CHUNK * (KEPT + 3) - 7, 1000, u64::MAX - 40];
+        let (one, other) = (shared.walk(), shared.walk());
+        for (k, first) in starts.into_iter().enumerate() {
+            let count = 33 + 1500 * (k % 2);
+            for walk in [&one, &other] {
+                let (mut a, mut b) = (vec![0.0; count], vec![0.0; count]);
+                walk.fill(first, [&mut a, &mut b]);
+                let (mut c, mut d) = (vec![1.0; count], vec![1.0; count]);
+                noise.fill(first, [&mut c, &mut d]);
+                assert_eq!((a, b), (c, d), "{first}");
             }
         }
     }

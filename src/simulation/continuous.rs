@@ -9,7 +9,7 @@ use crate::cosim::surroundings::{Moment, World};
 use crate::design::Design;
 use crate::error::{InputError, Result};
 use crate::parallel::both;
-use crate::plant::noise::Noise;
+use crate::plant::noise::{Noise, Shared, Walk};
 use crate::plant::profile::{Profile, Reading};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -45,16 +45,33 @@ pub fn run(design: &Design, seconds: f64, threads: usize, progress: Progress) ->
         let done = done.fetch_add(1, Ordering::Relaxed) + 1;
         progress("seconds of both paths", done, total);
     };
-    let path = |kind| one_path(design, kind, records, rows_per_record, &said);
+    let noise = Shared::new(Noise::new(design.thermal_run.seed, STREAM));
+    let course = |kind| Course::new(design, kind, rows_per_record, noise.walk());
     let (fixed, float) = if threads > 1 {
-        both(
-            || path(ArithmeticKind::Fixed),
-            || path(ArithmeticKind::Float),
-        )
+        let whole = |kind| {
+            let mut course = course(kind)?;
+            let record = |_| course.record().inspect(|_| said());
+            (0..records).map(record).collect::<Result<Vec<_>>>()
+        };
+        let (fixed, float) = both(
+            || whole(ArithmeticKind::Fixed),
+            || whole(ArithmeticKind::Float),
+        );
+        (fixed?, float?)
     } else {
-        (path(ArithmeticKind::Fixed), path(ArithmeticKind::Float))
+        // In turn, so that both see the noise while it is kept.
+        let mut courses = (
+            course(ArithmeticKind::Fixed)?,
+            course(ArithmeticKind::Float)?,
+        );
+        let mut means = (Vec::new(), Vec::new());
+        for _ in 0..records {
+            means.0.push(courses.0.record().inspect(|_| said())?);
+            means.1.push(courses.1.record().inspect(|_| said())?);
+        }
+        means
     };
-    let taken = fixed?.into_iter().zip(float?).enumerate();
+    let taken = fixed.into_iter().zip(float).enumerate();
     let taken = taken
         .map(|(k, ((moment, fixed), (_, float)))| Taken {
             reading: Reading {
@@ -75,45 +92,67 @@ pub fn run(design: &Design, seconds: f64, threads: usize, progress: Progress) ->
     })
 }
 
-/// The means of one path, each with the moment in the middle of it.
-fn one_path(
-    design: &Design,
-    kind: ArithmeticKind,
-    records: u64,
+/// One path on its way.
+struct Course<'a> {
+    design: &'a Design,
+    world: World,
+    path: Path,
+    noise: Walk<'a>,
+    /// What acts now.
+    moment: Moment,
+    /// Decimated samples so far.
+    row: u64,
+    /// Decimated samples of a record.
     rows_per_record: u64,
-    said: &(dyn Fn() + Sync),
-) -> Result<Vec<(Moment, Mean)>> {
-    let (profile, _) = Profile::of_run(&design.thermal_run, 0.0);
-    let mut world = World::new(design, profile);
-    let rate = rows_per_s(design);
-    let every = (rate / UPDATES_HZ).ceil() as u64;
-    let noise = Noise::new(design.thermal_run.seed, STREAM);
-    let mut path = Path::new(design, kind);
-    let mut moment = world.advance_to(0.0);
-    path.warm_start(design, moment.conditions, &noise)?;
-    let mut means = Vec::new();
-    let mut row = 0u64;
-    for _ in 0..records {
-        let mut averager = Averager::new(design);
-        let mut middle = moment;
-        for k in 0..rows_per_record {
+}
+
+impl<'a> Course<'a> {
+    /// Warm-started at the run's beginning.
+    fn new(
+        design: &'a Design,
+        kind: ArithmeticKind,
+        rows_per_record: u64,
+        noise: Walk<'a>,
+    ) -> Result<Self> {
+        let (profile, _) = Profile::of_run(&design.thermal_run, 0.0);
+        let mut world = World::new(design, profile);
+        let mut path = Path::new(design, kind);
+        let moment = world.advance_to(0.0);
+        path.warm_start(design, moment.conditions, &noise)?;
+        Ok(Course {
+            design,
+            world,
+            path,
+            noise,
+            moment,
+            row: 0,
+            rows_per_record,
+        })
+    }
+
+    /// The mean of the next record, with the moment in the middle of it.
+    fn record(&mut self) -> Result<(Moment, Mean)> {
+        let rate = rows_per_s(self.design);
+        let every = (rate / UPDATES_HZ).ceil() as u64;
+        let mut averager = Averager::new(self.design);
+        let mut middle = self.moment;
+        for k in 0..self.rows_per_record {
+            let row = self.row;
             if row.is_multiple_of(every) {
                 // What it is in the middle of the time that it stands for.
-                moment = world.advance_to((row + every / 2) as f64 / rate);
-                path.gyroscope.set(moment.conditions);
+                self.moment = self.world.advance_to((row + every / 2) as f64 / rate);
+                self.path.gyroscope.set(self.moment.conditions);
             }
-            if k == rows_per_record / 2 {
+            if k == self.rows_per_record / 2 {
                 middle = Moment {
                     time_s: row as f64 / rate,
-                    ..moment
+                    ..self.moment
                 };
             }
-            let real = path.period(&noise)?;
-            averager.add(&real, path.relative_gain(&real));
-            row += 1;
+            let real = self.path.period(&self.noise)?;
+            averager.add(&real, self.path.relative_gain(&real));
+            self.row += 1;
         }
-        means.push((middle, averager.mean()));
-        said();
+        Ok((middle, averager.mean()))
     }
-    Ok(means)
 }

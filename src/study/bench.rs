@@ -2,18 +2,20 @@
 
 use super::figures::{Figures, added, whole};
 use super::journal::Journal;
-use super::measure::{Output, run};
+use super::measure::{Output, run, run_together};
 use super::merit::Scale;
 use super::progress::{Progress, Step};
 use super::scenario::{Extent, Plan};
 use super::space::{Lengths, Space};
 use crate::circuit::engine::ArithmeticKind;
+use crate::circuit::ensemble::{groups, share_a_closed_loop};
 use crate::cost::price::Objective;
 use crate::cost::{self, Cost};
 use crate::design::Design;
 use crate::error::Result;
 use crate::parallel::in_parallel;
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// What a run of a design gave: `None` = there is no such design, or it cannot run.
 pub type Trial = Option<Figures>;
@@ -125,7 +127,7 @@ impl<'a> Bench<'a> {
                     at_most: self.expected.1,
                 });
             };
-            let trials = in_parallel(part, self.threads, &said, |l| self.trial(l));
+            let trials = self.trials_of(part, &said);
             self.new += part.len();
             if let Some(journal) = &mut self.journal {
                 journal.append(part, &trials)?;
@@ -135,11 +137,48 @@ impl<'a> Bench<'a> {
         Ok(())
     }
 
-    fn trial(&self, lengths: &Lengths) -> Trial {
-        let design = self.space.design(self.given, lengths).ok()?;
-        let design = design.without_stops();
-        let output = run(&design, ArithmeticKind::Fixed, &self.plan).ok()?;
-        Some(added(&self.plan, &output, &self.twin))
+    /// Designs that share their closed loop run together. `said` is told how many are done.
+    fn trials_of(&self, part: &[Lengths], said: &(dyn Fn(usize) + Sync)) -> Vec<Trial> {
+        let designs = in_parallel(part, self.threads, &|_| {}, |lengths| {
+            let design = self.space.design(self.given, lengths).ok()?;
+            Some(design.without_stops())
+        });
+        let alike = |a: &Option<Design>, b: &Option<Design>| match (a, b) {
+            (Some(a), Some(b)) => share_a_closed_loop(&a.circuit, &b.circuit),
+            _ => false,
+        };
+        let groups = groups(&designs, alike);
+        let done = AtomicUsize::new(0);
+        let trials = in_parallel(&groups, self.threads, &|_| {}, |group| {
+            let members = group.iter().filter_map(|k| designs.get(*k)?.as_ref());
+            let trials = self.trials_together(&members.collect::<Vec<_>>());
+            said(done.fetch_add(group.len(), Ordering::Relaxed) + group.len());
+            trials
+        });
+        let mut all = vec![None; part.len()];
+        for (group, trials) in groups.iter().zip(trials) {
+            for (k, trial) in group.iter().zip(trials) {
+                if let Some(to) = all.get_mut(*k) {
+                    *to = trial;
+                }
+            }
+        }
+        all
+    }
+
+    fn trials_together(&self, designs: &[&Design]) -> Vec<Trial> {
+        match run_together(designs, ArithmeticKind::Fixed, &self.plan) {
+            Ok(outputs) => {
+                let figures = |output| Some(added(&self.plan, output, &self.twin));
+                outputs.iter().map(figures).collect()
+            }
+            // Which of them it was is seen when each runs alone.
+            Err(_) if designs.len() > 1 => {
+                let alone = |design: &&Design| self.trials_together(&[*design]);
+                designs.iter().flat_map(alone).collect()
+            }
+            Err(_) => vec![None],
+        }
     }
 
     /// The figures of a design that has run.

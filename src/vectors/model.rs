@@ -11,7 +11,7 @@ use crate::numeric::arithmetic::Block;
 use crate::numeric::cast::Cast;
 use crate::numeric::fixed::Fixed;
 use crate::numeric::trace::ir::{Function, Interval, Program};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// A function of the model.
 pub struct Model {
@@ -29,6 +29,8 @@ pub struct Model {
     pub state: usize,
     /// True for each input and word of the state that takes two 64-bit words.
     wide: Vec<bool>,
+    /// The same of each output and word of the state, and of the fault: made when it is first asked for.
+    wide_outputs: OnceLock<Vec<bool>>,
     call: Box<Evaluate>,
     /// The function with one rounding constant off by one.
     damaged: Vec<Box<Evaluate>>,
@@ -103,6 +105,7 @@ impl Model {
                 .iter()
                 .map(|(_, range)| is_wide(range))
                 .collect(),
+            wide_outputs: OnceLock::new(),
             call: evaluate(block, narrow),
             damaged: Vec::new(),
             recorded: None,
@@ -155,6 +158,7 @@ impl Model {
             output_names,
             state: words.len(),
             wide,
+            wide_outputs: OnceLock::new(),
             call: Box::new(call),
             damaged: Vec::new(),
             recorded: Some((program.clone(), number)),
@@ -167,6 +171,7 @@ impl Model {
         let functions = &program.program().functions;
         let number = functions.iter().position(|f| f.name == self.name);
         self.recorded = number.map(|number| (program.clone(), number));
+        self.wide_outputs = OnceLock::new();
         self
     }
 
@@ -204,44 +209,41 @@ impl Model {
 
     /// The words of a record as 64-bit words, a wider one as its low and its high half.
     pub fn input_words(&self, inputs: &[i128]) -> Vec<i128> {
-        halves(inputs.iter().copied().zip(self.wide.iter().copied()))
+        halves(inputs, &self.wide)
     }
 
-    /// The same of outputs and state; the fault stays as it is.
-    pub fn output_words(&self, outputs: &[i128]) -> Vec<i128> {
-        halves(outputs.iter().copied().zip(self.wide_outputs()))
-    }
-
-    /// True for each output and word of the state that takes two 64-bit words.
-    fn wide_outputs(&self) -> Vec<bool> {
-        let plain = std::iter::repeat_n(false, self.outputs - self.state);
-        let inputs = self.inputs.len() - self.state;
-        let state = self.wide[inputs..].iter().copied();
-        let mut wide: Vec<bool> = plain.chain(state).collect();
-        if let Some((program, number)) = &self.recorded {
-            let function = &program.program().functions[*number];
-            let named = function
-                .outputs
-                .iter()
-                .filter(|(port, _)| !port.name.is_empty());
-            for (wide, (_, id)) in wide.iter_mut().zip(named) {
-                *wide = function.nodes[*id].range.bits() > 64;
+    /// True for each output and word of the state that takes two 64-bit words; the fault, which comes last, does not.
+    fn wide_outputs(&self) -> &[bool] {
+        self.wide_outputs.get_or_init(|| {
+            let plain = std::iter::repeat_n(false, self.outputs - self.state);
+            let inputs = self.inputs.len() - self.state;
+            let state = self.wide[inputs..].iter().copied();
+            let mut wide: Vec<bool> = plain.chain(state).collect();
+            if let Some((program, number)) = &self.recorded {
+                let function = &program.program().functions[*number];
+                let named = function
+                    .outputs
+                    .iter()
+                    .filter(|(port, _)| !port.name.is_empty());
+                for (wide, (_, id)) in wide.iter_mut().zip(named) {
+                    *wide = function.nodes[*id].range.bits() > 64;
+                }
             }
-        }
-        wide.push(false);
-        wide
+            wide.push(false);
+            wide
+        })
     }
 
     /// The columns of its vectors: inputs, outputs, fault, each of at most 64 bits; and how many are inputs.
     pub fn columns(&self) -> (Vec<String>, usize) {
-        let split = |names: &[String], wide: Vec<bool>| -> Vec<String> {
+        let split = |names: &[String], wide: &[bool]| -> Vec<String> {
             let columns = names.iter().zip(wide).flat_map(|(name, wide)| match wide {
                 true => vec![format!("{name}.low"), format!("{name}.high")],
                 false => vec![name.clone()],
             });
             columns.collect()
         };
-        let mut columns = split(&self.input_names, self.wide.clone());
+        let mut columns = split(&self.input_names, &self.wide);
         let inputs = columns.len();
         columns.extend(split(&self.output_names, self.wide_outputs()));
         columns.push("fault".to_owned());
@@ -252,7 +254,11 @@ impl Model {
     pub fn record(&self, input: &[i128]) -> Vec<i128> {
         let mut outputs = vec![0; self.outputs + 1];
         outputs[self.outputs] = i128::from(self.call(input, &mut outputs[..self.outputs]));
-        self.output_words(&outputs)
+        let wide = self.wide_outputs();
+        if !wide.contains(&true) {
+            return outputs;
+        }
+        halves(&outputs, wide)
     }
 
     /// The model with damaged copies of its block, each of which vectors have to tell from it.
@@ -276,12 +282,16 @@ fn is_wide(range: &Interval) -> bool {
     range.bits() > 64
 }
 
-fn halves(words: impl Iterator<Item = (i128, bool)>) -> Vec<i128> {
-    let split = words.flat_map(|(word, wide)| match wide {
-        true => vec![word & i128::from(u64::MAX), word >> 64],
-        false => vec![word],
-    });
-    split.collect()
+fn halves(words: &[i128], wide: &[bool]) -> Vec<i128> {
+    let mut all = Vec::with_capacity(2 * words.len());
+    for (word, wide) in words.iter().zip(wide) {
+        if *wide {
+            all.extend([word & i128::from(u64::MAX), word >> 64]);
+        } else {
+            all.push(*word);
+        }
+    }
+    all
 }
 
 /// On the way from `a` to `b`, one input after the other: the neighbours between which the fault

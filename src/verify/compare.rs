@@ -6,6 +6,7 @@ use crate::emit::bundle::Bundle;
 use crate::emit::views::{self, Language};
 use crate::error::Result;
 use crate::firmware::manifest::{EveryEntry, LongEntry};
+use crate::parallel::in_parallel;
 use crate::vectors::chain;
 use crate::vectors::model;
 use crate::vectors::model::Model;
@@ -40,31 +41,54 @@ pub struct Compared {
     pub first: Option<String>,
 }
 
-/// Compares everything that a bundle holds with the model of `design`.
+/// Compares everything that a bundle holds with the model of `design`, by the drivers of the languages that it was
+/// built in, on so many threads; one list a driver. What is due is made once for all.
 ///
 /// # Errors
 /// A test driver that cannot be run.
 pub fn with_model(
     design: &Design,
     bundle: &Bundle,
-    language: Language,
-    harness: &Harness,
-) -> Result<Vec<Compared>> {
-    let mut all = Vec::new();
-    for table in views::tables(bundle, language) {
-        all.push(self::table(language, harness, &table.name, &table.entries)?);
+    drivers: &[(Language, &Harness)],
+    threads: usize,
+) -> Result<Vec<Vec<Compared>>> {
+    let each = |compare: &Comparison| -> Result<Vec<Compared>> {
+        let compared = in_parallel(drivers, threads, &|_| {}, |(l, h)| compare(*l, h));
+        compared.into_iter().collect()
+    };
+    let mut all = vec![Vec::new(); drivers.len()];
+    for ((language, harness), all) in drivers.iter().zip(&mut all) {
+        for table in views::tables(bundle, *language) {
+            all.push(self::table(
+                *language,
+                harness,
+                &table.name,
+                &table.entries,
+            )?);
+        }
     }
+    let mut take = |compared: Vec<Compared>| {
+        for (all, one) in all.iter_mut().zip(compared) {
+            all.push(one);
+        }
+    };
     for model in model::models(design, &bundle.program) {
-        all.push(function(language, harness, &model)?);
+        let due = Due::of(&model);
+        take(each(&|language, harness| {
+            function(language, harness, &model, &due)
+        })?);
     }
     if bundle.has_chain {
         let ratio = bundle.ratio as usize;
         let samples = CHAIN_SAMPLES.div_ceil(ratio) * ratio;
         let (drive, sense) = stimulus::capture(design, samples, SEED + 2);
-        all.push(chain(design, language, harness, &drive, &sense)?);
+        take(chain(design, drivers, threads, &drive, &sense)?);
     }
     Ok(all)
 }
+
+/// A comparison by one driver.
+type Comparison<'a> = dyn Fn(Language, &Harness) -> Result<Compared> + Sync + 'a;
 
 /// The language's name in results.
 pub fn language_name(language: Language) -> &'static str {
@@ -152,63 +176,78 @@ pub fn table(
     Ok(tally.finish(expected.len() as u64))
 }
 
-/// Compares a function: exhaustively if it has one input of at most [`EXHAUSTIVE_BITS`] bits, else
-/// on corners and random words.
-///
-/// # Errors
-/// A test driver that cannot be run.
-pub fn function(language: Language, harness: &Harness, model: &Model) -> Result<Compared> {
-    if let [range] = model.inputs.as_slice()
-        && model.state == 0
-        && range.high - range.low < 1 << EXHAUSTIVE_BITS
-    {
-        let count = (range.high - range.low + 1) as u64;
-        let arguments = [
-            "range".to_owned(),
-            model.name.clone(),
-            range.low.to_string(),
-            count.to_string(),
-        ];
-        let mut tally = Tally::new(language, &model.name);
-        tally.outcome.exhaustive = true;
-        let mut input = range.low;
-        let mut outputs = vec![0; model.outputs];
-        let mut expected = Vec::new();
-        harness.run(
-            &arguments,
-            Vec::new(),
-            (model.outputs + 1, count),
-            &mut |words| {
-                let fault = i64::from(model.call(&[input], &mut outputs));
-                expected.clear();
-                expected.extend(outputs.iter().map(|word| *word as i64).chain([fault]));
-                tally.note(words, &expected, || format!("input {input}"));
-                input += 1;
-            },
-        )?;
-        return Ok(tally.finish(count));
+/// What a function has to give.
+enum Due {
+    /// At every input, which is called when it is compared: the first and their number.
+    Every(i128, u64),
+    /// At these inputs, each as 64-bit words: outputs, state and fault.
+    These(WordRows, WordRows),
+}
+
+impl Due {
+    /// All inputs of a function with one input of at most [`EXHAUSTIVE_BITS`] bits, else corners and random words.
+    fn of(model: &Model) -> Self {
+        if let [range] = model.inputs.as_slice()
+            && model.state == 0
+            && range.high - range.low < 1 << EXHAUSTIVE_BITS
+        {
+            return Due::Every(range.low, (range.high - range.low + 1) as u64);
+        }
+        let count = match model.state {
+            0 => RANDOM_INPUTS,
+            _ => RANDOM_STATES,
+        };
+        let (columns, given) = model.columns();
+        let mut inputs = WordRows::new(given);
+        let mut expected = WordRows::new(columns.len() - given);
+        let mut take = |input: &[i128]| {
+            inputs.push(model.input_words(input));
+            expected.push(model.record(input));
+        };
+        for mut input in stimulus::inputs(&model.inputs, count, SEED + 3) {
+            model.repair(&mut input);
+            take(&input);
+        }
+        if model.state > 0 {
+            let vectors = search::vectors(model, SEED + 3);
+            vectors.iter().for_each(|input| take(input));
+        }
+        Due::These(inputs, expected)
     }
-    let count = match model.state {
-        0 => RANDOM_INPUTS,
-        _ => RANDOM_STATES,
+}
+
+/// Compares a function with what is due.
+fn function(language: Language, harness: &Harness, model: &Model, due: &Due) -> Result<Compared> {
+    let (low, count) = match due {
+        Due::These(inputs, expected) => {
+            return calls(language, harness, &model.name, inputs, expected);
+        }
+        Due::Every(low, count) => (*low, *count),
     };
-    let (columns, given) = model.columns();
-    let mut inputs = WordRows::new(given);
-    let mut expected = WordRows::new(columns.len() - given);
-    let mut take = |input: &[i128]| {
-        inputs.push(model.input_words(input));
-        expected.push(model.record(input));
-    };
-    for mut input in stimulus::inputs(&model.inputs, count, SEED + 3) {
-        model.repair(&mut input);
-        take(&input);
-    }
-    if model.state > 0 {
-        search::vectors(model, SEED + 3)
-            .iter()
-            .for_each(|input| take(input));
-    }
-    calls(language, harness, &model.name, &inputs, &expected)
+    let arguments = [
+        "range".to_owned(),
+        model.name.clone(),
+        low.to_string(),
+        count.to_string(),
+    ];
+    let mut tally = Tally::new(language, &model.name);
+    tally.outcome.exhaustive = true;
+    let mut input = low;
+    let mut outputs = vec![0; model.outputs];
+    let mut expected = Vec::new();
+    harness.run(
+        &arguments,
+        Vec::new(),
+        (model.outputs + 1, count),
+        &mut |words| {
+            let fault = i64::from(model.call(&[input], &mut outputs));
+            expected.clear();
+            expected.extend(outputs.iter().map(|word| *word as i64).chain([fault]));
+            tally.note(words, &expected, || format!("input {input}"));
+            input += 1;
+        },
+    )?;
+    Ok(tally.finish(count))
 }
 
 /// Compares a function on given inputs; the last expected word is the fault.
@@ -325,21 +364,24 @@ fn checksum(
     Ok(tally.outcome)
 }
 
-/// Compares the chain row by row on captured codes.
+/// Compares the chain row by row on captured codes, by each driver, on so many threads.
 ///
 /// # Errors
 /// A test driver that cannot be run.
 pub fn chain(
     design: &Design,
-    language: Language,
-    harness: &Harness,
+    drivers: &[(Language, &Harness)],
+    threads: usize,
     drive: &[i32],
     sense: &[i32],
-) -> Result<Compared> {
+) -> Result<Vec<Compared>> {
     let rows = chain::rows(design, drive, sense);
-    let mut compared = chain_rows(language, harness, drive, sense, &rows)?;
-    compared.inputs = drive.len() as u64;
-    Ok(compared)
+    let compared = in_parallel(drivers, threads, &|_| {}, |(language, harness)| {
+        let mut compared = chain_rows(*language, harness, drive, sense, &rows)?;
+        compared.inputs = drive.len() as u64;
+        Ok(compared)
+    });
+    compared.into_iter().collect()
 }
 
 /// Compares the chain with given rows, each with the fault as its last word.

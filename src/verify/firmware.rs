@@ -5,7 +5,7 @@ use crate::emit::bundle::{Bundle, Part};
 use crate::emit::views::Language;
 use crate::error::{Result, io_error};
 use crate::firmware::files;
-use crate::firmware::files::EmittedFile;
+use crate::firmware::files::{Emission, EmittedFile};
 use crate::firmware::replace;
 use crate::leftovers::TemporaryFolder;
 use crate::parallel::both;
@@ -54,9 +54,26 @@ impl Firmware {
         } else {
             Part::Compensation
         };
-        let emit = |language| files::emit(design, part, language, command);
-        let (c, rust) = both(|| emit(Language::C), || emit(Language::Rust));
-        Firmware::of_files(Bundle::new(design, part), c?, rust?, languages)
+        let emission = Emission::new(design, part, command)?;
+        let print = |language| emission.print(language);
+        let (c, rust) = both(|| print(Language::C), || print(Language::Rust));
+        let (c, rust) = (c?, rust?);
+        // The drivers need the sources alone: they are built while the vectors are made.
+        let build = || built([&c.sources, &rust.sources], emission.prefix(), languages);
+        let (built, vectors) = std::thread::scope(|scope| {
+            let built = scope.spawn(build);
+            let vectors = emission.vectors();
+            match built.join() {
+                Ok(built) => (built, vectors),
+                Err(panic) => std::panic::resume_unwind(panic),
+            }
+        });
+        let emitted = [c, rust].map(|printed| emission.files(printed, &vectors));
+        Ok(Firmware {
+            bundle: Bundle::new(design, part),
+            built: built?,
+            emitted,
+        })
     }
 
     /// Builds emitted files.
@@ -69,16 +86,10 @@ impl Firmware {
         rust: Vec<EmittedFile>,
         languages: &[Language],
     ) -> Result<Self> {
-        let prefix = bundle.prefix.clone();
-        let build = |language, files: &[EmittedFile]| match languages.contains(&language) {
-            true => Built::of_files(files, language, &prefix).map(Some),
-            false => Ok(None),
-        };
-        let (built_c, built_rust) =
-            both(|| build(Language::C, &c), || build(Language::Rust, &rust));
+        let built = built([&c, &rust], &bundle.prefix, languages)?;
         Ok(Firmware {
             bundle,
-            built: built_c?.into_iter().chain(built_rust?).collect(),
+            built,
             emitted: [c, rust],
         })
     }
@@ -86,6 +97,14 @@ impl Firmware {
     /// Those that were built, C first.
     pub fn all(&self) -> &[Built] {
         &self.built
+    }
+
+    /// The drivers of those, with their languages.
+    pub fn drivers(&self) -> Vec<(Language, &Harness)> {
+        self.built
+            .iter()
+            .map(|b| (b.language, &b.harness))
+            .collect()
     }
 
     /// A language's, if it was built.
@@ -116,13 +135,29 @@ impl Firmware {
     /// # Errors
     /// A driver that cannot be run.
     pub fn compare(&self, design: &Design) -> Result<Vec<Compared>> {
-        self.each(|built| compare::with_model(design, &self.bundle, built.language, &built.harness))
+        let drivers = self.drivers();
+        let compared = compare::with_model(design, &self.bundle, &drivers, drivers.len())?;
+        Ok(compared.concat())
     }
 
     /// The bundles, each with its folder among the results.
     pub fn bundles(&self) -> impl Iterator<Item = (&[EmittedFile], &'static str)> {
         self.emitted.iter().map(Vec::as_slice).zip(FOLDERS)
     }
+}
+
+/// The drivers of both languages' sources, those that are among `languages`: C first.
+fn built(
+    [c, rust]: [&[EmittedFile]; 2],
+    prefix: &str,
+    languages: &[Language],
+) -> Result<Vec<Built>> {
+    let build = |language, files: &[EmittedFile]| match languages.contains(&language) {
+        true => Built::of_files(files, language, prefix).map(Some),
+        false => Ok(None),
+    };
+    let (c, rust) = both(|| build(Language::C, c), || build(Language::Rust, rust));
+    Ok(c?.into_iter().chain(rust?).collect())
 }
 
 /// Refuses a folder of results whose firmware was edited: to be asked before work begins.
