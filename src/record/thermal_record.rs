@@ -60,6 +60,8 @@ impl ThermalRecord {
             let unit = record_columns::unit_of(name);
             match self.renamed.get(name) {
                 Some(file) => format!("{name} in {unit} (from {file})"),
+                // An auxiliary column, whose unit nobody has said.
+                None if unit == "1" => format!("{name} as it is"),
                 None => format!("{name} in {unit}"),
             }
         });

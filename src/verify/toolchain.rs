@@ -148,7 +148,10 @@ impl Compiler {
     fn answer(&self) -> std::result::Result<String, String> {
         let mut command = self.command();
         command.arg("--version");
-        let said = process::output(command, "the compiler").map_err(|e| e.to_string())?;
+        let said = process::output(command, "the compiler").map_err(|e| match e {
+            Error::Input(e) => e.message.clone(),
+            other => other.to_string(),
+        })?;
         if !said.status.success() {
             return Err(format!("`--version` ends with {}", said.status));
         }
