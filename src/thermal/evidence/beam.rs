@@ -26,7 +26,7 @@ pub struct Seen {
     pub member: Member,
     /// Gain in score by the grid alone.
     pub gain: f64,
-    /// The best points of its other forms, where they are less than [`BEHIND`] nats behind: their grids may be too coarse to tell.
+    /// The best points of its other forms, where they are less than fifteen nats (`BEHIND`) behind: their grids may be too coarse to tell.
     pub others: Vec<Point>,
 }
 
