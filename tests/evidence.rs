@@ -2,6 +2,8 @@
 
 mod blind;
 
+use blind::dice::Dice;
+use blind::rng::Rng;
 use blind::{Class, Scenario, make};
 use gyrogen::design::{Design, reader};
 use gyrogen::record::ThermalRecord;
@@ -59,24 +61,82 @@ fn a_large_effect_is_named_and_noise_is_not() {
     }
 }
 
+/// Rows that judge hold noise in place of the output, a thousand times as large, or nothing at all: names and parameters are the same.
 #[test]
 fn judge_rows_steer_nothing() {
     let design = reader::read(None).expect("the default");
     let record = read(&make(&Scenario::drawn(Class::Pair, SEED)).csv, &design);
     let intake = Intake::of(&record, &design, Vec::new()).expect("a thermometer");
-    let mut channels = intake.channels.clone();
-    let split = channels.split().expect("blocks");
-    let before = named(&channels, &split);
+    let split = intake.channels.split().expect("blocks");
+    let before = named(&intake.channels, &split);
     assert!(!before.is_empty());
-    let mut high = 1.0;
-    for (error, _) in channels
-        .error_dps
-        .iter_mut()
-        .zip(&split.heldout)
-        .filter(|(_, h)| **h)
-    {
-        high = -high;
-        *error += 0.1 * high;
-    }
-    assert_eq!(named(&channels, &split), before);
+    let with = |made: &mut dyn FnMut() -> f64| {
+        let mut channels = intake.channels.clone();
+        let errors = channels.error_dps.iter_mut().zip(&split.heldout);
+        errors
+            .filter(|(_, held)| **held)
+            .for_each(|(error, _)| *error = made());
+        named(&channels, &split)
+    };
+    let mut rng = Rng::new(SEED);
+    assert_eq!(with(&mut || 1e3 * rng.gauss()), before);
+    assert_eq!(with(&mut || 0.0), before);
+}
+
+/// The columns of a CSV in another order, with `more` in front.
+fn rearranged(csv: &str, more: &[(&str, Vec<f64>)]) -> String {
+    let mut row = 0;
+    let line = |line: &str| {
+        if line.starts_with('#') {
+            return line.to_owned();
+        }
+        let mut cells: Vec<String> = line.split(',').rev().map(str::to_owned).collect();
+        let is_head = line.contains("rate_out_dps");
+        for (name, values) in more {
+            let cell = match is_head {
+                true => (*name).to_owned(),
+                false => values[row].to_string(),
+            };
+            cells.insert(0, cell);
+        }
+        row += usize::from(!is_head);
+        cells.join(",")
+    };
+    csv.lines().map(line).collect::<Vec<_>>().join("\n") + "\n"
+}
+
+/// Neither the order of columns nor four that have nothing to do with the output change a name.
+#[test]
+fn columns_may_stand_anywhere_and_inert_ones_do_nothing() {
+    let design = reader::read(None).expect("the default");
+    let of = |csv: &str| -> Vec<String> {
+        let record = read(csv, &design);
+        let intake = Intake::of(&record, &design, Vec::new()).expect("a thermometer");
+        let split = intake.channels.split().expect("blocks");
+        let all = named(&intake.channels, &split);
+        all.into_iter().map(|(id, _)| id).collect()
+    };
+    let csv = make(&Scenario::drawn(Class::Pair, SEED)).csv;
+    let before = of(&csv);
+    assert!(!before.is_empty());
+    assert_eq!(of(&rearranged(&csv, &[])), before);
+    let mut rng = Rng::new(SEED);
+    let rows = csv.lines().count();
+    let mut level = 0.0;
+    let mut walk = || {
+        level += 0.1 * rng.gauss();
+        level
+    };
+    let walks: Vec<f64> = (0..rows).map(|_| walk()).collect();
+    let mut white = || -> Vec<f64> { (0..rows).map(|_| rng.gauss()).collect() };
+    let inert = [
+        ("pump_w", white()),
+        ("door_mm", walks),
+        (
+            "mains_a",
+            (0..rows).map(|k| (0.05 * k as f64).sin()).collect(),
+        ),
+        ("blower_rpm", white()),
+    ];
+    assert_eq!(of(&rearranged(&csv, &inert)), before);
 }

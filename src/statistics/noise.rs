@@ -167,6 +167,43 @@ impl Timeline {
         out
     }
 
+    /// The states of a shape with a smooth walk beside it, relaxations first, and the stationary covariance of the last two
+    /// relaxations.
+    ///
+    /// A smooth walk is integrated random walk, here with `smooth`, the variance that its slope gains in a row period (rows^-2,
+    /// in units of the white variance). Two relaxations of rates a < b that one noise of intensity g drives with opposite signs have
+    /// the spectrum g (b - a)^2 / ((w^2 + a^2)(w^2 + b^2)): integrated walk at all periods that the record has, if a and b
+    /// are those of the longest two time constants. Variances g / 2a, g / 2b; covariance -g / (a + b).
+    pub fn smooth_states(&self, shape: Shape, smooth: f64) -> (Vec<State>, f64) {
+        let [.., short, long] = self.taus[..] else {
+            return (self.states(shape), 0.0);
+        };
+        if smooth <= 0.0 {
+            return (self.states(shape), 0.0);
+        }
+        let variance = shape.flicker * self.log_ratio();
+        let relaxation = |tau: &f64| State {
+            tau: *tau,
+            variance,
+        };
+        // Without 1/f noise the longest two alone.
+        let first = match shape.flicker > 0.0 {
+            true => 0,
+            false => self.taus.len() - 2,
+        };
+        let mut out: Vec<State> = self.taus[first..].iter().map(relaxation).collect();
+        let (a, b) = (1.0 / long, 1.0 / short);
+        let g = smooth / (b - a).powi(2);
+        let last = out.len() - 1;
+        out[last].variance += 0.5 * g / a;
+        out[last - 1].variance += 0.5 * g / b;
+        out.extend(self.states(Shape {
+            flicker: 0.0,
+            ..shape
+        }));
+        (out, -g / (a + b))
+    }
+
     /// Variance, in units of the white variance, that every row has whatever its weight.
     pub fn floor(&self, shape: Shape) -> f64 {
         FAST * shape.flicker

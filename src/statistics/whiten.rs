@@ -45,11 +45,17 @@ macro_rules! sized {
 impl Whitener {
     /// The gains for a timeline and a shape.
     pub fn new(line: &Timeline, shape: Shape) -> Self {
-        let states = line.states(shape);
+        Self::with_smooth(line, shape, 0.0)
+    }
+
+    /// The same with a smooth walk beside it ([`Timeline::smooth_states`]).
+    pub fn with_smooth(line: &Timeline, shape: Shape, smooth: f64) -> Self {
+        let (states, cross) = line.smooth_states(shape, smooth);
         let recursion = Recursion {
             line,
             shape,
             states: &states,
+            cross,
         };
         Arch::new().dispatch(recursion)
     }
@@ -204,6 +210,8 @@ struct Recursion<'a> {
     line: &'a Timeline,
     shape: Shape,
     states: &'a [State],
+    /// Stationary covariance of the last two relaxations.
+    cross: f64,
 }
 
 impl WithSimd for Recursion<'_> {
@@ -211,15 +219,15 @@ impl WithSimd for Recursion<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Whitener {
-        let states = self.states;
-        sized!(states.len(), gains(self.line, self.shape, states))
+        let (states, cross) = (self.states, self.cross);
+        sized!(states.len(), gains(self.line, self.shape, states, cross))
     }
 }
 
 /// The covariance recursion (Durbin & Koopman 2012, 4.3) for states that are observed as their
 /// sum.
 #[inline(always)]
-fn gains<const N: usize>(line: &Timeline, shape: Shape, states: &[State]) -> Whitener {
+fn gains<const N: usize>(line: &Timeline, shape: Shape, states: &[State], cross: f64) -> Whitener {
     let mut out = Whitener {
         shape,
         log_det: 0.0,
@@ -238,6 +246,15 @@ fn gains<const N: usize>(line: &Timeline, shape: Shape, states: &[State]) -> Whi
         }
     }
     let relaxations = states.iter().filter(|s| s.tau.is_finite()).count();
+    // Places of the two that are correlated; (0, 0) for none.
+    let pair = match cross != 0.0 && relaxations > 1 && relaxations <= N {
+        true => [relaxations - 2, relaxations - 1],
+        false => [0, 0],
+    };
+    if pair[0] < pair[1] {
+        let [i, j] = pair;
+        (p[i][j], p[j][i]) = (cross, cross);
+    }
     let floor = line.floor(shape);
     let mut last = Settled::default();
     for (row, (step, factor)) in line.steps.iter().zip(&line.white_factor).enumerate() {
@@ -246,7 +263,9 @@ fn gains<const N: usize>(line: &Timeline, shape: Shape, states: &[State]) -> Whi
             continue;
         }
         let mut a = [1.0f64; N];
-        for (a, decay) in a.iter_mut().zip(&line.decays(row)[..relaxations]) {
+        let decays = line.decays(row);
+        // All, or the last ones.
+        for (a, decay) in a.iter_mut().zip(&decays[decays.len() - relaxations..]) {
             *a = *decay;
         }
         let mut z = [0.0f64; N];
@@ -255,6 +274,14 @@ fn gains<const N: usize>(line: &Timeline, shape: Shape, states: &[State]) -> Whi
                 p[i][j] *= a[i] * a[j];
             }
             p[i][i] += variance[i] * (1.0 - a[i] * a[i]) + walk[i] * step;
+        }
+        if pair[0] < pair[1] {
+            let [i, j] = pair;
+            let gained = cross * (1.0 - a[i] * a[j]);
+            p[i][j] += gained;
+            p[j][i] += gained;
+        }
+        for i in 0..N {
             z[i] = p[i].iter().sum();
         }
         let f = z.iter().sum::<f64>() + factor + floor;

@@ -129,6 +129,54 @@ fn even(n: usize) -> Timeline {
     Timeline::new(&times, (0..n).map(factor).collect()).unwrap()
 }
 
+/// x = x1 + x2, each a relaxation, driven by one noise with opposite signs: the covariance of two times is the sum over both of what is
+/// left of the stationary covariances after the time between them.
+#[test]
+fn a_smooth_walk_is_two_relaxations_of_one_noise() {
+    let line = uneven(40);
+    let (shape, smooth) = (Shape::default(), 1e-3);
+    let (states, cross) = line.smooth_states(shape, smooth);
+    let [.., short, long] = &states[..] else {
+        panic!("two relaxations")
+    };
+    let rows: Vec<usize> = (0..line.len())
+        .filter(|i| line.white_factor[*i].is_finite())
+        .collect();
+    let times: Vec<f64> = rows
+        .iter()
+        .map(|row| line.steps[..=*row].iter().sum())
+        .collect();
+    let dense = DMatrix::from_fn(rows.len(), rows.len(), |a, b| {
+        let apart = (times[a] - times[b]).abs();
+        let left = |tau: f64| (-apart / tau).exp();
+        let walk =
+            (short.variance + cross) * left(short.tau) + (long.variance + cross) * left(long.tau);
+        let own = if a == b {
+            line.white_factor[rows[a]]
+        } else {
+            0.0
+        };
+        walk + own
+    });
+    let whitener = Whitener::with_smooth(&line, shape, smooth);
+    let factor = dense.cholesky().unwrap().l();
+    let y: Vec<f64> = times.iter().map(|t| (0.3 * t).sin()).collect();
+    let mut column = vec![0.0; line.len()];
+    rows.iter().zip(&y).for_each(|(row, y)| column[*row] = *y);
+    let expected = factor
+        .solve_lower_triangular(&DVector::from_vec(y))
+        .unwrap();
+    let white = whitener.apply(&column);
+    for (k, row) in rows.iter().enumerate() {
+        assert!((white[*row] - expected[k]).abs() < 1e-6, "{k}");
+    }
+    // Between rows much nearer than the time constants it grows as integrated random walk: q t^3 / 3 about its own tangent.
+    let (a, b) = (1.0 / long.tau, 1.0 / short.tau);
+    let g = smooth / (b - a).powi(2);
+    assert!((2.0 * a * long.variance / g - 1.0).abs() < 1e-12);
+    assert!((cross * (a + b) / g + 1.0).abs() < 1e-12);
+}
+
 #[test]
 fn steady_gains_are_those_of_the_covariance() {
     let n = 500;

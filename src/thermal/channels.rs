@@ -135,6 +135,16 @@ impl Channels {
         Ok(out)
     }
 
+    /// The record with the output of the given rows alone, NaN in all others: for whatever must not depend on these.
+    pub fn seen(&self, rows: &[bool]) -> Self {
+        let mut out = self.clone();
+        let errors = out.error_dps.iter_mut().zip(rows);
+        errors
+            .filter(|(_, row)| !**row)
+            .for_each(|(e, _)| *e = f64::NAN);
+        out
+    }
+
     /// What the output was, deg/s; NaN where not measured.
     pub fn output_dps(&self) -> Vec<f64> {
         let rate = self.column("rate_dps");

@@ -253,6 +253,22 @@ impl Told<'_> {
         })
     }
 
+    /// How often a step is chosen again in halves of the record: against what is judged beside the other steps, or, of the search by
+    /// evidence, beside none.
+    fn selection_frequency(
+        &self,
+        k: usize,
+    ) -> std::result::Result<f64, crate::statistics::Unusable> {
+        let search = self.search;
+        if search.effort.method == Method::Stepwise || self.after.terms[k].evident {
+            return search.selected_beside(self.after, k, &[]);
+        }
+        let mut others = self.after.terms.clone();
+        others.remove(k);
+        let without = search.model(&others)?;
+        Ok(search.selection_frequency(self.after, k, &without, self.found.first.iter()))
+    }
+
     /// The steps in their order, each with the held-out error of itself and those before it.
     fn steps(&self) -> std::result::Result<Vec<Step>, crate::statistics::Unusable> {
         let terms = &self.found.terms;
@@ -274,7 +290,7 @@ impl Told<'_> {
                 parameter_std: reported.iter().map(|(n, v)| (n.clone(), v.1)).collect(),
                 heldout_rms: model.heldout_rms,
                 p_value: term.p_value.clamp(1e-300, 1.0),
-                selection_frequency: self.search.selected_beside(self.after, k, &[])?,
+                selection_frequency: self.selection_frequency(k)?,
                 indistinguishable_from: term.rivals.clone(),
                 separating_experiment: (!term.rivals.is_empty())
                     .then(|| term.candidate.sheet().experiment.to_owned()),

@@ -142,6 +142,11 @@ pub trait Candidate: Send + Sync {
         true
     }
 
+    /// True for what a record may have any number of: a spectral line, a level that changes at a moment.
+    fn repeats(&self) -> bool {
+        false
+    }
+
     /// The columns of the record that it uses.
     ///
     /// # Errors

@@ -109,6 +109,10 @@ impl Candidate for Outside {
         false
     }
 
+    fn repeats(&self) -> bool {
+        matches!(self.kind, Kind::Change | Kind::Bump)
+    }
+
     fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing> {
         Ok(vec![match &self.kind {
             Kind::Curve | Kind::Play => c.thermometer.clone(),

@@ -64,6 +64,10 @@ impl Candidate for Pickup {
         !self.further
     }
 
+    fn repeats(&self) -> bool {
+        self.further
+    }
+
     fn channels(&self, _c: &Channels) -> Result<Vec<String>, Missing> {
         Ok(vec!["time_s".to_owned()])
     }

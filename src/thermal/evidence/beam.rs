@@ -4,7 +4,8 @@ use super::MOST_TERMS;
 use super::columns::{Frame, Member, Shapes};
 use super::lines;
 use super::refine::refined;
-use super::score::{Node, Stage, against, node, stage};
+use super::score::{Node, Stage, against, node, odds, price, stage};
+use crate::thermal::effects::Point;
 use std::sync::Arc;
 
 /// Sets of one size that are kept (calibration on the split *tune* of the corpus is to come; 3 names what 6 does there).
@@ -16,8 +17,8 @@ const TRIED: usize = 5;
 /// Nats by which the best set of a size may be behind the best of all before the search stops (convention: e^-15).
 const BEHIND: f64 = 15.0;
 
-/// Most lines of a set.
-const MOST_LINES: usize = 8;
+/// Most lines and events of a set.
+const MOST_EVENTS: usize = 8;
 
 /// A further term as a scan sees it.
 #[derive(Clone)]
@@ -25,6 +26,8 @@ pub struct Seen {
     pub member: Member,
     /// Gain in score by the grid alone.
     pub gain: f64,
+    /// The best points of its other forms, where they are less than fifteen nats (`BEHIND`) behind: their grids may be too coarse to tell.
+    pub others: Vec<Point>,
 }
 
 /// What one candidate's points gain beside a stage: the best of them and its Occam factor. None where no shape is excited.
@@ -38,6 +41,12 @@ fn seen(
     let (candidate, points) = (&shapes.candidate, &shapes.points);
     let known = !candidate.acts_on_bias() && !stage.holds();
     let mut all: Vec<(f64, usize)> = Vec::new();
+    let priced = |k: usize| {
+        odds(
+            candidate.as_ref(),
+            shapes.columns.get(k).map_or(1, Vec::len),
+        )
+    };
     for (k, point) in points.iter().enumerate() {
         let is_sized = candidate.is_sized(point);
         let l = match known {
@@ -49,13 +58,24 @@ fn seen(
             ),
         };
         if let Some(l) = l.filter(|l| l.is_finite()) {
-            all.push((l - against(frame, candidate.as_ref(), point), k));
+            all.push((l - against(frame, candidate.as_ref(), point) + priced(k), k));
         }
     }
     let best = *all.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
     let mean = all.iter().map(|(l, _)| (l - best.0).exp()).sum::<f64>() / points.len() as f64;
     let occam = mean.ln();
+    all.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut others: Vec<Point> = Vec::new();
+    for (l, k) in all {
+        let is_new = |form: usize| {
+            form != points[best.1].form && others.iter().all(|p: &Point| p.form != form)
+        };
+        if l > best.0 - BEHIND && is_new(points[k].form) {
+            others.push(points[k].clone());
+        }
+    }
     Some(Seen {
+        others,
         gain: best.0 - stage.likelihood + occam,
         member: Member {
             candidate: candidate.clone(),
@@ -75,13 +95,17 @@ pub fn scan(frame: &Frame, node: &Node, noise: usize) -> Vec<Seen> {
     let taken = node.ids();
     let mut out = Vec::new();
     let full = node.causes() >= MOST_TERMS;
+    let events = node.members.iter().filter(|m| m.is_noise()).count();
     for (shapes, white) in frame.shapes.iter().zip(frame.white(noise)) {
-        if !full && !taken.contains(&shapes.candidate.id()) {
+        let open = match shapes.candidate.repeats() {
+            true => events < MOST_EVENTS,
+            false => !full && !taken.contains(&shapes.candidate.id()),
+        };
+        if open {
             out.extend(seen(frame, &stage, node, shapes, white));
         }
     }
-    let lines_in = node.members.iter().filter(|m| m.is_line()).count();
-    if lines_in < MOST_LINES {
+    if events < MOST_EVENTS {
         let named = !taken
             .iter()
             .any(|id| id == crate::thermal::effects::tone::NAMED);
@@ -92,7 +116,8 @@ pub fn scan(frame: &Frame, node: &Node, noise: usize) -> Vec<Seen> {
                 let occam = -cells.max(1.0).ln();
                 let fixed = frame.fixed(candidate.as_ref(), &point);
                 out.push(Seen {
-                    gain: l - stage.likelihood + occam,
+                    others: Vec::new(),
+                    gain: l - stage.likelihood + occam + odds(candidate.as_ref(), columns.len()),
                     member: Member {
                         candidate,
                         point,
@@ -108,16 +133,23 @@ pub fn scan(frame: &Frame, node: &Node, noise: usize) -> Vec<Seen> {
     out
 }
 
-/// The set with a further term: its parameters at their best, its score at its own noise.
+/// The set with a further term: its form and its parameters at their best, its score at its own noise.
 pub fn child(frame: &Frame, parent: &Node, seen: &Seen, noise: usize) -> Option<Node> {
-    let mut members = parent.members.clone();
-    members.push(seen.member.clone());
-    let last = members.len() - 1;
-    let first = node(frame, members, &parent.bias, noise)?;
-    let (members, _) = refined(frame, &first.members, last, &first.bias, first.noise)?;
-    let mut best = node(frame, members, &first.bias, first.noise)?;
-    best.score -= sheets(frame, &best.members);
-    Some(best)
+    let from = |point: &Point| -> Option<(Vec<Member>, f64)> {
+        let mut members = parent.members.clone();
+        members.push(Member {
+            fixed: frame.fixed(seen.member.candidate.as_ref(), point),
+            point: point.clone(),
+            ..seen.member.clone()
+        });
+        let last = members.len() - 1;
+        let (members, l) = refined(frame, &members, last, &parent.bias, noise)?;
+        let price = price(&members);
+        Some((members, l + price))
+    };
+    let points = [&seen.member.point].into_iter().chain(&seen.others);
+    let (members, _) = points.filter_map(from).max_by(|a, b| a.1.total_cmp(&b.1))?;
+    of(frame, members, parent)
 }
 
 /// What the data sheets have against the members' shapes.
@@ -182,7 +214,7 @@ fn next(frame: &Frame, level: &[Node], declared_noise: usize) -> Vec<Node> {
 pub fn search(frame: &Frame, start: &Node) -> Node {
     let mut level = vec![start.clone()];
     let mut best = start.clone();
-    for _ in 0..MOST_TERMS + MOST_LINES {
+    for _ in 0..MOST_TERMS + MOST_EVENTS {
         level = next(frame, &level, start.noise);
         level.truncate(WIDTH);
         let Some(first) = level.first() else { break };
@@ -218,7 +250,7 @@ fn settled(frame: &Frame, mut best: Node) -> Node {
     best
 }
 
-/// The set without member `k`, and with the likeliest others in its place; best first.
+/// The set without member `k`, and with the likeliest others in its place, as the last member; best first.
 pub fn around(frame: &Frame, set: &Node, k: usize) -> Vec<Node> {
     let mut members = set.members.clone();
     let gone = members.remove(k);
@@ -229,7 +261,8 @@ pub fn around(frame: &Frame, set: &Node, k: usize) -> Vec<Node> {
     for noise in [set.noise, without.noise] {
         for s in scan(frame, &without, noise).iter().take(TRIED) {
             let id = s.member.candidate.id();
-            if id != gone.candidate.id() && !out.iter().any(|n: &Node| n.ids().contains(&id)) {
+            let is_in = |n: &Node| n.members.last().is_some_and(|m| m.candidate.id() == id);
+            if id != gone.candidate.id() && !out.iter().any(is_in) {
                 out.extend(child(frame, &without, s, noise));
             }
         }

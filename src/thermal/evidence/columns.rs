@@ -1,12 +1,18 @@
 //! A record as regressors: its rows, the declared model, the candidates and their shapes.
 
+use super::{NAMELESS, PRIOR_ODDS};
 use crate::statistics::linear::Basis;
 use crate::statistics::noise::{Shape, Timeline};
 use crate::statistics::whiten::Whitener;
 use crate::statistics::{lattice, reml};
 use crate::thermal::channels::Channels;
 use crate::thermal::effects::{Bias, Candidate, Point};
+use std::f64::consts::TAU;
 use std::sync::{Arc, OnceLock};
+
+/// Highest frequency, in turns a row, at which a smooth walk meets the white noise: what is faster is no slow noise (convention: ten
+/// rows a turn).
+const FASTEST: f64 = 0.1;
 
 /// A term of a set.
 #[derive(Clone)]
@@ -22,6 +28,11 @@ pub struct Member {
 }
 
 impl Member {
+    /// Whether it is part of the noise rather than a cause: a line, an event.
+    pub fn is_noise(&self) -> bool {
+        self.is_line() || self.candidate.repeats()
+    }
+
     /// Whether it is a spectral line.
     pub fn is_line(&self) -> bool {
         let id = self.candidate.id();
@@ -67,8 +78,12 @@ pub struct Frame<'a> {
     pub declared: usize,
     /// Rows (or, of long records, means of blocks) with their weights: from the fit of a set.
     pub fit: reml::Fit,
-    /// Noise shapes to compare (flicker and walk over the white variance), with their places on a grid.
-    pub noises: Vec<Shape>,
+    /// Noise shapes to compare.
+    pub noises: Vec<Noise>,
+    /// The white one.
+    pub plain_noise: usize,
+    /// Logarithm of the prior odds of each noise.
+    pub noise_odds: Vec<f64>,
     /// Neighbours of each noise on its grid.
     pub neighbours: Vec<Vec<usize>>,
     /// Shapes that do not depend on the bias, as the fit sees them.
@@ -120,7 +135,8 @@ impl Frame<'_> {
     /// Base and error whitened by a noise.
     pub fn whitened(&self, noise: usize) -> &Whitened {
         self.whitened[noise].get_or_init(|| {
-            let whitener = Whitener::new(self.line(), self.noises[noise]);
+            let Noise { shape, smooth } = self.noises[noise];
+            let whitener = Whitener::with_smooth(self.line(), shape, smooth);
             let base = Basis::new(&whitener.apply_all(&self.plain_base));
             let error = whitener.apply(&self.plain_error);
             Whitened {
@@ -172,40 +188,107 @@ impl Frame<'_> {
     }
 }
 
-/// About two dozen shapes of noise: every second level of the lattice in each direction, with each one's neighbours.
-pub fn noises(line: &Timeline) -> (Vec<Shape>, Vec<Vec<usize>>) {
-    let all = lattice::shapes(line);
-    let mut flickers: Vec<f64> = all.iter().map(|s| s.flicker).collect();
-    let mut walks: Vec<f64> = all.iter().map(|s| s.walk).collect();
-    for levels in [&mut flickers, &mut walks] {
-        levels.sort_by(f64::total_cmp);
-        levels.dedup();
-        // 0 stays, and of the others every second one from the greatest down.
-        let last = levels.len() - 1;
-        let kept = levels.iter().enumerate();
-        *levels = kept
-            .filter(|(k, _)| *k == 0 || (last - k).is_multiple_of(2))
-            .map(|(_, v)| *v)
-            .collect();
+/// A shape of noise.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Noise {
+    /// Strengths of 1/f noise and random walk over the white variance.
+    pub shape: Shape,
+    /// Strength of the smooth walk ([`Timeline::smooth_states`]).
+    pub smooth: f64,
+}
+
+impl Noise {
+    /// Whether it is more than white and 1/f.
+    pub fn walks(&self) -> bool {
+        self.shape.walk > 0.0 || self.smooth > 0.0
     }
-    let (rows, wide) = (flickers.len(), walks.len());
+}
+
+/// Every second of some levels from the greatest down, and 0 in front.
+fn thinned(mut levels: Vec<f64>) -> Vec<f64> {
+    levels.sort_by(f64::total_cmp);
+    levels.dedup();
+    let last = levels.len() - 1;
+    let kept = levels.iter().enumerate();
+    kept.filter(|(k, _)| *k == 0 || (last - k).is_multiple_of(2))
+        .map(|(_, v)| *v)
+        .collect()
+}
+
+/// Strengths of a smooth walk: its spectrum, s / (2 pi f)^4 in rows, meets the white one at frequencies from two turns in the record to
+/// [`FASTEST`], an octave apart.
+fn smooth_levels(line: &Timeline) -> Vec<f64> {
+    let rows = line.used().max(8) as f64;
+    let octaves = (FASTEST * rows / 2.0).log2().max(0.0) as i32;
+    let strength = |k: i32| (TAU * FASTEST * 0.5f64.powi(k)).powi(4);
+    (0..=octaves).rev().map(strength).collect()
+}
+
+/// A few dozen shapes of noise: every second level of the lattice in 1/f noise, with nothing, a random walk or a smooth walk; and the
+/// neighbours of each, those of a walk and a smooth walk that meet the white noise at the same frequency among them.
+pub fn noises(line: &Timeline) -> (Vec<Noise>, Vec<Vec<usize>>) {
+    let all = lattice::shapes(line);
+    let flickers = thinned(all.iter().map(|s| s.flicker).collect());
+    let walks = thinned(all.iter().map(|s| s.walk).collect());
+    let smooths = smooth_levels(line);
+    // The second axis: smooth walks from the strongest down, none, random walks.
+    let mut slow: Vec<(f64, f64)> = smooths.iter().rev().map(|s| (0.0, *s)).collect();
+    slow.extend(walks.iter().map(|walk| (*walk, 0.0)));
+    let meets = |slow: &(f64, f64)| match *slow {
+        (_, smooth) if smooth > 0.0 => smooth.powf(0.25),
+        (walk, _) => walk.sqrt(),
+    };
+    let wide = slow.len();
     let mut shapes = Vec::new();
     let mut neighbours = Vec::new();
     for (i, flicker) in flickers.iter().enumerate() {
-        for (j, walk) in walks.iter().enumerate() {
-            shapes.push(Shape {
-                flicker: *flicker,
-                walk: *walk,
+        for (j, (walk, smooth)) in slow.iter().enumerate() {
+            shapes.push(Noise {
+                shape: Shape {
+                    flicker: *flicker,
+                    walk: *walk,
+                },
+                smooth: *smooth,
             });
             let mut near = Vec::new();
             for (a, b) in [(-1i64, 0i64), (1, 0), (0, -1), (0, 1), (-1, 1), (1, -1)] {
                 let (x, y) = (i as i64 + a, j as i64 + b);
-                if (0..rows as i64).contains(&x) && (0..wide as i64).contains(&y) {
+                if (0..flickers.len() as i64).contains(&x) && (0..wide as i64).contains(&y) {
                     near.push(x as usize * wide + y as usize);
                 }
+            }
+            let others = slow.iter().enumerate();
+            let others = others.filter(|(_, s)| (s.1 > 0.0) != (*smooth > 0.0) && meets(s) > 0.0);
+            let apart = |s: &(f64, f64)| (meets(s) / meets(&slow[j])).ln().abs();
+            let like = others.min_by(|a, b| apart(a.1).total_cmp(&apart(b.1)));
+            if let Some((k, _)) = like.filter(|_| meets(&slow[j]) > 0.0) {
+                near.push(i * wide + k);
             }
             neighbours.push(near);
         }
     }
     (shapes, neighbours)
+}
+
+/// Logarithms of the prior odds of noises: a smooth walk is what nobody recorded, and costs what every hypothesis does, its strength being
+/// one of so many.
+pub fn odds(noises: &[Noise]) -> Vec<f64> {
+    let mut levels: Vec<f64> = noises
+        .iter()
+        .map(|n| n.smooth)
+        .filter(|s| *s > 0.0)
+        .collect();
+    levels.sort_by(f64::total_cmp);
+    levels.dedup();
+    let price = (PRIOR_ODDS * NAMELESS).ln() - (levels.len().max(1) as f64).ln();
+    let of = |n: &Noise| if n.smooth > 0.0 { price } else { 0.0 };
+    noises.iter().map(of).collect()
+}
+
+/// Where white and no other noise is among those of [`noises`].
+pub fn white(noises: &[Noise]) -> usize {
+    noises
+        .iter()
+        .position(|n| *n == Noise::default())
+        .unwrap_or(0)
 }

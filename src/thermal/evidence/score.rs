@@ -7,8 +7,8 @@
 //! the Gram determinants of Z taken beyond B (O'Hagan & Forster 2004, ch. 11; Zellner 1986 for the prior along the
 //! orthonormal columns). It is Laplace's approximation in the prior of c, which is wide against its posterior.
 
-use super::PRIOR_ODDS;
 use super::columns::{Frame, Member};
+use super::{NAMELESS, PRIOR_ODDS};
 use crate::statistics::linear::{Basis, add_scaled, dot};
 use crate::thermal::effects::{Bias, Candidate, Point};
 use crate::thermal::search::weighted;
@@ -27,7 +27,7 @@ pub struct Node {
     pub noise: usize,
     /// L at that noise.
     pub likelihood: f64,
-    /// L with prior odds and Occam factors: what sets are compared by.
+    /// L with the prior odds of the noise and of the terms, and Occam factors: what sets are compared by.
     pub score: f64,
     /// The declared bias beside the terms.
     pub bias: Bias,
@@ -41,9 +41,9 @@ impl Node {
         ids
     }
 
-    /// Terms that are no lines.
+    /// Terms that are no part of the noise.
     pub fn causes(&self) -> usize {
-        self.members.iter().filter(|m| !m.is_line()).count()
+        self.members.iter().filter(|m| !m.is_noise()).count()
     }
 }
 
@@ -187,10 +187,10 @@ impl Stage {
 
 /// The columns of a set's terms as the fit sees them, free ones in order; what is left of the error of what is taken off as it
 /// is; and the rows that a clip holds.
-struct Parts {
-    free: Vec<Vec<f64>>,
-    error: Vec<f64>,
-    held: Vec<bool>,
+pub struct Parts {
+    pub free: Vec<Vec<f64>>,
+    pub error: Vec<f64>,
+    pub held: Vec<bool>,
 }
 
 /// Whether a row of the record, or a block of rows, is mostly held by a clip.
@@ -198,7 +198,8 @@ fn reduced_held(frame: &Frame, held: &[f64]) -> Vec<bool> {
     frame.fit.reduce(held).iter().map(|h| *h > 0.5).collect()
 }
 
-fn parts(frame: &Frame, members: &[Member], bias: &Bias) -> Parts {
+/// [`Parts`] of a set beside a bias.
+pub fn parts(frame: &Frame, members: &[Member], bias: &Bias) -> Parts {
     let c = frame.channels;
     let mut error = frame.plain_error.clone();
     let (mut free, mut held) = (Vec::new(), Vec::new());
@@ -389,10 +390,26 @@ pub fn at_noise(
     None
 }
 
+/// Logarithm of the prior odds of a term of so many columns. A smooth function is as many laws as it has columns: two effects of one channel are
+/// no less likely than the function that has both in it.
+pub fn odds(candidate: &dyn Candidate, columns: usize) -> f64 {
+    if candidate.named() {
+        return PRIOR_ODDS.ln();
+    }
+    let laws = if candidate.repeats() {
+        1
+    } else {
+        columns.max(1)
+    };
+    NAMELESS.ln() + laws as f64 * PRIOR_ODDS.ln()
+}
+
 /// The price of a set: prior odds and Occam factors of its terms.
 pub fn price(members: &[Member]) -> f64 {
+    let columns = |m: &Member| m.fixed.as_ref().map_or(1, |f| f.len());
     let paid = members.iter().filter(|m| !m.evident);
-    paid.map(|m| PRIOR_ODDS.ln() + m.occam).sum()
+    paid.map(|m| odds(m.candidate.as_ref(), columns(m)) + m.occam)
+        .sum()
 }
 
 /// A set at its most likely noise: downhill on the grid from a noise and from white.
@@ -401,10 +418,10 @@ pub fn node(frame: &Frame, members: Vec<Member>, bias: &Bias, start: usize) -> O
     let mut at = |k: usize| -> Option<f64> {
         *known
             .entry(k)
-            .or_insert_with(|| at_noise(frame, &members, bias, k).map(|l| l.0))
+            .or_insert_with(|| Some(at_noise(frame, &members, bias, k)?.0 + frame.noise_odds[k]))
     };
     let mut best: Option<(f64, usize)> = None;
-    for start in [start, 0] {
+    for start in [start, frame.plain_noise] {
         let Some(mut l) = at(start) else { continue };
         let mut here = start;
         loop {
@@ -426,7 +443,7 @@ pub fn node(frame: &Frame, members: Vec<Member>, bias: &Bias, start: usize) -> O
     let stage = stage(frame, &members, &bias, noise)?;
     let bias = settled(frame, &members, &bias, &stage);
     Some(Node {
-        score: likelihood + price(&members),
+        score: likelihood + frame.noise_odds[noise] + price(&members),
         likelihood,
         noise,
         bias,

@@ -236,7 +236,9 @@ impl<'a> Search<'a> {
         candidates.extend(effects::catalogue(channels).into_iter().map(Arc::from));
         candidates.extend(effects::outside::all(channels).into_iter().map(Arc::from));
         let train: Vec<bool> = both(&split.train);
-        let rails = rails::of(channels, &train);
+        // Rows that judge must not say what readings err by, nor which rows stand at a rail.
+        let seen = channels.seen(&train);
+        let rails = rails::of(&seen, &train);
         let free = |(i, row): (usize, &bool)| *row && !rails.as_ref().is_some_and(|r| r.rows[i]);
         let mut search = Search {
             channels,
@@ -245,7 +247,7 @@ impl<'a> Search<'a> {
             heldout: both(&split.heldout),
             effort,
             rails,
-            blur: reading::errors_of(channels),
+            blur: reading::errors_of(&seen),
             candidates,
             models: Memo::default(),
             rounds: Memo::of(memo::SOME),
