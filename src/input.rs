@@ -46,7 +46,9 @@ pub fn open(path: &Path, what: &str) -> Result<File> {
 /// # Errors
 /// A failed read; more than `most` bytes.
 pub fn text_bytes(mut input: impl Read, path: &Path, what: &str, most: u64) -> Result<Vec<u8>> {
-    let mut bytes = Vec::new();
+    // A buffer that grows by doubling would take up to twice the file.
+    let size = std::fs::metadata(path).map_or(0, |m| if m.is_file() { m.len() } else { 0 });
+    let mut bytes = Vec::with_capacity(size.min(most) as usize + 1);
     let mut looked_at = 0;
     loop {
         let count = input
