@@ -185,7 +185,7 @@ fn what_is_not_said_is_asked_for_with_the_keys() {
         (
             "a,b\n1,2\n3,x\n5,6\n7,8\n9,9\n",
             "drive_column = 0\nsense_column = 1\n",
-            "like a row",
+            "right before the first whole one",
             "repair",
         ),
         (
@@ -241,6 +241,39 @@ fn a_row_that_is_none_is_refused_with_its_place() {
             "{row}: {error}"
         );
         assert!(error.to_string().contains(message), "{error}");
+    }
+}
+
+#[test]
+fn a_damaged_first_row_is_no_preamble_and_no_header() {
+    let rows: String = (2..40)
+        .map(|k| format!("{k},{},{}\n", 10 * k, 7 * k))
+        .collect();
+    let names = "drive_column = \"CH1\"\nsense_column = \"CH2\"\n";
+    let places = "drive_column = 1\nsense_column = 2\n";
+    for (first, line) in [
+        ("0,OVL,0", 2),
+        ("0,,0", 2),
+        ("0,-9000,", 2),
+        (",5,5", 2),
+        ("OVL,5,5", 2),
+        ("0,-9000,--", 2),
+        ("0,nan,5", 2),
+        ("0,-9000", 2),
+        ("0,-9000,5,5", 2),
+        ("0,-9000,0\n1,OVL,1", 3),
+        ("0,OVL,0\n1,5,1", 2),
+        ("0,OVL,0\n1,OVL,1", 2),
+    ] {
+        for keys in [names, places] {
+            let (_, error) = csv(format!("TIME,CH1,CH2\n{first}\n{rows}"))
+                .beside("capture.toml", keys)
+                .rows(Q15, 9);
+            let error = error.unwrap_or_else(|| panic!("{first} is passed over"));
+            let told = error.to_string();
+            assert_eq!(error.line, Some(line), "{first}: {told}");
+            assert!(!told.contains("_column ="), "{first}: {told}");
+        }
     }
 }
 

@@ -8,6 +8,9 @@
 //! - a value that stands apart from its neighbours in time, on both sides, by far more than the readings move, and is
 //!   repeated to the last digit, is no reading, whatever its share;
 //! - so is a single cell of a thermometer, for a die has a heat capacity.
+//!
+//! At an end of the record one neighbour alone can tell: there a value has to be half of the range away, or, of a
+//! thermometer, two dozen usual steps and further than a die moves in that time.
 
 use super::columns::{THERMOMETERS, unit_of};
 use super::thermal::ThermalRecord;
@@ -27,6 +30,9 @@ const HALF: f64 = 0.5;
 
 /// No die moves faster, K/s.
 const FASTEST_K_PER_S: f64 = 1.5;
+
+/// Usual steps that a value at an end of the record has to stand apart, where it is within half of the range.
+const DOZENS: f64 = 24.0;
 
 /// Different readings that a channel needs beside the error values, so that its own movement is known.
 const READINGS: usize = 10;
@@ -341,6 +347,17 @@ impl Scale {
             && visit.distance > share * self.range
     }
 
+    /// Whether a thermometer's value at an end of the record, where one neighbour alone can tell, is two dozen usual steps
+    /// from it and further than a die moves in that time; of `all` cells it has a tenth at most.
+    fn is_cut_off(&self, visit: &Visit, all: usize) -> bool {
+        !visit.inner
+            && visit.distance.is_finite()
+            && 10 * visit.cells.len() <= all
+            && visit.per_row > DOZENS * self.usual
+            && visit.distance > LEAST_OF_RANGE * self.range
+            && self.is_out_of_reach(visit)
+    }
+
     /// Whether no die gets there and back in the time; half of the range is out of reach in any time.
     fn is_out_of_reach(&self, visit: &Visit) -> bool {
         visit.distance > (FASTEST_K_PER_S * visit.way_s).min(HALF * self.range)
@@ -358,14 +375,14 @@ struct Seen {
     farthest: f64,
 }
 
-/// The visits by the bits of their value.
-fn seen(visits: &[Visit], scale: &Scale) -> BTreeMap<u64, Seen> {
+/// The visits by the bits of their value; `is_far` is told whether the value is one of an error elsewhere.
+fn seen(visits: &[Visit], is_far: impl Fn(&Visit, bool) -> bool) -> BTreeMap<u64, Seen> {
     let mut out: BTreeMap<u64, Seen> = BTreeMap::new();
     for inner in [true, false] {
         for visit in visits.iter().filter(|v| v.inner == inner) {
             let seen = out.entry(visit.value.to_bits()).or_default();
             seen.visits += 1;
-            if scale.is_far(visit, seen.inner > 0) {
+            if is_far(visit, seen.inner > 0) {
                 seen.far += 1;
                 seen.inner += usize::from(inner);
                 seen.far_cells += visit.cells.len();
@@ -385,9 +402,12 @@ fn apart(time_s: &[f64], values: &[f64], aside: &[bool], inert: bool) -> Vec<usi
     let Some(scale) = Scale::of_visits(&visits) else {
         return few_readings(values, &cells);
     };
-    let seen = seen(&visits, &scale);
+    let is_far = |v: &Visit, known: bool| {
+        scale.is_far(v, known) || (inert && scale.is_cut_off(v, cells.len()))
+    };
+    let seen = seen(&visits, is_far);
     let of = |v: &Visit| seen.get(&v.value.to_bits()).copied().unwrap_or_default();
-    let far = |v: &Visit| scale.is_far(v, of(v).inner > 0);
+    let far = |v: &Visit| is_far(v, of(v).inner > 0);
     // Of the values that are repeated, the one that stands apart most often; single cells when there is none.
     let repeated = seen
         .iter()

@@ -70,6 +70,31 @@ fn a_block_at_the_start_in_the_middle_or_at_the_end_is_found() {
 }
 
 #[test]
+fn a_value_at_an_end_is_judged_by_one_neighbour() {
+    let ramp = |k: usize| 40.0 + 0.335 * k as f64 + 0.01 * noise(k);
+    for cells in [1, 2, 5, 20] {
+        let start = found(1.0, kind(), |k| if k < cells { 25.0 } else { ramp(k) });
+        assert_eq!(start, (0..cells).collect::<Vec<_>>(), "{cells}");
+    }
+    // As much as a die moves in the time between the rows, or a part of the record of its own.
+    assert_eq!(
+        found(60.0, kind(), |k| if k < 5 { 25.0 } else { ramp(k) }),
+        []
+    );
+    let part = |k: usize| if k < 60 { 25.0 } else { ramp(k - 60) };
+    assert_eq!(found(1.0, kind(), part), []);
+    // Of a channel without a heat capacity it may be a setting.
+    let setting = Kind {
+        inert: false,
+        ..kind()
+    };
+    assert_eq!(
+        found(1.0, setting, |k| if k < 5 { 25.0 } else { ramp(k) }),
+        []
+    );
+}
+
+#[test]
 fn several_values_and_single_glitches_are_found_together() {
     let value = |k: usize| match k {
         30 | 90 | 91 => 0.0,

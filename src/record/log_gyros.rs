@@ -346,10 +346,23 @@ fn replaced(sources: &[Source], gyro: &Gyro) -> Option<(u64, String)> {
 /// Rows beside a change of an offset that tell whether the output has it.
 const BESIDE: usize = 5;
 
+/// The source that the rate is from in the end: a faster one than the leading one may be taken.
+pub(super) fn source_of_rate<'a>(
+    averager: &Averager,
+    sources: &'a [Source],
+    choice: &Choice,
+    chosen: Chosen,
+) -> Option<&'a Source> {
+    let rate = log_rows::rate(averager, choice);
+    let gives = |s: &&Source| s.channel("rate_out_dps").is_some_and(|c| Some(c) == rate);
+    sources.iter().find(gives).or(sources.get(chosen.lead))
+}
+
 /// Adds what the parameters say. An offset that was learnt anew splits the record, unless the output is the driver's own and
 /// does not step by it.
 pub(super) fn corrected(averager: &Averager, choice: &mut Choice, found: Found, source: &Source) {
     choice.undo = found.undo;
+    choice.switched = found.switched;
     choice.warnings.extend(found.warnings);
     for (time_us, said, step_dps) in found.cuts {
         let rate = source.channel("rate_out_dps");

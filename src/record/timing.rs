@@ -122,15 +122,24 @@ fn too_short(record: &ThermalRecord) -> Option<Warning> {
         lag *= 2;
     }
     if let (Some((a, b)), 0.0) = (jump, fastest) {
+        let (from, to) = largest_step(&record.time_s, die, a.0, b.0)?;
+        let at = |row: usize| record.time_s.get(row).copied().unwrap_or(f64::NAN);
+        let line = match record.is_of_log() {
+            true => String::new(),
+            false => format!(" (line {})", record.lines.get(to).copied().unwrap_or(0)),
+        };
         return Some(Warning::on(
             "record_spliced",
             "die_degc",
             format!(
-                "die_degc jumps from {:.1} to {:.1} degC at {:.1} s, faster than a die can. It looks like two \
+                "die_degc jumps from {:.1} to {:.1} degC between {:.1} and {:.1} s{line}, faster than a die can. It looks like two \
                  sessions in one file: whatever else changed between them (orientation, mounting, power) cannot be told from \
                  the temperature. Record both temperatures in one session, give time_s the pause between them, or close them \
                  one by one",
-                a.1, b.1, b.0
+                die[from],
+                die[to],
+                at(from),
+                at(to)
             ),
         ));
     }
@@ -145,6 +154,15 @@ fn too_short(record: &ThermalRecord) -> Option<Warning> {
             ),
         )
     })
+}
+
+/// The rows before and behind the largest step of a channel within a time.
+fn largest_step(time_s: &[f64], values: &[f64], from_s: f64, to_s: f64) -> Option<(usize, usize)> {
+    let is_read = |i: &usize| (from_s..=to_s).contains(&time_s[*i]) && !values[*i].is_nan();
+    let rows: Vec<usize> = (0..values.len()).filter(is_read).collect();
+    let steps = rows.windows(2).map(|w| (w[0], w[1]));
+    let size = |s: &(usize, usize)| (values[s.1] - values[s.0]).abs();
+    steps.max_by(|a, b| size(a).total_cmp(&size(b)))
 }
 
 #[cfg(test)]
@@ -189,6 +207,12 @@ mod tests {
                 }
             };
             assert_eq!(codes(header, row(0.0)), ["record_spliced"], "{at}");
+            let rows: String = (0..400).map(|k| row(0.0)(f64::from(k)) + "\n").collect();
+            let text = format!("{header}\n{rows}");
+            let mapping = RecordMapping::default();
+            let (_, warnings) = parse(text.as_bytes(), Path::new("r.csv"), &mapping).unwrap();
+            let place = format!("between {}.0 and {at}.0 s (line {})", at - 1, at + 2);
+            assert!(warnings[0].message.contains(&place), "{warnings:?}");
             assert!(codes(header, row(600.0)).is_empty(), "{at}");
         }
     }
