@@ -97,10 +97,9 @@ pub(super) fn table(
         notes.push(format!("{before} lines stand before the first row"));
     }
     if let Some(scale) = scale {
-        let per = scale.volts_per_code;
-        let zero = scale.volts_at_code_0;
+        let [per, zero] = [scale.volts_per_code, scale.volts_at_code_0].map(shown);
         notes.push(format!(
-            "a code is {per:e} of the column's unit, code 0 at {zero}; the nearest code is taken"
+            "a code is {per} of the column's unit, code 0 at {zero}; the nearest code is taken"
         ));
         notes.extend(between(scale, used, &rows));
     }
@@ -505,6 +504,15 @@ fn sample_rate(named: &Named, rows: &[Vec<f64>]) -> Option<(f64, String)> {
     let hz = (times.len() - 1) as f64 / span;
     (times.len() >= ROWS_OF_A_TABLE && hz.is_finite() && hz > 0.0)
         .then(|| (rounded(hz), named.shown(column)))
+}
+
+/// A number to twelve digits: what a product of decimals leaves behind them is no part of it.
+fn shown(value: f64) -> String {
+    let value: f64 = format!("{value:.11e}").parse().unwrap_or(value);
+    match value == 0.0 || (1e-3..1e7).contains(&value.abs()) {
+        true => format!("{value}"),
+        false => format!("{value:e}"),
+    }
 }
 
 /// To six digits: printed times carry no more.

@@ -336,6 +336,131 @@ fn raw_samples_are_what_their_side_car_says() {
 }
 
 #[test]
+fn raw_samples_may_stand_behind_a_header_in_text() {
+    let low = |c: i32| (c as i16).to_le_bytes().to_vec();
+    let header = |bytes: usize| "model = X, channels = 2\r\n".bytes().cycle().take(bytes);
+    let samples: Vec<u8> = (0..40).flat_map(|_| interleaved(low, 2)).collect();
+    for bytes in [100, 512, 4096] {
+        let whole: Vec<u8> = header(bytes).chain(samples.iter().copied()).collect();
+        let keys = format!("item = \"int16\"\nskip_bytes = {bytes}\n");
+        let file = Capture::new("c.dat", &whole).beside("c.toml", &keys);
+        let (read, error) = file.rows(Q15, 100);
+        assert_eq!((read.len(), error), (240, None), "{bytes}");
+        assert_eq!(read[..6], rows());
+    }
+    // A CSV file beside it, of the same stem, stays one.
+    let text: String = (0..300).map(|k| format!("{k},{}\n", k % 7)).collect();
+    let file = csv(format!("drive_code,sense_code\n{text}"))
+        .beside("capture.toml", "item = \"int16\"\nskip_bytes = 512\n");
+    assert_eq!(file.rows(Q15, 1000).0.len(), 300);
+}
+
+#[test]
+fn what_is_no_capture_is_called_what_it_is() {
+    let thermal = |names: &str| format!("{names}\n1,2,3\n2,3,5\n4,5,6\n5,6,7\n").into_bytes();
+    let page = b"\xEF\xBB\xBF\n\n<!DOCTYPE html>\n<html><body>time_s,rate_out_dps</body></html>\n";
+    let gzip = |bytes: &[u8]| {
+        let mut out = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+        out.write_all(bytes).unwrap();
+        out.finish().unwrap()
+    };
+    let capture = gzip(b"drive_code,sense_code\n1,2\n3,4\n");
+    let ulog = super::ulog_tests::sound().0;
+    let flash = super::dataflash_tests::sound();
+    for (name, bytes, message, help) in [
+        (
+            "a.csv",
+            thermal("time_s,rate_out_dps,die_degc"),
+            "a thermal record",
+            "--record",
+        ),
+        (
+            "a.csv",
+            thermal("Time (ms),Rate (\u{b0}/s),Die (\u{b0}C)"),
+            "a thermal record",
+            "--record",
+        ),
+        (
+            "a.csv",
+            thermal("t;gyro [deg/s];temp_c"),
+            "a thermal record",
+            "--record",
+        ),
+        (
+            "a.csv",
+            thermal("time_ms,rate_out_rad_s,phase_rad"),
+            "a thermal record",
+            "--record",
+        ),
+        (
+            "a.csv.gz",
+            gzip(&thermal("time_s,rate_out_dps,die_degc")),
+            "a thermal record",
+            "--record",
+        ),
+        ("a.ulg", ulog, "a PX4 log", "--record"),
+        ("a.bin", flash, "an ArduPilot log", "--record"),
+        ("a.csv", page.to_vec(), "HTML", "downloaded"),
+        ("a.npy", page.to_vec(), "HTML", "downloaded"),
+        ("a.ulg", page.to_vec(), "HTML", "downloaded"),
+        ("a.csv.gz", gzip(page), "HTML", "downloaded"),
+        ("a.csv", b"{\"drive\": [1, 2]}".to_vec(), "JSON", ""),
+        (
+            "a.csv.gz",
+            gzip(&capture),
+            "holds another packed file",
+            "once",
+        ),
+        (
+            "a.csv.gz",
+            capture[..capture.len() - 12].to_vec(),
+            "cut short",
+            "another copy",
+        ),
+    ] {
+        let file = Capture::new(name, &bytes);
+        let told = file.rows(Q15, 9).1.unwrap().to_string();
+        assert!(
+            told.contains(message) && told.contains(help),
+            "{name}: {told}"
+        );
+        assert!(!told.contains("drive_column"), "{name}: {told}");
+    }
+    // A temperature beside the codes is none of the codes.
+    let text: String = (1..9).map(|k| format!("{k},{k},{k}\n")).collect();
+    let file = csv(format!("drive,sense,die_degc\n{text}"));
+    assert_eq!(file.rows(Q15, 9).0.len(), 8);
+}
+
+#[test]
+fn unsigned_codes_and_microvolts_are_told_as_a_user_thinks_of_them() {
+    let item = npy(
+        "<u2",
+        "(6, 2)",
+        false,
+        &interleaved(|c| (c as u16).to_le_bytes().to_vec(), 2),
+    );
+    for keys in ["", "drive_column = 0\nsense_column = 1\n"] {
+        let file = Capture::new("c.npy", &item).beside("c.toml", keys);
+        let told = file.rows(Q15, 9).1.unwrap().to_string();
+        assert!(
+            told.contains("offset binary") && told.contains("32768"),
+            "{told}"
+        );
+    }
+    let text: String = (0..90)
+        .map(|k| format!("{},{}\n", 100 * k, 200 * k))
+        .collect();
+    let file =
+        csv(format!("drive_uV,sense_uV\n{text}")).beside("capture.toml", "volts_per_code = 1e-4\n");
+    let notes = CaptureReader::open(&file.path, Q15)
+        .unwrap()
+        .notes()
+        .join("; ");
+    assert!(notes.contains("a code is 100 of"), "{notes}");
+}
+
+#[test]
 fn raw_samples_without_what_they_need_are_refused() {
     let low = |c: i32| (c as i16).to_le_bytes().to_vec();
     let bytes = interleaved(low, 2);

@@ -52,7 +52,38 @@ pub(super) struct Kind {
     pub inert: bool,
 }
 
-/// The kind of a column; `None` for one that is no abscissa.
+/// No gyro turns faster, deg/s.
+const FASTEST_DPS: f64 = 20_000.0;
+
+/// Full scales of converters of 16, 24 and 32 bits, which they give where they have no reading.
+const OF_CONVERTERS: [f64; 9] = [
+    -32_768.0,
+    32_767.0,
+    65_535.0,
+    -8_388_608.0,
+    8_388_607.0,
+    -2_147_483_648.0,
+    2_147_483_647.0,
+    4_294_967_295.0,
+    -2_147_483_647.0,
+];
+
+/// Error values of the output: faster than any gyro turns, in a tenth of the rows at most, each a converter's full scale or
+/// repeated to the last digit. What else is so fast is in another unit.
+fn of_converter(values: &[f64], kind: Kind) -> Vec<bool> {
+    let beyond = |v: f64| v.is_finite() && !(kind.possible.0..=kind.possible.1).contains(&v);
+    let all: Vec<f64> = values.iter().copied().filter(|v| beyond(*v)).collect();
+    let measured = values.iter().filter(|v| v.is_finite()).count();
+    let repeated = |v: f64| all.iter().filter(|o| **o == v).count() > 1;
+    let are = all
+        .iter()
+        .all(|v| OF_CONVERTERS.contains(v) || repeated(*v));
+    let few = 10 * all.len() <= measured;
+    let marked = |v: &f64| are && few && beyond(*v);
+    values.iter().map(marked).collect()
+}
+
+/// The kind of a column; `None` for one whose values are taken as they are.
 pub(super) fn kind_of(column: &str) -> Option<Kind> {
     let tiny = f64::MIN_POSITIVE;
     let turn = std::f64::consts::TAU;
@@ -63,6 +94,7 @@ pub(super) fn kind_of(column: &str) -> Option<Kind> {
         "accel_g" => (-20_000.0, 20_000.0),
         "agc" => (tiny, f64::MAX),
         "quad_dps" => (-f64::MAX, f64::MAX),
+        "rate_out_dps" => (-FASTEST_DPS, FASTEST_DPS),
         _ if unit_of(column) == "degC" => (-100.0, 250.0),
         _ => return None,
     };
@@ -77,22 +109,23 @@ pub(super) fn take(record: &mut ThermalRecord, warnings: &mut Vec<Warning>) {
         let (Some(kind), Some(values)) = (kind_of(&name), record.columns.get(&name)) else {
             continue;
         };
-        let marks = marks(&record.time_s, values, kind);
+        let marks = match name == "rate_out_dps" {
+            true => of_converter(values, kind),
+            false => marks(&record.time_s, values, kind),
+        };
         if !marks.contains(&true) {
             continue;
         }
-        let cells = values.iter().zip(&record.lines).zip(&marks);
-        let marked: Vec<(f64, usize)> = cells
-            .filter(|(_, mark)| **mark)
-            .map(|((v, line), _)| (*v, *line))
-            .collect();
+        let rows: Vec<usize> = (0..marks.len()).filter(|row| marks[*row]).collect();
+        let marked: Vec<f64> = rows.iter().map(|row| values[*row]).collect();
         let measured = record.measured(&name);
         let kept = values
             .iter()
             .zip(&marks)
-            .filter(|(v, mark)| !**mark && marked.iter().any(|(m, _)| m == *v))
+            .filter(|(v, mark)| !**mark && marked.contains(v))
             .count();
-        warnings.push(told(&name, &marked, measured, kept));
+        let places = record.places(&rows);
+        warnings.push(told(&name, &marked, &places, measured, kept));
         if let Some(values) = record.columns.get_mut(&name) {
             let cells = values.iter_mut().zip(&marks).filter(|(_, mark)| **mark);
             cells.for_each(|(value, _)| *value = f64::NAN);
@@ -100,13 +133,8 @@ pub(super) fn take(record: &mut ThermalRecord, warnings: &mut Vec<Warning>) {
     }
 }
 
-/// What is said of the cells (value, line) of a column.
-fn told(name: &str, marked: &[(f64, usize)], measured: usize, kept: usize) -> Warning {
-    let lines: Vec<String> = marked.iter().take(8).map(|c| c.1.to_string()).collect();
-    let more = match marked.len().saturating_sub(8) {
-        0 => String::new(),
-        n => format!(" and {n} more"),
-    };
+/// What is said of the cells of a column, and where they are.
+fn told(name: &str, marked: &[f64], places: &str, measured: usize, kept: usize) -> Warning {
     let doubtful = match kept {
         0 => String::new(),
         n => format!(
@@ -118,10 +146,9 @@ fn told(name: &str, marked: &[(f64, usize)], measured: usize, kept: usize) -> Wa
         name,
         format!(
             "{} of {measured} cells of {name} hold {}, out of reach of the readings before and after them. These are \
-             error values, not readings. They count as not measured (line {}{more}){doubtful}",
+             error values, not readings. They count as not measured ({places}){doubtful}",
             marked.len(),
-            values_of(marked.iter().map(|c| c.0), unit_of(name)),
-            lines.join(", ")
+            values_of(marked.iter().copied(), unit_of(name)),
         ),
     )
 }

@@ -523,9 +523,9 @@ fn error_values_among_the_samples_of_a_row_are_left_out() {
             told.contains(&format!("{value} degC")) && told.contains("sensor_gyro.temperature"),
             "{told}"
         );
-        // 16 samples, each in a row of its own, of all 60.
+        // 17 samples, each in a row of its own, of all 60.
         assert!(
-            told.contains("(16 times) in 16 samples of 16 of 60 rows"),
+            told.contains("(17 times) in 17 samples of 17 of 60 rows"),
             "{told}"
         );
     }
@@ -547,6 +547,33 @@ fn error_values_are_counted_in_samples_and_rows() {
     assert!(
         told.contains("-127 degC (32 times) in 32 samples of 4 of 60 rows"),
         "{told}"
+    );
+}
+
+#[test]
+fn what_is_said_of_a_log_has_times_and_no_lines() {
+    let w = gyro(1200, |k| {
+        let rate = if (300..310).contains(&k) {
+            40_000.0
+        } else {
+            0.1 + wobble(k)
+        };
+        let degc = 20.0 + 0.02 * k.min(800) as f64 + 0.1 * wobble(k / 10);
+        (at(k), 7, rate, if k < 600 { degc } else { 31.0 })
+    });
+    let (_, warnings) = of(&w, None).unwrap();
+    let told = said(&warnings, "rate_out_of_range");
+    assert!(
+        told.contains("at 40.4 s since power-on") || told.contains("at 40.5 s since power-on"),
+        "{told}"
+    );
+    assert!(
+        warnings.iter().all(|w| !w.message.contains("line ")),
+        "{warnings:?}"
+    );
+    assert!(
+        !said(&warnings, "frozen_channel").is_empty(),
+        "{warnings:?}"
     );
 }
 
