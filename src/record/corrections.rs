@@ -129,8 +129,8 @@ pub(super) struct Undo {
 
 impl Undo {
     fn cubic(&self, time_us: f64) -> Option<&Cubic> {
-        let before = self.pieces.iter().filter(|p| p.0 as f64 <= time_us);
-        before.last()?.1.as_ref()
+        let mut before = self.pieces.iter().filter(|p| p.0 as f64 <= time_us);
+        before.next_back()?.1.as_ref()
     }
 
     /// Adds what was subtracted to every row in which it was.
@@ -198,8 +198,8 @@ impl Switched {
     /// What is to be said of rows with these times, s since power-on.
     pub(super) fn said(&self, since_s: &[f64]) -> Warning {
         let is_on = |s: &f64| {
-            let before = self.on.iter().filter(|o| o.0 as f64 <= s * 1e6);
-            before.last().is_some_and(|o| o.1)
+            let mut before = self.on.iter().filter(|o| o.0 as f64 <= s * 1e6);
+            before.next_back().is_some_and(|o| o.1)
         };
         match since_s.iter().any(is_on) {
             true => self.with.clone(),

@@ -123,6 +123,35 @@ fn two_gyros_are_listed_and_the_first_is_taken() {
 }
 
 #[test]
+fn a_topic_without_samples_is_no_gyro() {
+    // The gyro's number in sensor_gyro is 1, and 0 in the topic that has its temperature.
+    let mut w = gyro(0, |k| (k, 0, 0.0, 0.0));
+    w.message(
+        b'F',
+        b"vehicle_imu_status:uint64_t timestamp;uint32_t gyro_device_id;float temperature_gyro;",
+    );
+    w.subscribe(1, 1, "sensor_gyro");
+    w.subscribe(2, 0, "vehicle_imu_status");
+    for k in 0..300 {
+        let degc = 20.0 + k as f32 * 0.1;
+        let id = 7u32.to_le_bytes();
+        let sample = floats(&[0.0, 0.0, wobble(k) as f32, f32::NAN]);
+        w.data(1, at(k), &[&id[..], &sample].concat());
+        w.data(2, at(k), &[&id[..], &floats(&[degc])].concat());
+    }
+    let (r, warnings) = of(&w, None).unwrap();
+    assert_eq!(r.len(), 30);
+    assert_eq!(said(&warnings, "gyros_in_log"), "");
+    let (r, _) = of(&w, Some(1)).unwrap();
+    assert!(r.columns.contains_key("die_degc"));
+    let refused = of(&w, Some(0)).unwrap_err().to_string();
+    assert!(
+        refused.contains("no samples of gyro 0") && refused.contains("1 (sensor_gyro, 30 rows"),
+        "{refused}"
+    );
+}
+
+#[test]
 fn a_device_that_is_replaced_ends_the_record() {
     let w = gyro(400, |k| {
         (
