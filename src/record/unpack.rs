@@ -57,15 +57,22 @@ impl<R: Read> Read for Told<R> {
 
 /// A decoder's failure in words: cut, or damaged; what the system says stays.
 fn told(error: io::Error, name: &str) -> io::Error {
-    let is_cut =
-        error.to_string().contains("stream ends") || error.to_string().contains("incomplete");
+    let text = error.to_string();
+    let is_cut = ["stream ends", "incomplete", "UnexpectedEof"]
+        .iter()
+        .any(|part| text.contains(part));
     match error.kind() {
         io::ErrorKind::UnexpectedEof => cut(name),
-        io::ErrorKind::InvalidData | io::ErrorKind::InvalidInput if is_cut => cut(name),
-        io::ErrorKind::InvalidData | io::ErrorKind::InvalidInput => io::Error::new(
-            io::ErrorKind::InvalidData,
-            format!("the {name} file is damaged ({error})"),
-        ),
+        // The zstd decoder tells all of its failures as of another kind.
+        io::ErrorKind::InvalidData | io::ErrorKind::InvalidInput | io::ErrorKind::Other => {
+            match is_cut {
+                true => cut(name),
+                false => io::Error::new(
+                    io::ErrorKind::InvalidData,
+                    format!("the {name} file is damaged ({text})"),
+                ),
+            }
+        }
         _ => error,
     }
 }
