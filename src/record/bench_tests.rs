@@ -426,6 +426,10 @@ fn what_is_no_capture_is_called_what_it_is() {
         );
         assert!(!told.contains("drive_column"), "{name}: {told}");
     }
+    // A line of a preamble is no header.
+    let text: String = (1..9).map(|k| format!("{k},{k}\n")).collect();
+    let file = csv(format!("Temperature (C),25\ndrive,sense\n{text}"));
+    assert_eq!(file.rows(Q15, 9).0.len(), 8);
     // A temperature beside the codes is none of the codes.
     let text: String = (1..9).map(|k| format!("{k},{k},{k}\n")).collect();
     let file = csv(format!("drive,sense,die_degc\n{text}"));

@@ -79,6 +79,10 @@ pub(super) fn refuse_thermal(line: Line<'_>) -> Result<()> {
     let mut names = text
         .split([',', ';', '\t'])
         .map(|n| n.trim().trim_matches('"').trim());
+    // A line of a preamble, such as `Temperature (C),25`, is no header.
+    if names.clone().any(|n| n.parse::<f64>().is_ok()) || names.clone().count() < 2 {
+        return Ok(());
+    }
     let is_thermal = |name: &&str| {
         let is_of = |n: &str| is_known(n) && !["time_s", "supply_v", "accel_g"].contains(&n);
         let stated = |column: &str| units::stated(name, column);
