@@ -161,6 +161,9 @@ pub fn io_error(path: impl AsRef<Path>, doing: &str, e: &std::io::Error) -> Erro
         .help(match e.kind() {
             std::io::ErrorKind::NotFound => "check the path",
             std::io::ErrorKind::PermissionDenied => "check the permissions",
+            std::io::ErrorKind::UnexpectedEof | std::io::ErrorKind::InvalidData => {
+                "take another copy of the file"
+            }
             _ => "check the path and the disk",
         })
         .into()

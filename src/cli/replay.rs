@@ -83,6 +83,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let started = Instant::now();
     let (mut samples, mut index) = (0u64, 0u64);
     let mut busy = Duration::ZERO;
+    let mut still = [Still::default(), Still::default()];
     loop {
         let count = capture.read_block(&mut drive, &mut sense, BLOCK)?;
         if count == 0 {
@@ -94,12 +95,21 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
             .map_err(|overflowed| Error::Check(overflowed.to_string()))?;
         busy += start.elapsed();
         samples += count as u64;
+        for (still, codes) in still.iter_mut().zip([&drive, &sense]) {
+            still.add(codes);
+        }
         index = write(&mut rows, columns.len(), index, &mut writer)?;
         stages.at(samples, of);
     }
     writer.finish()?;
     stages.over();
     let period = design.circuit.decimator.ratio;
+    for (still, name) in still.iter().zip(["drive_code", "sense_code"]) {
+        if let Some(message) = still.said(name) {
+            talk!("warning: {message}");
+            warnings.push(message);
+        }
+    }
     if index == 0 {
         warnings.push(format!(
             "the capture has {samples} samples, and a row takes {period}. The file has no row. Capture longer"
@@ -131,6 +141,39 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     }
     Ok(())
 }
+
+/// How long a channel stands at one code.
+#[derive(Debug, Clone, Copy, Default)]
+struct Still {
+    last: Option<i32>,
+    samples: u64,
+    /// Samples with the code of the one before.
+    repeated: u64,
+}
+
+impl Still {
+    fn add(&mut self, codes: &[i32]) {
+        let before = self.last.into_iter().chain(codes.iter().copied());
+        let same = before.zip(codes.iter().skip(usize::from(self.last.is_none())));
+        self.repeated += same.filter(|(a, b)| a == *b).count() as u64;
+        self.samples += codes.len() as u64;
+        self.last = codes.last().copied().or(self.last);
+    }
+
+    /// What is said of a channel that hardly ever changes: a tone does within a few samples.
+    fn said(&self, name: &str) -> Option<String> {
+        let code = self.last?;
+        let still = self.samples >= LEAST_STILL && 100 * self.repeated >= 99 * (self.samples - 1);
+        still.then(|| {
+            format!(
+                "{name} has no signal: it stands at one code (the last is {code}) in nearly all rows. Is it connected?"
+            )
+        })
+    }
+}
+
+/// Fewer samples at one code are no standstill (convention).
+const LEAST_STILL: u64 = 64;
 
 /// M samples/s.
 fn rate(samples: u64, time: Duration) -> f64 {
@@ -177,4 +220,31 @@ pub(super) fn warn_of_mismatches(design: &Design, capture: &CaptureReader) -> Ve
         talk!("warning: {warning}");
     }
     warnings
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_channel_at_one_code_is_said_and_a_tone_is_none() {
+        let said = |codes: &[i32]| {
+            let mut still = Still::default();
+            codes.chunks(7).for_each(|block| still.add(block));
+            still.said("drive_code")
+        };
+        let mut codes = vec![9000; 500];
+        assert!(
+            said(&codes)
+                .unwrap()
+                .contains("stands at one code (the last is 9000)")
+        );
+        codes[100] = 8999;
+        assert!(said(&codes).is_some());
+        let tone: Vec<i32> = (0..500)
+            .map(|k| (100.0 * (0.1 * f64::from(k)).sin()) as i32)
+            .collect();
+        assert_eq!(said(&tone), None);
+        assert_eq!((said(&[]), said(&[5]), said(&[5; 40])), (None, None, None));
+    }
 }

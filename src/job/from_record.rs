@@ -120,17 +120,24 @@ fn check_range(
     let Some(row) = beyond else {
         return Ok(());
     };
-    Err(InputError::new(format!(
-        "rate_out_dps is {} deg/s, the firmware's rate word {format} ends at {full_scale:.3} deg/s",
-        rate_out[row]
+    let error = InputError::new(format!(
+        "rate_out_dps is {} deg/s {}, the firmware's rate word {format} ends at {full_scale:.3} deg/s",
+        rate_out[row],
+        record.at_place(row)
     ))
     .in_file(&record.source)
-    .at(record.lines.get(row).copied().unwrap_or(0), 1)
     .help(match design.compensation_is_own {
         true => "raise compensation.rate_full_scale_dps or the rate's format",
         false => "give the design a [compensation] of its own with a larger rate_full_scale_dps",
+    });
+    // A log has no lines.
+    Err(match record.is_of_log() {
+        true => error.into(),
+        false => {
+            let line = record.lines.get(row).copied().unwrap_or(0);
+            error.at(line, 1).into()
+        }
     })
-    .into())
 }
 
 /// The bit-accurate compensation of each row, raw.

@@ -204,12 +204,21 @@ fn parse(bytes: &[u8], path: &Path) -> Result<Profile> {
         .from_reader(bytes);
     let broken = |e: csv::Error| {
         let line = e.position().map_or(1, csv::Position::line);
-        refuse(format!("is no readable CSV: {e}"), line, None)
+        refuse(format!("the profile is no readable CSV: {e}"), line, None)
     };
     let header = reader.headers().map_err(broken)?.clone();
     let find = |name: &str| header.iter().position(|h| h == name);
     let need = |name: &str| {
-        find(name).ok_or_else(|| Error::from(refuse(format!("has no column {name}"), 1, None)))
+        find(name).ok_or_else(|| {
+            Error::from(refuse(
+                format!(
+                    "the profile has no column {name}; the file has: {}",
+                    header.iter().collect::<Vec<_>>().join(", ")
+                ),
+                1,
+                None,
+            ))
+        })
     };
     let places = [
         Some(need("time_s")?),
@@ -231,18 +240,20 @@ fn parse(bytes: &[u8], path: &Path) -> Result<Profile> {
                 Ok(v) if v.is_finite() => v,
                 _ => {
                     let name = header.get(place).unwrap_or("");
-                    let message = format!("has \"{cell}\" as {name}, which is no number");
+                    let message =
+                        format!("the profile has \"{cell}\" as {name}, which is no number");
                     return Err(refuse(message, line, Some(column_of(&record, place))).into());
                 }
             };
         }
         let [time_s, chamber_degc, rate_dps, supply_v, accel_g] = values;
         if chamber_degc <= -super::resonator::ZERO_CELSIUS_K {
-            let message = format!("has a chamber at {chamber_degc} degC, below absolute zero");
+            let message =
+                format!("the profile has a chamber at {chamber_degc} degC, below absolute zero");
             return Err(refuse(message, line, None).into());
         }
         if corners.last().is_some_and(|last| time_s < last.time_s) {
-            let message = format!("has the time {time_s} s after a later one");
+            let message = format!("the profile has the time {time_s} s after a later one");
             return Err(refuse(message, line, None).into());
         }
         corners.push(Surroundings {
@@ -254,7 +265,7 @@ fn parse(bytes: &[u8], path: &Path) -> Result<Profile> {
         });
     }
     if corners.is_empty() {
-        return Err(refuse("has no rows".to_owned(), 1, None).into());
+        return Err(refuse("the profile has no rows".to_owned(), 1, None).into());
     }
     let has = [places[2], places[3], places[4]].map(|p| p.is_some());
     Ok(Profile { corners, has })

@@ -62,3 +62,16 @@ fn what_is_no_profile_is_refused_with_its_place() {
         assert!(e.to_string().contains(words), "{text:?}: {e}");
     }
 }
+
+#[test]
+fn a_missing_column_is_told_with_those_that_are_there() {
+    let error = parse(b"seconds,chamber_degc\n0,20\n", Path::new("oven.csv")).unwrap_err();
+    let text = error.to_string();
+    for part in [
+        "oven.csv:1:1",
+        "the profile has no column time_s",
+        "the file has: seconds, chamber_degc",
+    ] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+}

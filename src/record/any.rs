@@ -28,6 +28,9 @@ pub fn read_any(path: &Path, mapping: &RecordMapping) -> Result<(ThermalRecord, 
         true => headed(input).map_err(failed)?,
         false => (head, input),
     };
+    if let Some(error) = unpack::packed_twice(path, &head).filter(|_| packed) {
+        return Err(error.into());
+    }
     if let Some((what, help)) = unpack::foreign(&head) {
         return Err(InputError::new(what).in_file(path).help(help).into());
     }
@@ -59,6 +62,10 @@ fn headed(mut input: Box<dyn Read + Send>) -> std::io::Result<(Vec<u8>, Box<dyn 
 fn refuse_by_name(path: &Path, start: &[u8]) -> Result<()> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
     let (what, help) = match extension.to_ascii_lowercase().as_str() {
+        "ulg" | "ulog" | "bin" | "tlog" | "mavlink" if start.is_empty() => (
+            "the log is empty: the file has no byte",
+            "take another copy of it: the disk may have been full, or the copy broken off",
+        ),
         "ulg" | "ulog" => (
             "the file is named as a PX4 ULog and does not begin as one",
             "a ULog begins with `ULog`: was the file truncated, packed, or downloaded in part?",

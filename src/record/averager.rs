@@ -319,10 +319,28 @@ impl Averager {
             }
         }
         let marks = error_values::marks(&time_s, &values, kind);
+        // Of samples and rows as the log has them; what is left is less.
+        let all = self.rows_of(channel).count();
+        let of_part = |number: u64, part: usize| -> Option<u32> {
+            let sum = self.rows.get(&number)?.get(channel)?;
+            let part = match part.checked_sub(1) {
+                None => sum,
+                Some(i) => sum.others.get(i)?,
+            };
+            Some(part.count)
+        };
+        let counts: Vec<usize> = rows
+            .iter()
+            .map(|(number, part)| of_part(*number, *part).unwrap_or(1) as usize)
+            .collect();
         self.leave_out(channel, &rows, &values, &marks, kind);
         let marked = || marks.iter().zip(&time_s).filter(|(m, _)| **m).map(|m| *m.1);
         let (first, last) = (marked().next()?, marked().next_back()?);
-        let cells = values.iter().zip(&marks).filter(|(_, m)| **m).map(|v| *v.0);
+        let parts = || (0..marks.len()).filter(|i| marks[*i]);
+        let samples: usize = parts().map(|i| counts[i]).sum();
+        let mut hit: Vec<u64> = parts().map(|i| rows[i].0).collect();
+        hit.dedup();
+        let cells = parts().flat_map(|i| std::iter::repeat_n(values[i], counts[i]));
         let (source, unit) = (
             &self.channels.get(channel)?.source,
             super::columns::unit_of(column),
@@ -331,11 +349,11 @@ impl Averager {
             "error_values",
             column,
             format!(
-                "{source} holds {} in {} of {} rows ({first:.1} to {last:.1} s since power-on), out of reach of the readings \
-                 before and after: error values, no readings. They were left out",
+                "{source} holds {} in {samples} {} of {} of {all} rows ({first:.1} to {last:.1} s since power-on), out of reach \
+                 of the readings before and after: error values, no readings. They were left out",
                 error_values::values_of(cells, unit),
-                marked().count(),
-                self.rows_of(channel).count(),
+                if samples == 1 { "sample" } else { "samples" },
+                hit.len(),
             ),
         ))
     }

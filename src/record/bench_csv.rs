@@ -52,6 +52,17 @@ pub(super) fn table(
     let Some((before, width)) = found else {
         return Ok(None);
     };
+    if let Some(k) = damaged_row(&lines[..before], lines[before], separator) {
+        let mut error = InputError::new(
+            "this line stands among the rows, right before the first whole one, and is none: some of its cells hold numbers, and \
+             others do not",
+        )
+        .in_file(path)
+        .at(number + k, 1)
+        .help("repair the row or take it away; if it is the header, let no name in it be a number");
+        error.source_line = lines.get(k).map(|l| l.trim_end().to_owned());
+        return Err(error.into());
+    }
     let named = names(&lines[..before], separator, width);
     let used = used((path, number), &named, width, keys)?;
     if let Some(k) = row_before(&lines[..before], separator, width, used) {
@@ -86,10 +97,9 @@ pub(super) fn table(
         notes.push(format!("{before} lines stand before the first row"));
     }
     if let Some(scale) = scale {
-        let per = scale.volts_per_code;
-        let zero = scale.volts_at_code_0;
+        let [per, zero] = [scale.volts_per_code, scale.volts_at_code_0].map(shown);
         notes.push(format!(
-            "a code is {per:e} of the column's unit, code 0 at {zero}; the nearest code is taken"
+            "a code is {per} of the column's unit, code 0 at {zero}; the nearest code is taken"
         ));
         notes.extend(between(scale, used, &rows));
     }
@@ -241,6 +251,36 @@ fn first_row(lines: &[&str], separator: u8) -> Option<(usize, usize)> {
             .all(|w| *w == Some(width))
             .then_some((i, width))
     })
+}
+
+/// The first of the damaged rows that stand right before the first whole one, `row`; there they would end as a preamble or
+/// as the header. A damaged row has the width of the rows and numbers in some of its cells alone, or begins with a number.
+fn damaged_row(before: &[&str], row: &str, separator: u8) -> Option<usize> {
+    let width = |line: &str| line.bytes().filter(|b| *b == separator).count();
+    let of = |line: &str| {
+        let cells = line.split(char::from(separator));
+        let bare = cells.map(|c| c.trim().trim_matches('"').trim());
+        bare.map(|c| number(c, separator).is_some())
+            .collect::<Vec<bool>>()
+    };
+    let is_part = |numbers: &[bool], line: &str| {
+        let any = numbers.contains(&true);
+        (any && width(line) == width(row)) || (numbers.len() >= 2 && numbers[0])
+    };
+    let mut found = None;
+    for (k, line) in before.iter().enumerate().rev() {
+        if line.trim().is_empty() {
+            break;
+        }
+        let numbers = of(line);
+        if !is_part(&numbers, line) {
+            break;
+        }
+        if numbers.contains(&false) || width(line) != width(row) {
+            found = Some(k);
+        }
+    }
+    found
 }
 
 /// A line before the first row that is a row itself, or that lacks names where both columns have them: a damaged one
@@ -464,6 +504,15 @@ fn sample_rate(named: &Named, rows: &[Vec<f64>]) -> Option<(f64, String)> {
     let hz = (times.len() - 1) as f64 / span;
     (times.len() >= ROWS_OF_A_TABLE && hz.is_finite() && hz > 0.0)
         .then(|| (rounded(hz), named.shown(column)))
+}
+
+/// A number to twelve digits: what a product of decimals leaves behind them is no part of it.
+fn shown(value: f64) -> String {
+    let value: f64 = format!("{value:.11e}").parse().unwrap_or(value);
+    match value == 0.0 || (1e-3..1e7).contains(&value.abs()) {
+        true => format!("{value}"),
+        false => format!("{value:e}"),
+    }
 }
 
 /// To six digits: printed times carry no more.

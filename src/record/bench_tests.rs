@@ -185,7 +185,7 @@ fn what_is_not_said_is_asked_for_with_the_keys() {
         (
             "a,b\n1,2\n3,x\n5,6\n7,8\n9,9\n",
             "drive_column = 0\nsense_column = 1\n",
-            "like a row",
+            "right before the first whole one",
             "repair",
         ),
         (
@@ -241,6 +241,39 @@ fn a_row_that_is_none_is_refused_with_its_place() {
             "{row}: {error}"
         );
         assert!(error.to_string().contains(message), "{error}");
+    }
+}
+
+#[test]
+fn a_damaged_first_row_is_no_preamble_and_no_header() {
+    let rows: String = (2..40)
+        .map(|k| format!("{k},{},{}\n", 10 * k, 7 * k))
+        .collect();
+    let names = "drive_column = \"CH1\"\nsense_column = \"CH2\"\n";
+    let places = "drive_column = 1\nsense_column = 2\n";
+    for (first, line) in [
+        ("0,OVL,0", 2),
+        ("0,,0", 2),
+        ("0,-9000,", 2),
+        (",5,5", 2),
+        ("OVL,5,5", 2),
+        ("0,-9000,--", 2),
+        ("0,nan,5", 2),
+        ("0,-9000", 2),
+        ("0,-9000,5,5", 2),
+        ("0,-9000,0\n1,OVL,1", 3),
+        ("0,OVL,0\n1,5,1", 2),
+        ("0,OVL,0\n1,OVL,1", 2),
+    ] {
+        for keys in [names, places] {
+            let (_, error) = csv(format!("TIME,CH1,CH2\n{first}\n{rows}"))
+                .beside("capture.toml", keys)
+                .rows(Q15, 9);
+            let error = error.unwrap_or_else(|| panic!("{first} is passed over"));
+            let told = error.to_string();
+            assert_eq!(error.line, Some(line), "{first}: {told}");
+            assert!(!told.contains("_column ="), "{first}: {told}");
+        }
     }
 }
 
@@ -300,6 +333,135 @@ fn raw_samples_are_what_their_side_car_says() {
         "item = \"int16\"\ndrive_column = 1\nsense_column = 0\n",
     );
     assert_eq!(swapped.rows(Q15, 9).0[0], (-2, 1));
+}
+
+#[test]
+fn raw_samples_may_stand_behind_a_header_in_text() {
+    let low = |c: i32| (c as i16).to_le_bytes().to_vec();
+    let header = |bytes: usize| "model = X, channels = 2\r\n".bytes().cycle().take(bytes);
+    let samples: Vec<u8> = (0..40).flat_map(|_| interleaved(low, 2)).collect();
+    for bytes in [100, 512, 4096] {
+        let whole: Vec<u8> = header(bytes).chain(samples.iter().copied()).collect();
+        let keys = format!("item = \"int16\"\nskip_bytes = {bytes}\n");
+        let file = Capture::new("c.dat", &whole).beside("c.toml", &keys);
+        let (read, error) = file.rows(Q15, 100);
+        assert_eq!((read.len(), error), (240, None), "{bytes}");
+        assert_eq!(read[..6], rows());
+    }
+    // A CSV file beside it, of the same stem, stays one.
+    let text: String = (0..300).map(|k| format!("{k},{}\n", k % 7)).collect();
+    let file = csv(format!("drive_code,sense_code\n{text}"))
+        .beside("capture.toml", "item = \"int16\"\nskip_bytes = 512\n");
+    assert_eq!(file.rows(Q15, 1000).0.len(), 300);
+}
+
+#[test]
+fn what_is_no_capture_is_called_what_it_is() {
+    let thermal = |names: &str| format!("{names}\n1,2,3\n2,3,5\n4,5,6\n5,6,7\n").into_bytes();
+    let page = b"\xEF\xBB\xBF\n\n<!DOCTYPE html>\n<html><body>time_s,rate_out_dps</body></html>\n";
+    let gzip = |bytes: &[u8]| {
+        let mut out = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+        out.write_all(bytes).unwrap();
+        out.finish().unwrap()
+    };
+    let capture = gzip(b"drive_code,sense_code\n1,2\n3,4\n");
+    let ulog = super::ulog_tests::sound().0;
+    let flash = super::dataflash_tests::sound();
+    for (name, bytes, message, help) in [
+        (
+            "a.csv",
+            thermal("time_s,rate_out_dps,die_degc"),
+            "a thermal record",
+            "--record",
+        ),
+        (
+            "a.csv",
+            thermal("Time (ms),Rate (\u{b0}/s),Die (\u{b0}C)"),
+            "a thermal record",
+            "--record",
+        ),
+        (
+            "a.csv",
+            thermal("t;gyro [deg/s];temp_c"),
+            "a thermal record",
+            "--record",
+        ),
+        (
+            "a.csv",
+            thermal("time_ms,rate_out_rad_s,phase_rad"),
+            "a thermal record",
+            "--record",
+        ),
+        (
+            "a.csv.gz",
+            gzip(&thermal("time_s,rate_out_dps,die_degc")),
+            "a thermal record",
+            "--record",
+        ),
+        ("a.ulg", ulog, "a PX4 log", "--record"),
+        ("a.bin", flash, "an ArduPilot log", "--record"),
+        ("a.csv", page.to_vec(), "HTML", "downloaded"),
+        ("a.npy", page.to_vec(), "HTML", "downloaded"),
+        ("a.ulg", page.to_vec(), "HTML", "downloaded"),
+        ("a.csv.gz", gzip(page), "HTML", "downloaded"),
+        ("a.csv", b"{\"drive\": [1, 2]}".to_vec(), "JSON", ""),
+        (
+            "a.csv.gz",
+            gzip(&capture),
+            "holds another packed file",
+            "once",
+        ),
+        (
+            "a.csv.gz",
+            capture[..capture.len() - 12].to_vec(),
+            "cut short",
+            "another copy",
+        ),
+    ] {
+        let file = Capture::new(name, &bytes);
+        let told = file.rows(Q15, 9).1.unwrap().to_string();
+        assert!(
+            told.contains(message) && told.contains(help),
+            "{name}: {told}"
+        );
+        assert!(!told.contains("drive_column"), "{name}: {told}");
+    }
+    // A line of a preamble is no header.
+    let text: String = (1..9).map(|k| format!("{k},{k}\n")).collect();
+    let file = csv(format!("Temperature (C),25\ndrive,sense\n{text}"));
+    assert_eq!(file.rows(Q15, 9).0.len(), 8);
+    // A temperature beside the codes is none of the codes.
+    let text: String = (1..9).map(|k| format!("{k},{k},{k}\n")).collect();
+    let file = csv(format!("drive,sense,die_degc\n{text}"));
+    assert_eq!(file.rows(Q15, 9).0.len(), 8);
+}
+
+#[test]
+fn unsigned_codes_and_microvolts_are_told_as_a_user_thinks_of_them() {
+    let item = npy(
+        "<u2",
+        "(6, 2)",
+        false,
+        &interleaved(|c| (c as u16).to_le_bytes().to_vec(), 2),
+    );
+    for keys in ["", "drive_column = 0\nsense_column = 1\n"] {
+        let file = Capture::new("c.npy", &item).beside("c.toml", keys);
+        let told = file.rows(Q15, 9).1.unwrap().to_string();
+        assert!(
+            told.contains("offset binary") && told.contains("32768"),
+            "{told}"
+        );
+    }
+    let text: String = (0..90)
+        .map(|k| format!("{},{}\n", 100 * k, 200 * k))
+        .collect();
+    let file =
+        csv(format!("drive_uV,sense_uV\n{text}")).beside("capture.toml", "volts_per_code = 1e-4\n");
+    let notes = CaptureReader::open(&file.path, Q15)
+        .unwrap()
+        .notes()
+        .join("; ");
+    assert!(notes.contains("a code is 100 of"), "{notes}");
 }
 
 #[test]

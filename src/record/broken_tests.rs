@@ -283,6 +283,48 @@ fn broken_records_are_refused_with_their_place() {
             ],
         ),
         (
+            "a wild time in the middle",
+            with_row(9, "1700000000,0.1,29"),
+            plain.clone(),
+            Some((11, 1)),
+            &[
+                "1700000000 s is a wild one",
+                "8 s before it (line 10)",
+                "10 s after it (line 12)",
+            ],
+        ),
+        (
+            "a wild time in the first row",
+            with_row(0, "1700000000,0.1,29"),
+            plain.clone(),
+            Some((2, 1)),
+            &["1700000000 s is a wild one", "1 s after it (line 3)"],
+        ),
+        (
+            "a wild time in the last row",
+            with_row(19, "1700000000,0.1,29"),
+            plain.clone(),
+            Some((21, 1)),
+            &[
+                "1700000000 s of the last row is a wild one",
+                "(line 20) is at 18 s",
+            ],
+        ),
+        (
+            "the header again",
+            with_row(9, HEADER),
+            plain.clone(),
+            Some((11, 1)),
+            &["the header row again", "two records"],
+        ),
+        (
+            "the header again, with a mark",
+            with_row(9, &format!("\u{feff}{HEADER}")),
+            plain.clone(),
+            Some((11, 1)),
+            &["the header row again"],
+        ),
+        (
             "time decreases, mapped and further right",
             format!(
                 "die_degc,rate_out_dps, t\n{}",

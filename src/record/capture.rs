@@ -15,7 +15,8 @@ use super::{npy_header, unpack};
 use crate::error::{Error, InputError, Result, io_error};
 use crate::input;
 use crate::numeric::format::Format;
-use std::io::Read;
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
 /// A capture file, read block by block.
@@ -43,6 +44,45 @@ fn is_named_npy(path: &Path) -> bool {
 /// Bytes that tell what a file is: text has none below 9 in as many, and 16-bit samples hardly none (convention).
 const START_BYTES: u64 = 512;
 
+fn is_text(bytes: &[u8]) -> bool {
+    !bytes.iter().any(|b| matches!(b, 0..=8 | 14..=31))
+}
+
+/// Whether a file is text from a byte on as well, or cannot be looked at there; it is left where it was.
+fn is_text_from(file: &mut File, byte: u64) -> bool {
+    let mut look = || -> std::io::Result<bool> {
+        let here = file.stream_position()?;
+        file.seek(SeekFrom::Start(byte))?;
+        let mut bytes = Vec::new();
+        file.by_ref().take(START_BYTES).read_to_end(&mut bytes)?;
+        file.seek(SeekFrom::Start(here))?;
+        Ok(is_text(&bytes))
+    };
+    look().unwrap_or(true)
+}
+
+/// Refuses what is no capture by its first bytes: a log, a page, an archive.
+fn refuse_others(path: &Path, start: &[u8]) -> Result<()> {
+    let log = [
+        (&super::ulog::MAGIC[..], "a PX4 log"),
+        (&super::dataflash::MAGIC[..], "an ArduPilot log"),
+    ];
+    if let Some((_, what)) = log.iter().find(|(magic, _)| start.starts_with(magic)) {
+        return Err(InputError::new(format!(
+            "this is {what} and holds a thermal record, and no capture of ADC codes"
+        ))
+        .in_file(path)
+        .help("give it with --record (`run`, `close`)")
+        .into());
+    }
+    match unpack::foreign(start) {
+        Some((what, help)) if !start.starts_with(npy_header::MAGIC) => {
+            Err(InputError::new(what).in_file(path).help(help).into())
+        }
+        _ => Ok(()),
+    }
+}
+
 /// The keys of a file of raw samples; `None` for one that is to be read as text.
 ///
 /// # Errors
@@ -50,12 +90,22 @@ const START_BYTES: u64 = 512;
 fn raw_keys(
     path: &Path,
     start: &[u8],
+    file: &mut File,
     places: &mut Places,
 ) -> Result<Option<(CaptureMeta, BenchKeys)>> {
-    let is_text = |b: &u8| !matches!(b, 0..=8 | 14..=31);
     let named = is_named_raw(path);
-    if unpack::is_packed(start) || (!named && start.iter().all(is_text)) {
+    if unpack::is_packed(start) {
         return Ok(None);
+    }
+    if !named && is_text(start) {
+        // A header in text may stand before raw samples. A broken side-car is said where it is needed.
+        let Ok((_, keys)) = CaptureMeta::of_sidecar(path, &mut Places::default()) else {
+            return Ok(None);
+        };
+        let behind = keys.item.and(keys.skip_bytes).filter(|skip| *skip > 0);
+        if behind.is_none_or(|skip| is_text_from(file, skip)) {
+            return Ok(None);
+        }
     }
     let (meta, keys) = CaptureMeta::of_sidecar(path, places)?;
     match keys.item {
@@ -85,6 +135,10 @@ fn unpacked_text(
         .take(START_BYTES)
         .read_to_end(&mut head)
         .map_err(failed)?;
+    if let Some(error) = unpack::packed_twice(path, &head) {
+        return Err(error.into());
+    }
+    refuse_others(path, &head)?;
     if head.first() == npy_header::MAGIC.first() || head.contains(&0) {
         return Err(InputError::new("this packed file holds no CSV")
             .in_file(path)
@@ -121,6 +175,13 @@ impl CaptureReader {
         let codes = Codes::of(adc);
         let mut places = Places::default();
         let is_npy = start.first() == npy_header::MAGIC.first() || is_named_npy(path);
+        let raw = match is_npy {
+            true => None,
+            false => raw_keys(path, &start, &mut file, &mut places)?,
+        };
+        if raw.is_none() {
+            refuse_others(path, &start)?;
+        }
         let (meta, source, notes) = if is_npy {
             let (meta, keys) = CaptureMeta::of_sidecar(path, &mut places)?;
             if keys.columns == [None, None] && keys.volts_per_code.is_none() {
@@ -130,7 +191,7 @@ impl CaptureReader {
                 let (raw, notes) = RawSource::open_npy(path, file, length, codes, &keys)?;
                 (meta, Source::Raw(raw), notes)
             }
-        } else if let Some((meta, keys)) = raw_keys(path, &start, &mut places)? {
+        } else if let Some((meta, keys)) = raw {
             let (raw, notes) = RawSource::open(path, file, length, codes, &keys)?;
             (meta, Source::Raw(raw), notes)
         } else {

@@ -3,7 +3,7 @@
 use super::bench_csv;
 use super::bench_keys::{BenchKeys, Scale};
 use super::capture::{COLUMNS, Codes, HEADER_HELP};
-use super::capture_header::{Layout, names_a_column, read_comment, read_header};
+use super::capture_header::{Layout, names_a_column, read_comment, read_header, refuse_thermal};
 use super::capture_lines::{Line, Lines};
 use super::capture_meta::CaptureMeta;
 use super::capture_places::Places;
@@ -77,14 +77,17 @@ impl CsvSource {
             Err(e) if names_a_column(&header) || header.contains(&0) => return Err(e),
             Err(e) => {
                 let (beside, beside_keys) = CaptureMeta::of_sidecar(path, places)?;
+                let keys = keys.or(beside_keys);
+                if keys.columns == [None, None] {
+                    refuse_thermal(line)?;
+                }
                 meta = meta.or(beside);
                 let mut bytes = header.clone();
                 bytes.push(b'\n');
                 bytes.extend_from_slice(lines.ahead()?);
                 // A unit may be in Latin-1, and names are for messages.
                 let text = String::from_utf8_lossy(&bytes);
-                let found =
-                    bench_csv::table((path, number), &text, &keys.or(beside_keys), &mut meta)?;
+                let found = bench_csv::table((path, number), &text, &keys, &mut meta)?;
                 let Some(table) = found.filter(|table| table.before > 0) else {
                     return Err(e);
                 };

@@ -6,6 +6,8 @@ use super::capture::{COLUMNS, HEADER_HELP};
 use super::capture_lines::Line;
 use super::capture_meta::{CaptureMeta, Value};
 use super::capture_places::Places;
+use crate::design::record_columns::{is_known, unit_of};
+use crate::design::units;
 use crate::error::{InputError, Result};
 
 /// Where the two columns stand.
@@ -63,6 +65,46 @@ pub(super) fn read_comment(
         .map_err(|problem| refuse(offset, problem).into())
 }
 
+/// Refuses the header of a thermal record: a name in it is one of the contract's for such a record, or says deg/s or degC,
+/// and none is the drive's or the sense's.
+pub(super) fn refuse_thermal(line: Line<'_>) -> Result<()> {
+    let text = String::from_utf8_lossy(line.bytes);
+    let lower = text.to_lowercase();
+    if ["drive", "drv", "sense", "sns"]
+        .iter()
+        .any(|w| lower.contains(w))
+    {
+        return Ok(());
+    }
+    let mut names = text
+        .split([',', ';', '\t'])
+        .map(|n| n.trim().trim_matches('"').trim());
+    // A line of a preamble, such as `Temperature (C),25`, is no header.
+    if names.clone().any(|n| n.parse::<f64>().is_ok()) || names.clone().count() < 2 {
+        return Ok(());
+    }
+    let is_thermal = |name: &&str| {
+        let is_of = |n: &str| is_known(n) && !["time_s", "supply_v", "accel_g"].contains(&n);
+        let stated = |column: &str| units::stated(name, column);
+        let in_unit = ["rate_out_dps", "die_degc"]
+            .into_iter()
+            .any(|c| stated(c).is_some_and(|u| u.of == unit_of(c)));
+        is_of(name) || units::meant(name).is_some_and(is_of) || in_unit
+    };
+    let Some(name) = names.find(is_thermal) else {
+        return Ok(());
+    };
+    Err(line
+        .refuse(
+            0,
+            &format!(
+                "this is a thermal record (its column \"{name}\"), and no capture of ADC codes"
+            ),
+        )
+        .help("give it with --record (`run`, `close`)")
+        .into())
+}
+
 /// Finds the two columns in the header line.
 pub(super) fn read_header(line: Line<'_>, places: &mut Places) -> Result<Layout> {
     if line.bytes.contains(&0) || line.bytes.starts_with(b"\xff\xfe") {
@@ -73,16 +115,6 @@ pub(super) fn read_header(line: Line<'_>, places: &mut Places) -> Result<Layout>
             bench_csv::sidecar_name(line.path)
         );
         return Err(e.help(help).into());
-    }
-    let is_there = |name: &str| line.bytes.windows(name.len()).any(|w| w == name.as_bytes());
-    if is_there("time_s") && is_there("rate_out_dps") {
-        return Err(line
-            .refuse(
-                0,
-                "this is a thermal record, and no capture: it has no column `drive_code`",
-            )
-            .help("give it with --record")
-            .into());
     }
     let names: Vec<&[u8]> = line
         .bytes

@@ -10,6 +10,21 @@ use std::path::{Path, PathBuf};
 /// Rows decoded at a time: the chunk stays in the second-level cache.
 const CHUNK_ROWS: usize = 1 << 15;
 
+/// What helps with items that are not read.
+pub(super) fn item_help(descr: &str, otherwise: &str) -> String {
+    match descr.trim_start_matches(['<', '>', '|', '=']) {
+        "u2" => "unsigned 16-bit codes are offset binary, as a rule: `numpy.save(file, (codes.astype('<i4') - 32768).astype('<i2'))` \
+                 (take the code of 0 V in place of 32768)"
+            .to_owned(),
+        "u4" | "u1" => format!(
+            "unsigned codes are offset binary, as a rule: take the code of 0 V (half of the range) off first: \
+             `numpy.save(file, (codes.astype('<i8') - {}).astype('<i4'))`",
+            if descr.ends_with('4') { 2_147_483_648u32 } else { 128 }
+        ),
+        _ => otherwise.to_owned(),
+    }
+}
+
 /// The rows of an NPY capture.
 pub(super) struct NpySource {
     path: PathBuf,
@@ -56,9 +71,10 @@ impl NpySource {
             "<i2" => 2,
             "<i4" => 4,
             other => {
-                let other = other.escape_debug();
-                let message = format!("its items are `{other}`, not `<i2` or `<i4`");
-                return Err(refuse(message).into());
+                let shown = other.escape_debug();
+                let mut error = refuse(format!("its items are `{shown}`, not `<i2` or `<i4`"));
+                error.help = error.help.map(|help| item_help(other, &help));
+                return Err(error.into());
             }
         };
         let [rows, 2] = header.shape[..] else {

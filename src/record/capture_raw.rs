@@ -141,7 +141,14 @@ impl RawSource {
         })?;
         let item = Item::named(&header.descr)
             .filter(|_| header.descr.starts_with(['<', '>']))
-            .ok_or_else(|| refuse(format!("its items are `{}`", header.descr.escape_debug())))?;
+            .ok_or_else(|| {
+                let shown = header.descr.escape_debug();
+                let mut error = refuse(format!("its items are `{shown}`"));
+                error.help = error
+                    .help
+                    .map(|help| super::capture_npy::item_help(&header.descr, &help));
+                error
+            })?;
         let [rows, channels @ 2..=64] = header.shape[..] else {
             let message = format!("its shape is {:?}, not (n, 2) or (n, k)", header.shape);
             return Err(refuse(message).into());

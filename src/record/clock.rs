@@ -7,6 +7,7 @@ use super::thermal::ThermalRecord;
 use super::warning::Warning;
 use crate::design::RecordMapping;
 use crate::error::Result;
+use crate::statistics::stats;
 
 /// Takes the clock out of the columns, or makes it, and checks that it never runs backwards.
 pub(super) fn take(
@@ -32,6 +33,20 @@ pub(super) fn take(
             .into());
     };
     let last_line = record.lines.last().copied().unwrap_or(1);
+    if let Some((row, said)) = wild(&time, &record.lines) {
+        let line = lines.at(record.lines.get(row).copied().unwrap_or(1));
+        let column = cells::split(line.text)
+            .ok()
+            .and_then(|c| c.get(index).map(|c| c.column))
+            .unwrap_or(1);
+        return Err(line
+            .error(
+                column,
+                said,
+                "repair this time, or leave the cell empty: its row is left out then".to_owned(),
+            )
+            .into());
+    }
     let mut last: Option<(f64, usize)> = None;
     for (t, number) in time.iter().zip(&record.lines) {
         if t.is_nan() {
@@ -91,6 +106,73 @@ pub(super) fn take(
             .into());
     }
     Ok(())
+}
+
+/// Times in a row that can be wild, at most (convention); more are a clock that does something else.
+const MOST_WILD: usize = 3;
+
+/// A step that is no pause between two rows, in steps of usual length; at the end of a record, where no later row tells, in
+/// times of all that was before.
+const LEAP: f64 = 10.0;
+const LEAP_AT_END: f64 = 1000.0;
+
+/// The first row whose time is wild, and what is said of it: the clock leaps there, and the rows after it go on from before the
+/// leap. A clock that goes back by itself is none, nor are rows in disorder.
+fn wild(time: &[f64], lines: &[usize]) -> Option<(usize, String)> {
+    let rows: Vec<usize> = (0..time.len()).filter(|i| !time[*i].is_nan()).collect();
+    let at = |k: usize| rows.get(k).map_or(f64::NAN, |i| time[*i]);
+    let steps: Vec<f64> = (1..rows.len()).map(|k| at(k) - at(k - 1)).collect();
+    let ahead: Vec<f64> = steps.iter().copied().filter(|s| *s > 0.0).collect();
+    let usual = stats::median(&ahead);
+    let place = |k: usize| -> Option<(usize, usize)> {
+        let row = *rows.get(k)?;
+        Some((row, lines.get(row).copied().unwrap_or(0)))
+    };
+    let back = steps.iter().position(|s| *s < 0.0).map(|k| k + 1);
+    if let Some(k) = back {
+        let start = (0..k).rev().find(|j| at(*j) <= at(k)).map_or(0, |j| j + 1);
+        // Of a few rows nothing is usual.
+        let goes_on = (k + 1..rows.len())
+            .take(MOST_WILD)
+            .all(|j| at(j) >= at(j - 1) && at(j) < at(start));
+        let leaps = match start {
+            0 => at(0) - at(k) > LEAP * usual,
+            _ => at(start) - at(start - 1) > LEAP * usual,
+        };
+        let few = k - start <= MOST_WILD && 10 * (k - start) <= rows.len();
+        if !(goes_on && leaps && few) {
+            return None;
+        }
+        let (row, _) = place(start)?;
+        let after = place(k)?.1;
+        let before = match start.checked_sub(1).and_then(place) {
+            Some((row, line)) => format!("{} s before it (line {line}) and ", time[row]),
+            None => String::new(),
+        };
+        return Some((
+            row,
+            format!(
+                "the time {} s is a wild one: the clock is at {before}{} s after it (line {after})",
+                at(start),
+                at(k)
+            ),
+        ));
+    }
+    let last = rows.len().checked_sub(1)?;
+    let before = last.checked_sub(1)?;
+    let leap = at(last) - at(before);
+    let span = at(before) - at(0);
+    let is_wild = rows.len() > 10 && span > 0.0 && leap > LEAP_AT_END * span;
+    let (row, _) = place(last).filter(|_| is_wild)?;
+    Some((
+        row,
+        format!(
+            "the time {} s of the last row is a wild one: the row before it (line {}) is at {} s, and all rows before take {span} s",
+            at(last),
+            place(before)?.1,
+            at(before)
+        ),
+    ))
 }
 
 /// Keeps the rows that are marked.

@@ -121,6 +121,7 @@ pub(super) fn resolve(line: Line<'_>, mapping: &RecordMapping) -> Result<Roles> 
         }
     }
     in_other_units(&mut columns, &names, mapping);
+    warnings.extend(twice(&columns, mapping));
     let units = converted(line, &columns, mapping)?;
     warnings.extend(told(&units, &columns));
     let roles = Roles {
@@ -158,6 +159,28 @@ fn in_other_units(columns: &mut [(String, Vec<String>)], names: &[&str], mapping
             taken.push(meant);
         }
     }
+}
+
+/// What is said of a column that has in another unit what another column has as well, as `time_ms` beside `time_s`.
+fn twice(columns: &[(String, Vec<String>)], mapping: &RecordMapping) -> Vec<Warning> {
+    let serves = |role: &str| columns.iter().find(|c| c.1.iter().any(|r| r == role));
+    let others = columns
+        .iter()
+        .filter(|(name, roles)| roles.len() == 1 && roles.first() == Some(name) && !is_known(name));
+    others
+        .filter_map(|(name, _)| {
+            let role = units::meant(name).filter(|r| !mapping.columns.contains_key(*r))?;
+            let (taken, _) = serves(role)?;
+            Some(Warning::on(
+                "two_columns_of_one",
+                role,
+                format!(
+                    "the file has {role} twice, as \"{taken}\" and as \"{name}\": \"{taken}\" is taken. [record.columns] says otherwise: \
+                     {role} = \"{name}\""
+                ),
+            ))
+        })
+        .collect()
 }
 
 /// The units of the contract's columns where they are others than the contract's.
@@ -298,6 +321,12 @@ pub(super) fn open_quote(line: Line<'_>, column: usize) -> InputError {
 
 /// The column among `names` that is likely meant for `role`, as names of columns go.
 fn guess<'a>(role: &str, names: &[&'a str]) -> Option<&'a str> {
+    guesses(role, names).first().copied()
+}
+
+/// All that would do as well as the one that [`guess`] gives, which is the first.
+fn guesses<'a>(role: &str, names: &[&'a str]) -> Vec<&'a str> {
+    const HEAT: [&str; 5] = ["temp", "degc", "\u{b0}c", "die", "celsius"];
     let hints: &[&str] = match role {
         "time_s" => &["time", "sec", "clock"],
         "rate_out_dps" => &["gyro", "rate", "omega", "dps", "gx", "gz"],
@@ -308,12 +337,26 @@ fn guess<'a>(role: &str, names: &[&'a str]) -> Option<&'a str> {
         "quad_dps" => &["quad"],
         "supply_v" => &["supply", "vdd", "volt"],
         "accel_g" => &["acc"],
-        _ => &["temp", "degc"],
+        _ => &HEAT,
     };
     // "gyro" before "rate": the order of the hints is their strength.
-    let of = |hint: &&str| names.iter().find(|n| n.to_lowercase().contains(hint));
-    let found = hints.iter().find_map(of).copied();
-    found.filter(|n| *n != "time_since_power_on_s")
+    let is_heat = |name: &str| {
+        let stated = units::stated(name, "die_degc").is_some_and(|u| u.of == "degC");
+        stated || HEAT.iter().any(|hint| name.contains(hint))
+    };
+    let others = |name: &&&str| {
+        **name != "time_since_power_on_s"
+            && (unit_of(role) != "deg/s" || !is_heat(&name.to_lowercase()))
+    };
+    let of = |hint: &&str| -> Vec<&'a str> {
+        let fit = names.iter().filter(|n| n.to_lowercase().contains(hint));
+        fit.filter(others).copied().collect()
+    };
+    hints
+        .iter()
+        .map(of)
+        .find(|found| !found.is_empty())
+        .unwrap_or_default()
 }
 
 /// Lists the file's columns and shows the part of a design file that would map `role`, and what else it lacks.
@@ -346,6 +389,16 @@ fn suggestion(role: &str, names: &[&str]) -> String {
         "\n  say in the design which one it is (a file for `run FILE` or `close --design FILE`):\n    [record.columns]\n    {}",
         lines.join("\n    ")
     ));
+    let axes = guesses("rate_out_dps", &named);
+    if let [first @ .., last] = axes.as_slice()
+        && !first.is_empty()
+        && (role == "rate_out_dps" || !has("rate_out_dps"))
+    {
+        text.push_str(&format!(
+            "\n  {} and {last} would do as rate_out_dps; take the axis you want",
+            first.join(", ")
+        ));
+    }
     if let Some(unitless) = guess(role, &named)
         && is_known(role)
         && units::stated(unitless, role).is_none()
@@ -430,6 +483,47 @@ mod tests {
             !text.contains("time_s =") && !text.contains("die_degc ="),
             "{text}"
         );
+    }
+
+    #[test]
+    fn a_choice_is_told_as_one() {
+        let said = |header: &str| {
+            let error = resolve(at(header), &RecordMapping::default()).unwrap_err();
+            error.to_string()
+        };
+        let text = said("time_s,GyroTemp,GyroX,GyroY,GyroZ,die_degc");
+        assert!(text.contains("rate_out_dps = \"GyroX\""), "{text}");
+        let others = "GyroX, GyroY and GyroZ would do as rate_out_dps; take the axis you want";
+        assert!(text.contains(others), "{text}");
+        assert!(!said("time_s,gyro_z,die_degc").contains("would do"));
+        // Asked for the clock, it says the same of the rate that it shows beside it.
+        assert!(said("t,GyroX,GyroY,GyroZ").contains(others));
+        // The thermometer is listed too.
+        let text = said("Time (ms),Rate (\u{b0}/s),Die (\u{b0}C)");
+        assert!(text.contains("die_degc = \"Die (\u{b0}C)\""), "{text}");
+    }
+
+    #[test]
+    fn a_quantity_that_is_there_twice_is_told() {
+        let told = |header: &str, mapping: &RecordMapping| {
+            let roles = resolve(at(header), mapping).unwrap();
+            let found = roles
+                .warnings
+                .into_iter()
+                .find(|w| w.code == "two_columns_of_one");
+            found.map(|w| w.message).unwrap_or_default()
+        };
+        let plain = RecordMapping::default();
+        let text = told("time_s,time_ms,rate_out_dps", &plain);
+        assert!(
+            text.contains("\"time_s\" is taken") && text.contains("\"time_ms\""),
+            "{text}"
+        );
+        assert!(told("time_ms,time_us,rate_out_dps", &plain).contains("\"time_ms\" is taken"));
+        assert_eq!(told("time_s,rate_out_dps,note_ms", &plain), "");
+        let mut mapping = RecordMapping::default();
+        mapping.columns.insert("time_s".into(), "time_ms".into());
+        assert_eq!(told("time_s,time_ms,rate_out_dps", &mapping), "");
     }
 
     #[test]

@@ -121,7 +121,8 @@ pub(super) fn read<R: Read>(
     let nothing = ("no IMU message", reader.damage);
     let (mut choice, chosen) =
         log_gyros::choose(&reader.averager, &sources, mapping.instance, path, nothing)?;
-    if let Some(source) = sources.get(chosen.lead) {
+    let source = log_gyros::source_of_rate(&reader.averager, &sources, &choice, chosen);
+    if let Some(source) = source {
         let of = corrections::Chosen {
             number: chosen.number,
             id: chosen.id,

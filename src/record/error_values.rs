@@ -8,6 +8,9 @@
 //! - a value that stands apart from its neighbours in time, on both sides, by far more than the readings move, and is
 //!   repeated to the last digit, is no reading, whatever its share;
 //! - so is a single cell of a thermometer, for a die has a heat capacity.
+//!
+//! At an end of the record one neighbour alone can tell: there a value has to be half of the range away, or, of a
+//! thermometer, two dozen usual steps and further than a die moves in that time.
 
 use super::columns::{THERMOMETERS, unit_of};
 use super::thermal::ThermalRecord;
@@ -28,6 +31,9 @@ const HALF: f64 = 0.5;
 /// No die moves faster, K/s.
 const FASTEST_K_PER_S: f64 = 1.5;
 
+/// Usual steps that a value at an end of the record has to stand apart, where it is within half of the range.
+const DOZENS: f64 = 24.0;
+
 /// Different readings that a channel needs beside the error values, so that its own movement is known.
 const READINGS: usize = 10;
 
@@ -46,7 +52,38 @@ pub(super) struct Kind {
     pub inert: bool,
 }
 
-/// The kind of a column; `None` for one that is no abscissa.
+/// No gyro turns faster, deg/s.
+const FASTEST_DPS: f64 = 20_000.0;
+
+/// Full scales of converters of 16, 24 and 32 bits, which they give where they have no reading.
+const OF_CONVERTERS: [f64; 9] = [
+    -32_768.0,
+    32_767.0,
+    65_535.0,
+    -8_388_608.0,
+    8_388_607.0,
+    -2_147_483_648.0,
+    2_147_483_647.0,
+    4_294_967_295.0,
+    -2_147_483_647.0,
+];
+
+/// Error values of the output: faster than any gyro turns, in a tenth of the rows at most, each a converter's full scale or
+/// repeated to the last digit. What else is so fast is in another unit.
+fn of_converter(values: &[f64], kind: Kind) -> Vec<bool> {
+    let beyond = |v: f64| v.is_finite() && !(kind.possible.0..=kind.possible.1).contains(&v);
+    let all: Vec<f64> = values.iter().copied().filter(|v| beyond(*v)).collect();
+    let measured = values.iter().filter(|v| v.is_finite()).count();
+    let repeated = |v: f64| all.iter().filter(|o| **o == v).count() > 1;
+    let are = all
+        .iter()
+        .all(|v| OF_CONVERTERS.contains(v) || repeated(*v));
+    let few = 10 * all.len() <= measured;
+    let marked = |v: &f64| are && few && beyond(*v);
+    values.iter().map(marked).collect()
+}
+
+/// The kind of a column; `None` for one whose values are taken as they are.
 pub(super) fn kind_of(column: &str) -> Option<Kind> {
     let tiny = f64::MIN_POSITIVE;
     let turn = std::f64::consts::TAU;
@@ -57,6 +94,7 @@ pub(super) fn kind_of(column: &str) -> Option<Kind> {
         "accel_g" => (-20_000.0, 20_000.0),
         "agc" => (tiny, f64::MAX),
         "quad_dps" => (-f64::MAX, f64::MAX),
+        "rate_out_dps" => (-FASTEST_DPS, FASTEST_DPS),
         _ if unit_of(column) == "degC" => (-100.0, 250.0),
         _ => return None,
     };
@@ -71,22 +109,23 @@ pub(super) fn take(record: &mut ThermalRecord, warnings: &mut Vec<Warning>) {
         let (Some(kind), Some(values)) = (kind_of(&name), record.columns.get(&name)) else {
             continue;
         };
-        let marks = marks(&record.time_s, values, kind);
+        let marks = match name == "rate_out_dps" {
+            true => of_converter(values, kind),
+            false => marks(&record.time_s, values, kind),
+        };
         if !marks.contains(&true) {
             continue;
         }
-        let cells = values.iter().zip(&record.lines).zip(&marks);
-        let marked: Vec<(f64, usize)> = cells
-            .filter(|(_, mark)| **mark)
-            .map(|((v, line), _)| (*v, *line))
-            .collect();
+        let rows: Vec<usize> = (0..marks.len()).filter(|row| marks[*row]).collect();
+        let marked: Vec<f64> = rows.iter().map(|row| values[*row]).collect();
         let measured = record.measured(&name);
         let kept = values
             .iter()
             .zip(&marks)
-            .filter(|(v, mark)| !**mark && marked.iter().any(|(m, _)| m == *v))
+            .filter(|(v, mark)| !**mark && marked.contains(v))
             .count();
-        warnings.push(told(&name, &marked, measured, kept));
+        let places = record.places(&rows);
+        warnings.push(told(&name, &marked, &places, measured, kept));
         if let Some(values) = record.columns.get_mut(&name) {
             let cells = values.iter_mut().zip(&marks).filter(|(_, mark)| **mark);
             cells.for_each(|(value, _)| *value = f64::NAN);
@@ -94,13 +133,8 @@ pub(super) fn take(record: &mut ThermalRecord, warnings: &mut Vec<Warning>) {
     }
 }
 
-/// What is said of the cells (value, line) of a column.
-fn told(name: &str, marked: &[(f64, usize)], measured: usize, kept: usize) -> Warning {
-    let lines: Vec<String> = marked.iter().take(8).map(|c| c.1.to_string()).collect();
-    let more = match marked.len().saturating_sub(8) {
-        0 => String::new(),
-        n => format!(" and {n} more"),
-    };
+/// What is said of the cells of a column, and where they are.
+fn told(name: &str, marked: &[f64], places: &str, measured: usize, kept: usize) -> Warning {
     let doubtful = match kept {
         0 => String::new(),
         n => format!(
@@ -112,10 +146,9 @@ fn told(name: &str, marked: &[(f64, usize)], measured: usize, kept: usize) -> Wa
         name,
         format!(
             "{} of {measured} cells of {name} hold {}, out of reach of the readings before and after them. These are \
-             error values, not readings. They count as not measured (line {}{more}){doubtful}",
+             error values, not readings. They count as not measured ({places}){doubtful}",
             marked.len(),
-            values_of(marked.iter().map(|c| c.0), unit_of(name)),
-            lines.join(", ")
+            values_of(marked.iter().copied(), unit_of(name)),
         ),
     )
 }
@@ -341,6 +374,17 @@ impl Scale {
             && visit.distance > share * self.range
     }
 
+    /// Whether a thermometer's value at an end of the record, where one neighbour alone can tell, is two dozen usual steps
+    /// from it and further than a die moves in that time; of `all` cells it has a tenth at most.
+    fn is_cut_off(&self, visit: &Visit, all: usize) -> bool {
+        !visit.inner
+            && visit.distance.is_finite()
+            && 10 * visit.cells.len() <= all
+            && visit.per_row > DOZENS * self.usual
+            && visit.distance > LEAST_OF_RANGE * self.range
+            && self.is_out_of_reach(visit)
+    }
+
     /// Whether no die gets there and back in the time; half of the range is out of reach in any time.
     fn is_out_of_reach(&self, visit: &Visit) -> bool {
         visit.distance > (FASTEST_K_PER_S * visit.way_s).min(HALF * self.range)
@@ -358,14 +402,14 @@ struct Seen {
     farthest: f64,
 }
 
-/// The visits by the bits of their value.
-fn seen(visits: &[Visit], scale: &Scale) -> BTreeMap<u64, Seen> {
+/// The visits by the bits of their value; `is_far` is told whether the value is one of an error elsewhere.
+fn seen(visits: &[Visit], is_far: impl Fn(&Visit, bool) -> bool) -> BTreeMap<u64, Seen> {
     let mut out: BTreeMap<u64, Seen> = BTreeMap::new();
     for inner in [true, false] {
         for visit in visits.iter().filter(|v| v.inner == inner) {
             let seen = out.entry(visit.value.to_bits()).or_default();
             seen.visits += 1;
-            if scale.is_far(visit, seen.inner > 0) {
+            if is_far(visit, seen.inner > 0) {
                 seen.far += 1;
                 seen.inner += usize::from(inner);
                 seen.far_cells += visit.cells.len();
@@ -385,9 +429,12 @@ fn apart(time_s: &[f64], values: &[f64], aside: &[bool], inert: bool) -> Vec<usi
     let Some(scale) = Scale::of_visits(&visits) else {
         return few_readings(values, &cells);
     };
-    let seen = seen(&visits, &scale);
+    let is_far = |v: &Visit, known: bool| {
+        scale.is_far(v, known) || (inert && scale.is_cut_off(v, cells.len()))
+    };
+    let seen = seen(&visits, is_far);
     let of = |v: &Visit| seen.get(&v.value.to_bits()).copied().unwrap_or_default();
-    let far = |v: &Visit| scale.is_far(v, of(v).inner > 0);
+    let far = |v: &Visit| is_far(v, of(v).inner > 0);
     // Of the values that are repeated, the one that stands apart most often; single cells when there is none.
     let repeated = seen
         .iter()

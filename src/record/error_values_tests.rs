@@ -70,6 +70,25 @@ fn a_block_at_the_start_in_the_middle_or_at_the_end_is_found() {
 }
 
 #[test]
+fn a_value_at_an_end_is_judged_by_one_neighbour() {
+    let ramp = |k: usize| 40.0 + 0.335 * k as f64 + 0.01 * noise(k);
+    for cells in [1, 2, 5, 20] {
+        let start = found(1.0, kind(), |k| if k < cells { 25.0 } else { ramp(k) });
+        assert_eq!(start, (0..cells).collect::<Vec<_>>(), "{cells}");
+    }
+    // As much as a die moves in the time between the rows, or a part of the record of its own.
+    let few = |k: usize| if k < 5 { 25.0 } else { ramp(k) };
+    let part = |k: usize| if k < 60 { 25.0 } else { ramp(k - 60) };
+    assert!(found(60.0, kind(), few).is_empty() && found(1.0, kind(), part).is_empty());
+    // Of a channel without a heat capacity it may be a setting.
+    let setting = Kind {
+        inert: false,
+        ..kind()
+    };
+    assert!(found(1.0, setting, few).is_empty());
+}
+
+#[test]
 fn several_values_and_single_glitches_are_found_together() {
     let value = |k: usize| match k {
         30 | 90 | 91 => 0.0,
@@ -106,7 +125,11 @@ fn what_a_chamber_does_is_no_error() {
 }
 
 fn record(column: &str, value: impl Fn(usize) -> f64) -> (Vec<f64>, Vec<Warning>) {
-    let mut text = format!("time_s,rate_out_dps,die_degc,{column}\n");
+    let output = match column {
+        "rate_out_dps" => "aside",
+        _ => "rate_out_dps",
+    };
+    let mut text = format!("time_s,{output},die_degc,{column}\n");
     for k in 0..200 {
         text += &format!(
             "{k},{:.5},{:.3},{:.6}\n",
@@ -193,6 +216,46 @@ fn every_abscissa_loses_its_error_values_and_says_so() {
             "{column}: {warnings:?}"
         );
     }
+}
+
+#[test]
+fn a_converters_error_value_is_no_rate() {
+    let rate = |k: usize| 0.1 + 0.02 * noise(k);
+    for value in [-32768.0, 32767.0, 99999.0] {
+        let bad = |k: usize| [33, 70, 150].contains(&k);
+        let (cells, warnings) = record("rate_out_dps", |k| if bad(k) { value } else { rate(k) });
+        assert!(
+            (0..cells.len()).all(|k| cells[k].is_nan() == bad(k)),
+            "{value}"
+        );
+        let told = &warnings[0];
+        assert_eq!(told.code, "error_values");
+        assert!(
+            told.message.contains(&format!("{value} deg/s (3 times)")),
+            "{told:?}"
+        );
+        assert!(
+            !warnings.iter().any(|w| w.message.contains("mdps")),
+            "{warnings:?}"
+        );
+    }
+    // A glitch stays, and is in no other unit.
+    let (cells, warnings) = record("rate_out_dps", |k| if k == 50 { 31234.5 } else { rate(k) });
+    assert_eq!(cells[50], 31234.5);
+    assert!(warnings.iter().any(|w| w.code == "rate_out_of_range"));
+    assert!(
+        !warnings.iter().any(|w| w.message.contains("mdps")),
+        "{warnings:?}"
+    );
+    // Millidegrees of a turning gyro are none of either.
+    let (cells, warnings) = record("rate_out_dps", |k| {
+        30_000.0 * ((k / 20) % 3) as f64 + 20.0 * noise(k)
+    });
+    assert!(cells.iter().all(|c| !c.is_nan()));
+    assert!(
+        warnings.iter().any(|w| w.message.contains("mdps")),
+        "{warnings:?}"
+    );
 }
 
 #[test]

@@ -71,10 +71,10 @@ fn stuck_output(record: &ThermalRecord, name: &str, values: &[f64]) -> Option<Wa
             "frozen_channel",
             name,
             format!(
-                "{name} stands at exactly {} for {run} rows from line {}, while elsewhere {:.0} % \
+                "{name} stands at exactly {} for {run} rows from {}, while elsewhere {:.0} % \
                  of neighbouring rows differ: it froze, or it is clipped",
                 values[start],
-                record.lines.get(start).copied().unwrap_or(0),
+                record.place(start),
                 100.0 * (1.0 - q)
             ),
         )
@@ -96,9 +96,9 @@ fn stuck_thermometer(record: &ThermalRecord, name: &str, values: &[f64]) -> Opti
         let (a, b) = stats::extremes(&smooth(other.get(rows.clone())?))?;
         (high > low).then(|| (b - a) / (high - low))
     };
-    let line = record.lines.get(start).copied().unwrap_or(0);
+    let from = record.place(start);
     let stands = format!(
-        "{name} stands at exactly {} {} for {run} rows from line {line}, while",
+        "{name} stands at exactly {} {} for {run} rows from {from}, while",
         values[start],
         unit_of(name)
     );

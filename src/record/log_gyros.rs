@@ -80,7 +80,7 @@ pub(super) fn choose(
     path: &Path,
     (nothing, damage): (&str, Damage),
 ) -> Result<(Choice, Chosen)> {
-    let gyros = gyros(sources);
+    let gyros = gyros(averager, sources);
     let listed: Vec<String> = gyros
         .iter()
         .map(|gyro| line(averager, sources, gyro))
@@ -166,11 +166,16 @@ fn has_samples(averager: &Averager, gyro: &Gyro) -> bool {
     gyro.rate.iter().any(of)
 }
 
-/// The gyros that have a rate, by number.
-fn gyros(sources: &[Source]) -> Vec<Gyro> {
+/// The gyros that have a rate, by number; a topic without a sample is none, where others have some.
+fn gyros(averager: &Averager, sources: &[Source]) -> Vec<Gyro> {
+    let samples = |s: &Source| {
+        let channel = averager.channels.get(s.channel("rate_out_dps")?)?;
+        Some(channel.samples)
+    };
+    let any = sources.iter().any(|s| samples(s) > Some(0));
     let rates = || {
         let all = sources.iter().enumerate();
-        all.filter(|(_, s)| s.channel("rate_out_dps").is_some())
+        all.filter(|(_, s)| samples(s).is_some_and(|n| n > 0 || !any))
     };
     let mut leads: BTreeMap<u8, usize> = BTreeMap::new();
     for (i, source) in rates().filter(|(_, s)| s.numbers) {
@@ -346,10 +351,23 @@ fn replaced(sources: &[Source], gyro: &Gyro) -> Option<(u64, String)> {
 /// Rows beside a change of an offset that tell whether the output has it.
 const BESIDE: usize = 5;
 
+/// The source that the rate is from in the end: a faster one than the leading one may be taken.
+pub(super) fn source_of_rate<'a>(
+    averager: &Averager,
+    sources: &'a [Source],
+    choice: &Choice,
+    chosen: Chosen,
+) -> Option<&'a Source> {
+    let rate = log_rows::rate(averager, choice);
+    let gives = |s: &&Source| s.channel("rate_out_dps").is_some_and(|c| Some(c) == rate);
+    sources.iter().find(gives).or(sources.get(chosen.lead))
+}
+
 /// Adds what the parameters say. An offset that was learnt anew splits the record, unless the output is the driver's own and
 /// does not step by it.
 pub(super) fn corrected(averager: &Averager, choice: &mut Choice, found: Found, source: &Source) {
     choice.undo = found.undo;
+    choice.switched = found.switched;
     choice.warnings.extend(found.warnings);
     for (time_us, said, step_dps) in found.cuts {
         let rate = source.channel("rate_out_dps");

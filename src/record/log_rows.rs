@@ -1,7 +1,7 @@
 //! The rows of a log as a thermal record: which are whole, which belong to one stretch, what is told of the others.
 
 use super::averager::Averager;
-use super::corrections::Undo;
+use super::corrections::{Switched, Undo};
 use super::log_bytes::Damage;
 use super::thermal::{LEAST_ROWS, ThermalRecord};
 use super::warning::Warning;
@@ -30,6 +30,8 @@ pub(super) struct Choice {
     pub cuts: Vec<(u64, String)>,
     /// A correction that is to be taken off again.
     pub undo: Option<Undo>,
+    /// A correction that the parameters say was on.
+    pub switched: Option<Switched>,
     pub warnings: Vec<Warning>,
 }
 
@@ -93,8 +95,10 @@ pub(super) fn record(
     let samples: u64 = sums.map(|s| u64::from(s.count)).sum();
     let all = averager.channels.get(rate).map_or(samples, |c| c.samples);
     warnings.push(averaged(averager, &record, samples, all));
+    let since = record.column("time_since_power_on_s").unwrap_or(&[]);
+    warnings.extend(choice.switched.as_ref().map(|s| s.said(since)));
     if let Some(undo) = &choice.undo {
-        warnings.push(undo.take_off(&mut record, path)?);
+        warnings.extend(undo.take_off(&mut record, path)?);
     }
     if heat.is_none() {
         warnings.push(no_thermometer(&choice));
@@ -115,6 +119,11 @@ fn refused(path: &Path, warnings: &[Warning], message: String, help: &str) -> Er
         None => message,
     };
     InputError::new(message).in_file(path).help(help).into()
+}
+
+/// The channel that the rate is taken from.
+pub(super) fn rate(averager: &Averager, choice: &Choice) -> Option<usize> {
+    chosen(averager, choice, "rate_out_dps", &mut Vec::new())
 }
 
 /// The channel that a column is taken from: the first that holds something (a supply of 0 V is what an autopilot logs that

@@ -64,14 +64,13 @@ impl Column<'_> {
         self.quantile(1.0)
     }
 
-    /// Count of the values for which `bad` holds, and the line of the first.
-    pub(super) fn count(&self, bad: impl Fn(f64) -> bool) -> (usize, usize) {
-        let rows = self.values.iter().zip(&self.record.lines);
-        let mut hits = rows.filter(|(v, _)| bad(**v));
+    /// Count of the values for which `bad` holds, and where the first is: "on line 5".
+    pub(super) fn count(&self, bad: impl Fn(f64) -> bool) -> (usize, String) {
+        let mut hits = (0..self.values.len()).filter(|i| bad(self.values[*i]));
         let first = hits.next();
         (
             usize::from(first.is_some()) + hits.count(),
-            first.map_or(0, |(_, line)| *line),
+            first.map_or(String::new(), |row| self.record.at_place(row)),
         )
     }
 
@@ -122,12 +121,12 @@ fn phase(c: &Column<'_>) -> Option<Warning> {
             ),
         );
     }
-    let (beyond, line) = c.count(|v| v.abs() > TAU);
+    let (beyond, place) = c.count(|v| v.abs() > TAU);
     if beyond > 0 {
         return c.warn(
             "phase_out_of_range",
             format!(
-                "{beyond} values of phase_rad lie beyond a full turn (6.283 rad), the first on line {line}. Glitches bend the \
+                "{beyond} values of phase_rad lie beyond a full turn (6.283 rad), the first {place}. Glitches bend the \
                  fit. Leave their cells empty"
             ),
         );
@@ -138,13 +137,24 @@ fn phase(c: &Column<'_>) -> Option<Warning> {
 /// No gyro turns faster than 20 000 deg/s; 16-bit codes and millidegrees do.
 fn rate(c: &Column<'_>) -> Option<Warning> {
     let name = c.name;
-    let (beyond, line) = c.count(|v| v.abs() > 20_000.0);
+    let (beyond, place) = c.count(|v| v.abs() > 20_000.0);
+    if beyond > 0 && 10 * beyond <= c.sorted.len() && c.quantile(0.5).abs() < LARGEST_BIAS_DPS {
+        return c.warn(
+            "rate_out_of_range",
+            format!(
+                "{beyond} values of {name} lie beyond +-20000 deg/s (range {:.1} to {:.1}), the first {place}, and no gyro turns \
+                 so fast; the others are usual ones. Glitches bend the fit. Leave their cells empty",
+                c.min(),
+                c.max()
+            ),
+        );
+    }
     (beyond > 0).then(|| {
         Warning::on(
             "rate_out_of_range",
             name,
             format!(
-                "{beyond} values of {name} lie beyond +-20000 deg/s (range {:.1} to {:.1}), the first on line {line}, and no \
+                "{beyond} values of {name} lie beyond +-20000 deg/s (range {:.1} to {:.1}), the first {place}, and no \
                  gyro turns so fast. They look like mdeg/s or raw codes. If they are mdeg/s, say so: {}. Multiply raw codes by \
                  the gyro's scale first",
                 c.min(),
@@ -230,12 +240,12 @@ fn at_rest(c: &Column<'_>) -> Option<Warning> {
 
 /// Drive resonances lie between 1 and 200 kHz.
 fn frequency(c: &Column<'_>) -> Option<Warning> {
-    let (low, line) = c.count(|v| v <= 0.0);
+    let (low, place) = c.count(|v| v <= 0.0);
     if low > 0 {
         return c.warn(
             "frequency_out_of_range",
             format!(
-                "{low} values of freq_hz are not positive, the first on line {line}. No frequency is. Leave cells empty that \
+                "{low} values of freq_hz are not positive, the first {place}. No frequency is. Leave cells empty that \
                  were not measured"
             ),
         );
@@ -271,13 +281,13 @@ fn gain(c: &Column<'_>) -> Option<Warning> {
 
 /// Supplies are volts, below 100.
 fn supply(c: &Column<'_>) -> Option<Warning> {
-    let (beyond, line) = c.count(|v| !v.is_nan() && !(0.0..=100.0).contains(&v));
+    let (beyond, place) = c.count(|v| !v.is_nan() && !(0.0..=100.0).contains(&v));
     (beyond > 0).then(|| {
         Warning::on(
             "supply_out_of_range",
             c.name,
             format!(
-                "{beyond} values of supply_v lie outside 0 to 100 V (range {:.3} to {:.3}), the first on line {line}. They look \
+                "{beyond} values of supply_v lie outside 0 to 100 V (range {:.3} to {:.3}), the first {place}. They look \
                  like mV. If they are, say so: {}",
                 c.min(),
                 c.max(),
@@ -303,13 +313,13 @@ fn acceleration(c: &Column<'_>) -> Option<Warning> {
             ),
         );
     }
-    let (beyond, line) = c.count(|v| v.abs() > 20_000.0);
+    let (beyond, place) = c.count(|v| v.abs() > 20_000.0);
     (beyond > 0).then(|| {
         Warning::on(
             "acceleration_out_of_range",
             c.name,
             format!(
-                "{beyond} values of accel_g lie beyond 20000 g, the first on line {line}. No gyro survives that. Check the \
+                "{beyond} values of accel_g lie beyond 20000 g, the first {place}. No gyro survives that. Check the \
                  unit, and leave cells of glitches empty"
             ),
         )

@@ -37,13 +37,13 @@ pub(super) fn take(record: &mut ThermalRecord, warnings: &mut Vec<Warning>) {
             false => None,
         };
         let Some(why) = why else { continue };
-        let line = record.lines.get(run.start).copied().unwrap_or(0);
+        let from = record.place(run.start);
         let value = values.get(run.start).copied().unwrap_or(f64::NAN);
         warnings.push(Warning::on(
             "frozen_channel",
             name,
             format!(
-                "{name} stands at exactly {value} {} for {} rows from line {line}, while {why}: the last good reading, \
+                "{name} stands at exactly {value} {} for {} rows from {from}, while {why}: the last good reading, \
                  repeated. The {} repetitions count as not measured",
                 unit_of(name),
                 run.len(),

@@ -35,7 +35,7 @@ pub(super) fn temperature(c: &Column<'_>) -> Option<Warning> {
             ),
         );
     }
-    let (beyond, line) = c.count(|v| !v.is_nan() && !(-100.0..=250.0).contains(&v));
+    let (beyond, place) = c.count(|v| !v.is_nan() && !(-100.0..=250.0).contains(&v));
     // Most of them: whole hundredths or thousandths of a degree, that a gyro may have.
     let scaled = [(100.0, "cdegC"), (1000.0, "mdegC")]
         .into_iter()
@@ -59,7 +59,7 @@ pub(super) fn temperature(c: &Column<'_>) -> Option<Warning> {
         return c.warn(
             "temperature_out_of_range",
             format!(
-                "{beyond} values of {name} lie outside -100 to 250 degC (range {range}), the first on line {line}. They are \
+                "{beyond} values of {name} lie outside -100 to 250 degC (range {range}), the first {place}. They are \
                  glitches, or raw codes, or in another unit. Leave cells of glitches empty, or say the unit in \
                  [record.columns]"
             ),

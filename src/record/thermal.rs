@@ -244,6 +244,21 @@ fn any_cells(line: Line<'_>, roles: &Roles, columns: &mut [ReadColumn]) -> Resul
         Ok(cells) => cells,
         Err(column) => return Err(columns::open_quote(line, column).into()),
     };
+    let again = cells.len() == roles.columns.len()
+        && cells
+            .iter()
+            .zip(&roles.columns)
+            .all(|(c, (name, _))| c.text.trim_start_matches('\u{feff}') == name.as_str());
+    if again {
+        return Err(line
+            .error(
+                1,
+                "this is the header row again: the file is two records, one after the other".to_owned(),
+                "cut the file here and close the parts one by one; if they are one session with one clock, take this line away"
+                    .to_owned(),
+            )
+            .into());
+    }
     if cells.len() != roles.columns.len() {
         return Err(wrong_width(&line, &cells, roles).into());
     }

@@ -22,6 +22,51 @@ pub struct ThermalRecord {
 }
 
 impl ThermalRecord {
+    /// Where a row is, for messages: "line 5", or "12.3 s since power-on" of a log, which has no lines.
+    pub(crate) fn place(&self, row: usize) -> String {
+        match self.log_time(row) {
+            Some(s) => format!("{s:.1} s since power-on"),
+            None => format!("line {}", self.lines.get(row).copied().unwrap_or(0)),
+        }
+    }
+
+    /// "on line 5", "at 12.3 s since power-on".
+    pub(crate) fn at_place(&self, row: usize) -> String {
+        let word = if self.log_time(row).is_some() {
+            "at"
+        } else {
+            "on"
+        };
+        format!("{word} {}", self.place(row))
+    }
+
+    /// "line 5, 7, 9 and 5 more", "5.5, 7.5 s since power-on".
+    pub(crate) fn places(&self, rows: &[usize]) -> String {
+        const MOST: usize = 8;
+        let shown = rows.iter().take(MOST);
+        let more = match rows.len().saturating_sub(MOST) {
+            0 => String::new(),
+            n => format!(" and {n} more"),
+        };
+        let times: Option<Vec<String>> = shown
+            .clone()
+            .map(|row| Some(format!("{:.1}", self.log_time(*row)?)))
+            .collect();
+        match times {
+            Some(times) => format!("{} s since power-on{more}", times.join(", ")),
+            None => {
+                let lines = shown.filter_map(|row| self.lines.get(*row));
+                let lines: Vec<String> = lines.map(usize::to_string).collect();
+                format!("line {}{more}", lines.join(", "))
+            }
+        }
+    }
+
+    fn log_time(&self, row: usize) -> Option<f64> {
+        let times = self.columns.get("time_since_power_on_s");
+        times.filter(|_| self.is_of_log())?.get(row).copied()
+    }
+
     /// Number of rows.
     pub fn len(&self) -> usize {
         self.time_s.len()

@@ -34,6 +34,23 @@ fn too_long(record: &ThermalRecord, lasts_s: f64) -> Option<Warning> {
     let steps: Vec<f64> = record.time_s.windows(2).map(|w| w[1] - w[0]).collect();
     let step = stats::median(&steps);
     let days = lasts_s / 86_400.0;
+    // A clock that is set while it runs: all but one step is short.
+    let leap = steps.iter().copied().enumerate();
+    let leap = leap.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, 0.0));
+    if days > 5.0 && leap.1 > 0.9 * lasts_s && leap.1 > 1e4 * step {
+        let at = |row: usize| record.time_s.get(row).copied().unwrap_or(f64::NAN);
+        return Some(Warning::on(
+            "time_step_implausible",
+            "time_s",
+            format!(
+                "the clock leaps from {} to {} s ({}), and the other rows are {step} s apart. It looks like a clock that was set \
+                 within the record. Make it one clock, or close the two parts one by one",
+                at(leap.0),
+                at(leap.0 + 1),
+                record.place(leap.0 + 1)
+            ),
+        ));
+    }
     // Rows that are whole thousands of seconds apart are of no logger.
     let thousands = step >= 1000.0 && record.time_s.iter().all(|t| t % 1000.0 == 0.0);
     (step > 3600.0 || days > 5.0 || thousands).then(|| {
@@ -122,15 +139,21 @@ fn too_short(record: &ThermalRecord) -> Option<Warning> {
         lag *= 2;
     }
     if let (Some((a, b)), 0.0) = (jump, fastest) {
+        let (from, to) = largest_step(&record.time_s, die, a.0, b.0)?;
+        let at = |row: usize| record.time_s.get(row).copied().unwrap_or(f64::NAN);
+        let line = format!(" ({})", record.place(to));
         return Some(Warning::on(
             "record_spliced",
             "die_degc",
             format!(
-                "die_degc jumps from {:.1} to {:.1} degC at {:.1} s, faster than a die can. It looks like two \
+                "die_degc jumps from {:.1} to {:.1} degC between {:.1} and {:.1} s{line}, faster than a die can. It looks like two \
                  sessions in one file: whatever else changed between them (orientation, mounting, power) cannot be told from \
                  the temperature. Record both temperatures in one session, give time_s the pause between them, or close them \
                  one by one",
-                a.1, b.1, b.0
+                die[from],
+                die[to],
+                at(from),
+                at(to)
             ),
         ));
     }
@@ -145,6 +168,15 @@ fn too_short(record: &ThermalRecord) -> Option<Warning> {
             ),
         )
     })
+}
+
+/// The rows before and behind the largest step of a channel within a time.
+fn largest_step(time_s: &[f64], values: &[f64], from_s: f64, to_s: f64) -> Option<(usize, usize)> {
+    let is_read = |i: &usize| (from_s..=to_s).contains(&time_s[*i]) && !values[*i].is_nan();
+    let rows: Vec<usize> = (0..values.len()).filter(is_read).collect();
+    let steps = rows.windows(2).map(|w| (w[0], w[1]));
+    let size = |s: &(usize, usize)| (values[s.1] - values[s.0]).abs();
+    steps.max_by(|a, b| size(a).total_cmp(&size(b)))
 }
 
 #[cfg(test)]
@@ -189,8 +221,35 @@ mod tests {
                 }
             };
             assert_eq!(codes(header, row(0.0)), ["record_spliced"], "{at}");
+            let rows: String = (0..400).map(|k| row(0.0)(f64::from(k)) + "\n").collect();
+            let text = format!("{header}\n{rows}");
+            let mapping = RecordMapping::default();
+            let (_, warnings) = parse(text.as_bytes(), Path::new("r.csv"), &mapping).unwrap();
+            let place = format!("between {}.0 and {at}.0 s (line {})", at - 1, at + 2);
+            assert!(warnings[0].message.contains(&place), "{warnings:?}");
             assert!(codes(header, row(600.0)).is_empty(), "{at}");
         }
+    }
+
+    #[test]
+    fn a_clock_that_is_set_within_the_record_is_in_no_other_unit() {
+        let time = |k: f64| if k < 100.0 { k } else { 1.7e9 + k };
+        let rows: String = (0..400)
+            .map(f64::from)
+            .map(|k| format!("{},{},{}\n", time(k), (k * 1.7).sin(), 20.0 + 0.1 * k))
+            .collect();
+        let text = format!("time_s,rate_out_dps,die_degc\n{rows}");
+        let mapping = RecordMapping::default();
+        let (_, warnings) = parse(text.as_bytes(), Path::new("r.csv"), &mapping).unwrap();
+        let told = warnings
+            .iter()
+            .find(|w| w.code == "time_step_implausible")
+            .unwrap();
+        assert!(
+            told.message.contains("from 99 to 1700000100 s (line 102)"),
+            "{told:?}"
+        );
+        assert!(!told.message.contains("milliseconds"), "{told:?}");
     }
 
     #[test]

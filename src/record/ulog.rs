@@ -69,12 +69,15 @@ pub(super) fn read<R: Read>(
         sources: Vec::new(),
         in_use: Vec::new(),
         parameters: Parameters::default(),
+        unsettled: Vec::new(),
+        now_us: 0,
         appended: Vec::new(),
         damage: Damage::default(),
         averager: Averager::new(mapping),
         fields: wanted(mapping.axis.index()),
     };
     reader.run()?;
+    dated(&mut reader.unsettled, &mut reader.parameters, u64::MAX);
     let Reader {
         mut sources,
         mut averager,
@@ -90,7 +93,8 @@ pub(super) fn read<R: Read>(
     let nothing = ("no gyro topic", reader.damage);
     let (mut choice, chosen) =
         log_gyros::choose(&averager, &sources, mapping.instance, path, nothing)?;
-    if let Some(source) = sources.get(chosen.lead) {
+    let source = log_gyros::source_of_rate(&averager, &sources, &choice, chosen);
+    if let Some(source) = source {
         let of = corrections::Chosen {
             number: chosen.number,
             id: chosen.id,
@@ -104,6 +108,14 @@ pub(super) fn read<R: Read>(
         log_gyros::corrected(&averager, &mut choice, found, source);
     }
     averager.finish(path, mapping, reader.damage, choice)
+}
+
+/// Sets parameters that were read, each (name, us, value): none later than the message that follows, by which a wild time
+/// before them is told.
+fn dated(unsettled: &mut Vec<(String, u64, f64)>, parameters: &mut Parameters, next_us: u64) {
+    for (name, time_us, value) in unsettled.drain(..) {
+        parameters.set(&name, time_us.min(next_us), value);
+    }
 }
 
 /// Samples that were read and not yet taken: a message of type D.
@@ -124,6 +136,10 @@ struct Reader<'a, R: Read> {
     /// The gyro in use: us since power-on, `device_id`.
     in_use: Vec<(u64, u32)>,
     parameters: Parameters,
+    /// Parameters that no message with a time has followed yet.
+    unsettled: Vec<(String, u64, f64)>,
+    /// The time of the message that was read last, us.
+    now_us: u64,
     /// Where appended data begin, the nearest last.
     appended: Vec<u64>,
     damage: Damage,
@@ -296,7 +312,9 @@ impl<R: Read> Reader<'_, R> {
             _ => None,
         };
         if let Some(((_, name), value)) = key.zip(value) {
-            self.parameters.set(name, self.averager.now_us, value);
+            // The averager's time lags: there messages wait for others to agree with theirs.
+            let time_us = self.now_us.max(self.averager.now_us);
+            self.unsettled.push((name.to_owned(), time_us, value));
         }
     }
 
@@ -388,6 +406,9 @@ impl<R: Read> Reader<'_, R> {
         let (true, Some(time_us)) = (data.len() == subscription.layout.logged_bytes, time) else {
             return Ok(false);
         };
+        self.now_us = time_us;
+        let next_us = time_us.max(self.averager.now_us);
+        dated(&mut self.unsettled, &mut self.parameters, next_us);
         let read = |place: Option<(usize, Scalar)>| place.and_then(|(o, s)| s.read(data, o));
         if let (Some(id), Some(source)) = (
             read(subscription.id),

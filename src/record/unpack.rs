@@ -1,7 +1,9 @@
 //! What a file is by its first bytes, and gzip and zstd streams unpacked while they are read.
 
+use crate::error::InputError;
 use ruzstd::decoding::{FrameDecoder, StreamingDecoder};
 use std::io::{self, BufRead, BufReader, Read};
+use std::path::Path;
 
 /// Bytes that tell what a file is: a tar archive says so behind the first entry's name.
 pub(super) const HEAD: usize = 262;
@@ -31,12 +33,64 @@ pub(super) fn unpacked(
     input: Box<dyn Read + Send>,
 ) -> io::Result<(Box<dyn Read + Send>, bool)> {
     if head.starts_with(&GZIP) {
-        return Ok((Box::new(flate2::read::MultiGzDecoder::new(input)), true));
+        let of = flate2::read::MultiGzDecoder::new(input);
+        return Ok((Box::new(Told { of, name: "gzip" }), true));
     }
     if is_zstd(head) {
-        return Ok((Box::new(Zstd::new(input)?), true));
+        let of = Zstd::new(input).map_err(|e| told(e, "zstd"))?;
+        return Ok((Box::new(Told { of, name: "zstd" }), true));
     }
     Ok((input, false))
+}
+
+/// A decoder whose failures say what the file has.
+struct Told<R> {
+    of: R,
+    name: &'static str,
+}
+
+impl<R: Read> Read for Told<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.of.read(buffer).map_err(|e| told(e, self.name))
+    }
+}
+
+/// A decoder's failure in words: cut, or damaged; what the system says stays.
+fn told(error: io::Error, name: &str) -> io::Error {
+    let text = error.to_string();
+    let is_cut = ["stream ends", "incomplete", "UnexpectedEof"]
+        .iter()
+        .any(|part| text.contains(part));
+    match error.kind() {
+        io::ErrorKind::UnexpectedEof => cut(name),
+        // The zstd decoder tells all of its failures as of another kind.
+        io::ErrorKind::InvalidData | io::ErrorKind::InvalidInput | io::ErrorKind::Other => {
+            match is_cut {
+                true => cut(name),
+                false => io::Error::new(
+                    io::ErrorKind::InvalidData,
+                    format!("the {name} file is damaged ({text})"),
+                ),
+            }
+        }
+        _ => error,
+    }
+}
+
+fn cut(name: &str) -> io::Error {
+    io::Error::new(
+        io::ErrorKind::UnexpectedEof,
+        format!("the {name} file is cut short: it ends within its data"),
+    )
+}
+
+/// Refuses what was packed twice; `head` is what was unpacked.
+pub(super) fn packed_twice(path: &Path, head: &[u8]) -> Option<InputError> {
+    is_packed(head).then(|| {
+        InputError::new("this is a packed file that holds another packed file (gzip or zstd)")
+            .in_file(path)
+            .help("unpack it once: files that are packed once are read as they are")
+    })
 }
 
 /// A zstd stream of one frame after the other; frames of metadata are passed over, and checksums hold.
@@ -111,7 +165,7 @@ pub(super) fn foreign(head: &[u8]) -> Option<(&'static str, &'static str)> {
     const UNPACK: &str =
         "unpack it, and give the record that is in it (gzip and zstd files are read as they are)";
     const EXPORT: &str = "export the gyro's rate, its temperature and their time from it as CSV";
-    const KINDS: [(&[u8], &str, &str); 16] = [
+    const KINDS: [(&[u8], &str, &str); 14] = [
         (
             b"PK\x03\x04",
             "this is a ZIP archive or an Excel workbook",
@@ -146,17 +200,27 @@ pub(super) fn foreign(head: &[u8]) -> Option<(&'static str, &'static str)> {
         ),
         (b"%PDF", "this is a PDF", EXPORT),
         (
-            b"<",
-            "this is a web page or XML, and no table",
-            "was it downloaded while not logged in? Give the file itself, as CSV",
-        ),
-        (b"{", "this is JSON", EXPORT),
-        (
             b"\xD0\xCF\x11\xE0",
             "this is an old Excel workbook",
             "save the sheet as CSV UTF-8",
         ),
     ];
+    // Behind a byte order mark and blank lines.
+    let text = head
+        .strip_prefix(b"\xEF\xBB\xBF")
+        .unwrap_or(head)
+        .trim_ascii_start();
+    let is_text = !text.iter().any(|b| matches!(b, 0..=8 | 14..=31));
+    match text {
+        [b'<', b'!' | b'?' | b'a'..=b'z' | b'A'..=b'Z', ..] if is_text => {
+            return Some((
+                "this is a web page (HTML) or XML, and no table",
+                "was it downloaded while not logged in? Give the file itself",
+            ));
+        }
+        [b'{', ..] if is_text => return Some(("this is JSON", EXPORT)),
+        _ => {}
+    }
     if let Some((_, what, help)) = KINDS.iter().find(|(magic, ..)| head.starts_with(magic)) {
         return Some((what, help));
     }
@@ -217,8 +281,20 @@ mod tests {
             assert_eq!(record.columns, plain.0.columns, "{name}");
             assert_eq!(warnings, plain.1, "{name}");
             let cut = bytes.get(..bytes.len() / 2).unwrap();
-            assert_eq!(read(name, cut).unwrap_err().exit_status(), 2, "{name}");
+            let error = read(name, cut).unwrap_err();
+            assert_eq!(error.exit_status(), 2, "{name}");
+            let error = error.to_string();
+            assert!(
+                error.contains("cut short") || error.contains("damaged"),
+                "{error}"
+            );
         }
+        let error = read("r.csv.gz", &gzip(&gzip(&csv())))
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains("another packed file"), "{error}");
+        let error = read("r.ulg", b"").unwrap_err().to_string();
+        assert!(error.contains("the log is empty"), "{error}");
     }
 
     trait Halves {
@@ -241,6 +317,7 @@ mod tests {
             (&telemetry, "telemetry"),
             (b"\x89MCAP0\r\n", "MCAP"),
             (b"<!DOCTYPE html>", "web page"),
+            (b"\xEF\xBB\xBF\r\n\n  <html lang=\"en\">", "HTML"),
             (b"{\"time_s\": [1, 2]}", "JSON"),
             (&[&[b'r'; 257][..], b"ustar\0"].concat(), "tar"),
         ] {
@@ -251,6 +328,8 @@ mod tests {
             b"ULog\x01\x12\x35",
             b"",
             b"1,2,3,4,5,6,7,8",
+            b"<\x01\x02\x00 of samples",
+            b"<5,6,7",
         ] {
             assert_eq!(foreign(head), None);
         }

@@ -380,24 +380,9 @@ pub(super) fn glitches(record: &ThermalRecord, name: &str, rows: &[usize]) -> Wa
             "{} readings of {name} lie apart from their neighbours by more than half of the \
              range and are left out ({})",
             rows.len(),
-            lines_of(record, rows)
+            record.places(rows)
         ),
     )
-}
-
-/// "line 3, 17, 40 and 5 more".
-fn lines_of(record: &ThermalRecord, rows: &[usize]) -> String {
-    let shown: Vec<String> = rows
-        .iter()
-        .take(8)
-        .filter_map(|i| record.lines.get(*i))
-        .map(usize::to_string)
-        .collect();
-    let more = match rows.len().saturating_sub(8) {
-        0 => String::new(),
-        n => format!(" and {n} more"),
-    };
-    format!("line {}{more}", shown.join(", "))
 }
 
 fn outlier_warning(record: &ThermalRecord, outliers: &[usize], rows: usize) -> Option<Warning> {
@@ -417,7 +402,7 @@ fn outlier_warning(record: &ThermalRecord, outliers: &[usize], rows: usize) -> O
             "{} of {rows} rows stand out from their neighbours and hardly count in the fit ({}); \
              held-out and in-sample errors include them{many}",
             outliers.len(),
-            lines_of(record, outliers)
+            record.places(outliers)
         ),
     ))
 }

@@ -202,7 +202,7 @@ mod tests {
             assert_eq!(found.len(), due.len() / columns);
             for (found, due) in found.iter().zip(due.chunks_exact(columns)) {
                 let found = found[..columns].iter().map(|word| i128::from(*word));
-                assert!(found.eq(due.iter().copied().map(i128::from)));
+                assert!(found.eq(due.iter().copied()));
             }
         }
     }
