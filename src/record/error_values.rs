@@ -72,15 +72,17 @@ const OF_CONVERTERS: [f64; 9] = [
 /// repeated to the last digit. What else is so fast is in another unit.
 fn of_converter(values: &[f64], kind: Kind) -> Vec<bool> {
     let beyond = |v: f64| v.is_finite() && !(kind.possible.0..=kind.possible.1).contains(&v);
-    let all: Vec<f64> = values.iter().copied().filter(|v| beyond(*v)).collect();
+    let mut counts: BTreeMap<u64, usize> = BTreeMap::new();
+    for value in values.iter().filter(|v| beyond(**v)) {
+        *counts.entry(value.to_bits()).or_insert(0) += 1;
+    }
     let measured = values.iter().filter(|v| v.is_finite()).count();
-    let repeated = |v: f64| all.iter().filter(|o| **o == v).count() > 1;
-    let are = all
+    let few = 10 * counts.values().sum::<usize>() <= measured;
+    let is_known = |bits: u64| OF_CONVERTERS.contains(&f64::from_bits(bits));
+    let are = counts
         .iter()
-        .all(|v| OF_CONVERTERS.contains(v) || repeated(*v));
-    let few = 10 * all.len() <= measured;
-    let marked = |v: &f64| are && few && beyond(*v);
-    values.iter().map(marked).collect()
+        .all(|(bits, count)| *count > 1 || is_known(*bits));
+    values.iter().map(|v| are && few && beyond(*v)).collect()
 }
 
 /// The kind of a column; `None` for one whose values are taken as they are.
@@ -211,7 +213,7 @@ pub(super) fn marks(time_s: &[f64], values: &[f64], kind: Kind) -> Vec<bool> {
         let count = of_value.iter().filter(far).count();
         if 2 * count >= of_value.len() && count > 0 {
             let far = of_value.iter().filter(far);
-            far.for_each(|v| v.cells.clone().for_each(|k| marks[cells[k]] = true));
+            far.for_each(|v| v.cells().for_each(|k| marks[cells[k]] = true));
             put_aside(values, value, &mut aside);
         }
     }
@@ -262,8 +264,8 @@ fn frequent(values: &[f64], marks: &[bool]) -> Vec<f64> {
 #[derive(Debug, Clone, PartialEq)]
 struct Visit {
     value: f64,
-    /// Into the cells that were looked at.
-    cells: Range<usize>,
+    /// First of the cells that were looked at, and how many: there are as many visits as rows.
+    cells: (u32, u32),
     /// The lesser distance.
     distance: f64,
     /// The same for a step of usual length in time.
@@ -272,6 +274,14 @@ struct Visit {
     way_s: f64,
     /// Whether there are neighbours on both sides.
     inner: bool,
+}
+
+impl Visit {
+    /// Into the cells that were looked at.
+    fn cells(&self) -> Range<usize> {
+        let (first, count) = self.cells;
+        first as usize..first as usize + count as usize
+    }
 }
 
 /// The visits of the given cells, in order of time.
@@ -311,7 +321,7 @@ fn visits(time_s: &[f64], values: &[f64], cells: &[usize]) -> Vec<Visit> {
         let least = |f: fn(&(f64, f64)) -> f64| sides().map(f).fold(f64::INFINITY, f64::min);
         out.push(Visit {
             value,
-            cells: start..end,
+            cells: (start as u32, (end - start) as u32),
             distance: least(|s| s.0),
             per_row: least(|s| s.1),
             way_s: way(before_s).min(way(after_s)),
@@ -379,7 +389,7 @@ impl Scale {
     fn is_cut_off(&self, visit: &Visit, all: usize) -> bool {
         !visit.inner
             && visit.distance.is_finite()
-            && 10 * visit.cells.len() <= all
+            && 10 * visit.cells().len() <= all
             && visit.per_row > DOZENS * self.usual
             && visit.distance > LEAST_OF_RANGE * self.range
             && self.is_out_of_reach(visit)
@@ -412,7 +422,7 @@ fn seen(visits: &[Visit], is_far: impl Fn(&Visit, bool) -> bool) -> BTreeMap<u64
             if is_far(visit, seen.inner > 0) {
                 seen.far += 1;
                 seen.inner += usize::from(inner);
-                seen.far_cells += visit.cells.len();
+                seen.far_cells += visit.cells().len();
                 seen.farthest = seen.farthest.max(visit.distance);
             }
         }
@@ -457,7 +467,7 @@ fn apart(time_s: &[f64], values: &[f64], aside: &[bool], inert: bool) -> Vec<usi
         None => single(v) && 2.0 * v.distance >= most,
     });
     let found: Vec<usize> = found
-        .flat_map(|v| cells.get(v.cells.clone()).unwrap_or(&[]))
+        .flat_map(|v| cells.get(v.cells()).unwrap_or(&[]))
         .copied()
         .collect();
     // Where so much stands apart it is how the record is.
