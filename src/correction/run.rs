@@ -9,10 +9,10 @@ use crate::numeric::arithmetic::Block;
 use crate::numeric::fixed::{Fixed, Words};
 use crate::numeric::float::Float;
 use crate::numeric::format::{Format, pow2};
+use crate::numeric::rows::WordRows;
 use crate::numeric::trace::Trace;
 use crate::numeric::trace::ir::Program;
 use crate::record::thermal::ThermalRecord;
-use crate::vectors::rows::WordRows;
 
 /// Most steps that one reading takes, whatever the gap before it.
 pub const MOST_STEPS: u64 = 1 << 16;

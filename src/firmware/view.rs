@@ -1,13 +1,12 @@
 //! Everything that the templates of a bundle see.
 
+use super::example::{ExampleView, example};
 use super::tested::{self, TestView, Tested};
 use super::vectors::{self, Checked};
 use crate::design::Design;
 use crate::emit::bundle::Bundle;
 use crate::emit::machine::{Type, Width, parameter_type};
-use crate::emit::views::{
-    self, ExampleView, FunctionView, Language, StateView, StructView, TableView,
-};
+use crate::emit::views::{self, FunctionView, Language, StateView, StructView, TableView};
 use crate::emit::{c, rust};
 use crate::numeric::trace::ir::Interval;
 use crate::text::{self, Place};
@@ -132,6 +131,8 @@ impl View {
             }
             _ => Vec::new(),
         };
+        let result = functions.last().map_or("", |f| f.result.as_str());
+        let example = example(bundle, models, result, language);
         View {
             p: bundle.prefix.clone(),
             language,
@@ -165,7 +166,7 @@ impl View {
             long_steps: 0,
             long_restart: stimulus::SEGMENT,
             long_checksum: String::new(),
-            example: views::example(bundle, models, language),
+            example,
             functions,
             tables,
         }

@@ -7,11 +7,11 @@ use crate::design::{Compensation, CompensationInput, Design};
 use crate::emit::views::Language;
 use crate::error::{InputError, Result};
 use crate::numeric::format::Format;
+use crate::numeric::rows::WordRows;
 use crate::record::ThermalRecord;
 use crate::thermal::BaselineFit;
 use crate::vectors::model;
 use crate::vectors::model::Model;
-use crate::vectors::rows::WordRows;
 use crate::verify::firmware::{Built, Firmware};
 use std::collections::BTreeMap;
 

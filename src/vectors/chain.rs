@@ -2,13 +2,13 @@
 //! the columns of `replay`, the bias that stands behind the rate, and the state.
 
 use super::interpreter::{Interpreter, StateWord};
-use super::rows::WordRows;
 use crate::circuit::chain::{Chain, FastState, SlowState};
 use crate::circuit::decimator::Decimate;
 use crate::circuit::engine;
 use crate::design::Design;
 use crate::numeric::arithmetic::Block;
 use crate::numeric::fixed::{Fixed, Words};
+use crate::numeric::rows::WordRows;
 
 type Wide = Fixed<i128, i128>;
 

@@ -1,13 +1,12 @@
 //! What emitted functions are tested with: the bit-accurate [`model`] of each ([`form`]: of an approximation;
-//! [`interpreter`]: of what remembers something), the [`chain`] with its state, the inputs ([`stimulus`], [`search`]), and
-//! many of them in one piece of memory ([`rows`]).
+//! [`interpreter`]: of what remembers something), the [`chain`] with its state, and the inputs ([`stimulus`],
+//! [`search`]).
 
 pub mod chain;
 pub mod form;
 pub mod interpreter;
 pub mod model;
 mod repair;
-pub mod rows;
 pub mod search;
 pub mod stimulus;
 mod telling;

@@ -11,7 +11,7 @@ use crate::firmware::files::EmittedFile;
 use crate::firmware::folder::Folder;
 use crate::firmware::manifest::{self, Manifest};
 use crate::leftovers::TemporaryFolder;
-use crate::vectors::rows::WordRows;
+use crate::numeric::rows::WordRows;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

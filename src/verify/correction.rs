@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::firmware::correction::{Origin, emit};
 use crate::firmware::files::EmittedFile;
 use crate::firmware::stepped;
-use crate::vectors::rows::WordRows;
+use crate::numeric::rows::WordRows;
 use crate::verify::compare::{self, Compared};
 
 /// Both languages' bundles, with the test drivers of those that were built.
