@@ -71,8 +71,8 @@ typedef struct {
     int32_t sense_q; /* decimated, Q2.22 half_up saturate */
     int32_t phase; /* drive phase in units of 2^-24 turn */
     int32_t magnitude; /* drive magnitude in units of 2^-22 */
-    int32_t bias; /* bias in deg/s, Q12.12 half_up saturate */
-    int32_t rate; /* compensated rate in deg/s, Q12.12 half_up saturate */
+    int32_t bias; /* bias = raw * 2^-12 deg/s, Q12.12 half_up saturate */
+    int32_t rate; /* compensated rate = raw * 2^-12 deg/s, Q12.12 half_up saturate */
     int32_t gain; /* drive gain in units of 2^-15 */
 } gyro_period_out_t;
 
@@ -114,15 +114,15 @@ gyro_cordic_out_t gyro_cordic(int32_t in_phase, int32_t quadrature);
 
 /* bias
  *   in  thermometer: -8388608 .. 8388607; phase in units of 2^-24 turn
- *   out bias: -8208678 .. 8388607; bias in deg/s, Q12.12 half_up saturate
+ *   out bias: -8208678 .. 8388607; bias = raw * 2^-12 deg/s, Q12.12 half_up saturate
  *   error: each step one rounding to the accumulator's LSB
  */
 int32_t gyro_bias(int32_t thermometer);
 
 /* rate
- *   in  raw_rate: -4194176 .. 4194176; sense I, Q2.22, full scale 2048 deg/s
- *   in  bias: -8208678 .. 8388607; bias in deg/s, Q12.12 half_up saturate
- *   out rate: -8388608 .. 8388607; compensated rate in deg/s, Q12.12 half_up saturate
+ *   in  raw_rate: -4194176 .. 4194176; sense I = raw * 2^-11 deg/s, Q2.22
+ *   in  bias: -8208678 .. 8388607; bias = raw * 2^-12 deg/s, Q12.12 half_up saturate
+ *   out rate: -8388608 .. 8388607; compensated rate = raw * 2^-12 deg/s, Q12.12 half_up saturate
  *   error: one rounding of the input to the output's LSB; the difference is exact
  */
 int32_t gyro_rate(int32_t raw_rate, int32_t bias);
@@ -140,8 +140,8 @@ int32_t gyro_amplitude_loop(gyro_amplitude_loop_t *s, int32_t magnitude);
  *   out sense_q: -4194176 .. 4194176; decimated, Q2.22 half_up saturate
  *   out phase: -8388608 .. 8388607; drive phase in units of 2^-24 turn
  *   out magnitude: 0 .. 5931461; drive magnitude in units of 2^-22
- *   out bias: -8208678 .. 8388607; bias in deg/s, Q12.12 half_up saturate
- *   out rate: -8388608 .. 8388607; compensated rate in deg/s, Q12.12 half_up saturate
+ *   out bias: -8208678 .. 8388607; bias = raw * 2^-12 deg/s, Q12.12 half_up saturate
+ *   out rate: -8388608 .. 8388607; compensated rate = raw * 2^-12 deg/s, Q12.12 half_up saturate
  *   out gain: 0 .. 32767; drive gain in units of 2^-15
  */
 gyro_period_out_t gyro_period(gyro_chain_t *s);

@@ -530,9 +530,9 @@ pub struct PeriodOut {
     pub phase: i32,
     /// drive magnitude in units of 2^-22
     pub magnitude: i32,
-    /// bias in deg/s, Q12.12 half_up saturate
+    /// bias = raw * 2^-12 deg/s, Q12.12 half_up saturate
     pub bias: i32,
-    /// compensated rate in deg/s, Q12.12 half_up saturate
+    /// compensated rate = raw * 2^-12 deg/s, Q12.12 half_up saturate
     pub rate: i32,
     /// drive gain in units of 2^-15
     pub gain: i32,
@@ -702,7 +702,7 @@ pub fn cordic(in_phase: i32, quadrature: i32) -> CordicOut {
 ///
 /// ```text
 /// in  thermometer: -8388608 .. 8388607; phase in units of 2^-24 turn
-/// out bias: -8208678 .. 8388607; bias in deg/s, Q12.12 half_up saturate
+/// out bias: -8208678 .. 8388607; bias = raw * 2^-12 deg/s, Q12.12 half_up saturate
 /// error: each step one rounding to the accumulator's LSB
 /// ```
 #[must_use]
@@ -725,9 +725,9 @@ pub fn bias(thermometer: i32) -> i32 {
 /// The block `rate`.
 ///
 /// ```text
-/// in  raw_rate: -4194176 .. 4194176; sense I, Q2.22, full scale 2048 deg/s
-/// in  bias: -8208678 .. 8388607; bias in deg/s, Q12.12 half_up saturate
-/// out rate: -8388608 .. 8388607; compensated rate in deg/s, Q12.12 half_up saturate
+/// in  raw_rate: -4194176 .. 4194176; sense I = raw * 2^-11 deg/s, Q2.22
+/// in  bias: -8208678 .. 8388607; bias = raw * 2^-12 deg/s, Q12.12 half_up saturate
+/// out rate: -8388608 .. 8388607; compensated rate = raw * 2^-12 deg/s, Q12.12 half_up saturate
 /// error: one rounding of the input to the output's LSB; the difference is exact
 /// ```
 #[must_use]
@@ -769,8 +769,8 @@ pub fn amplitude_loop(s: &mut AmplitudeLoop, magnitude: i32) -> i32 {
 /// out sense_q: -4194176 .. 4194176; decimated, Q2.22 half_up saturate
 /// out phase: -8388608 .. 8388607; drive phase in units of 2^-24 turn
 /// out magnitude: 0 .. 5931461; drive magnitude in units of 2^-22
-/// out bias: -8208678 .. 8388607; bias in deg/s, Q12.12 half_up saturate
-/// out rate: -8388608 .. 8388607; compensated rate in deg/s, Q12.12 half_up saturate
+/// out bias: -8208678 .. 8388607; bias = raw * 2^-12 deg/s, Q12.12 half_up saturate
+/// out rate: -8388608 .. 8388607; compensated rate = raw * 2^-12 deg/s, Q12.12 half_up saturate
 /// out gain: 0 .. 32767; drive gain in units of 2^-15
 /// ```
 pub fn period(s: &mut Chain) -> PeriodOut {
