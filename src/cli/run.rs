@@ -116,6 +116,15 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     )))
 }
 
+/// A reading of a thermometer, to seven digits, without zeros at its end.
+fn plain(reading: f64) -> String {
+    let text = number(reading, 7);
+    match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => text,
+    }
+}
+
 fn print(outcome: &Outcome, out: &std::path::Path) {
     let s = &outcome.summary;
     if let Some(columns) = &outcome.parts.understood {
@@ -184,8 +193,8 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
     }
     say!(
         "calibrated for {} .. {} {}",
-        number(s.fit.range.0, 7),
-        number(s.fit.range.1, 7),
+        plain(s.fit.range.0),
+        plain(s.fit.range.1),
         s.fit.unit
     );
     say!(

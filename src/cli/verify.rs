@@ -180,7 +180,8 @@ fn reasons(v: &Verification) -> Vec<String> {
     reasons.extend(v.problems.iter().cloned());
     if !v.changed_files.is_empty() || !v.problems.is_empty() {
         reasons.push(
-            "restore the files, or emit the bundle again (`--force` replaces edited files)"
+            "move files of your own out of the folder, and emit the bundle again where its files changed (`--force` \
+             replaces edited ones)"
                 .to_owned(),
         );
     }

@@ -27,8 +27,12 @@ pub fn is_known(name: &str) -> bool {
 /// The unit of a column: the contract's, or by the suffix of an auxiliary column's name;
 /// `"1"` where the name carries none.
 pub fn unit_of(name: &str) -> &'static str {
-    const SUFFIXES: [(&str, &str); 14] = [
+    const SUFFIXES: [(&str, &str); 17] = [
+        // Before `_s`, which they end with.
+        ("_rad_s", "rad/s"),
         ("_dps", "deg/s"),
+        ("_mdps", "mdeg/s"),
+        ("_ms", "ms"),
         ("_degc", "degC"),
         ("_rad", "rad"),
         ("_hz", "Hz"),

@@ -220,7 +220,7 @@ pub fn facts(design: &Design, bundle: &Bundle) -> Vec<String> {
             k.coefficient_format
         ));
         facts.push(format!(
-            "accumulator {}, output {}, rate full scale {} deg/s",
+            "accumulator {}, output {}, uncompensated rate = value of its word * {} deg/s",
             k.accumulator, k.output, k.rate_full_scale_dps
         ));
         facts.push(match k.clamp_raw {

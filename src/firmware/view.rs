@@ -172,6 +172,15 @@ impl View {
         }
     }
 
+    /// Whether one function does all of a reading.
+    pub(super) fn calls_once(&self) -> bool {
+        !self.chain
+            && self
+                .functions
+                .last()
+                .is_some_and(|f| f.name == "compensate")
+    }
+
     pub(super) fn is_c(&self) -> bool {
         self.language == Language::C
     }

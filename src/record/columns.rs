@@ -530,6 +530,7 @@ mod tests {
     fn units_come_from_the_name() {
         assert_eq!(unit_of("phase_rad"), "rad");
         assert_eq!(unit_of("pressure_hpa"), "hPa");
+        assert_eq!(unit_of("gyro_x_rad_s"), "rad/s");
         assert_eq!(unit_of("agc"), "1");
         assert_eq!(unit_of("whatever"), "1");
     }

@@ -206,14 +206,14 @@ pub(super) fn marks(time_s: &[f64], values: &[f64], kind: Kind) -> Vec<bool> {
         let cells: Vec<usize> = (0..values.len())
             .filter(|i| values[*i].is_finite() && !aside[*i])
             .collect();
-        let visits = visits(time_s, values, &cells);
-        let of_value: Vec<&Visit> = visits.iter().filter(|v| v.value == value).collect();
+        let visits = Visits::of(time_s, values, &cells);
+        let of_value: Vec<Visit> = visits.iter().filter(|v| v.value == value).collect();
         let known = of_value.iter().any(|v| v.inner && scale.is_far(v, true));
-        let far = |v: &&&Visit| scale.is_far(v, known);
+        let far = |v: &&Visit| scale.is_far(v, known);
         let count = of_value.iter().filter(far).count();
         if 2 * count >= of_value.len() && count > 0 {
             let far = of_value.iter().filter(far);
-            far.for_each(|v| v.cells().for_each(|k| marks[cells[k]] = true));
+            far.for_each(|v| v.cells.clone().for_each(|k| marks[cells[k]] = true));
             put_aside(values, value, &mut aside);
         }
     }
@@ -264,8 +264,8 @@ fn frequent(values: &[f64], marks: &[bool]) -> Vec<f64> {
 #[derive(Debug, Clone, PartialEq)]
 struct Visit {
     value: f64,
-    /// First of the cells that were looked at, and how many: there are as many visits as rows.
-    cells: (u32, u32),
+    /// Into the cells that were looked at.
+    cells: Range<usize>,
     /// The lesser distance.
     distance: f64,
     /// The same for a step of usual length in time.
@@ -276,60 +276,70 @@ struct Visit {
     inner: bool,
 }
 
-impl Visit {
-    /// Into the cells that were looked at.
-    fn cells(&self) -> Range<usize> {
-        let (first, count) = self.cells;
-        first as usize..first as usize + count as usize
-    }
+/// The visits of some cells. Each is made when it is looked at: a long record has as many as rows.
+struct Visits<'a> {
+    time_s: &'a [f64],
+    values: &'a [f64],
+    cells: &'a [usize],
+    /// Step of usual length in time, s.
+    usual_s: f64,
 }
 
-/// The visits of the given cells, in order of time.
-fn visits(time_s: &[f64], values: &[f64], cells: &[usize]) -> Vec<Visit> {
-    let steps: Vec<f64> = cells
-        .windows(2)
-        .map(|w| time_s[w[1]] - time_s[w[0]])
-        .filter(|s| *s > 0.0)
-        .collect();
-    let usual_s = stats::median(&steps);
-    let step = |a: usize, b: usize| -> (f64, f64) {
-        let distance = (values[cells[b]] - values[cells[a]]).abs();
-        let rows = (time_s[cells[b]] - time_s[cells[a]]) / usual_s;
-        (
-            distance,
-            if rows > 1.0 {
-                distance / rows
-            } else {
-                distance
-            },
-        )
-    };
-    let alike = || cells.chunk_by(|a, b| values[*a] == values[*b]);
-    // As long as it gets: a long record has as many visits as rows.
-    let mut out = Vec::with_capacity(alike().count());
-    let mut start = 0;
-    for same in alike() {
-        let value = values[same[0]];
-        let end = start + same.len();
-        let before = start.checked_sub(1).map(|a| step(a, start));
-        let after = (end < cells.len()).then(|| step(end - 1, end));
-        let between = |a: usize, b: usize| time_s[cells[b]] - time_s[cells[a]];
-        let before_s = start.checked_sub(1).map(|a| between(a, start));
-        let after_s = (end < cells.len()).then(|| between(end - 1, end));
-        let way = |s: Option<f64>| s.unwrap_or(f64::INFINITY);
+impl<'a> Visits<'a> {
+    fn of(time_s: &'a [f64], values: &'a [f64], cells: &'a [usize]) -> Self {
+        let steps: Vec<f64> = cells
+            .windows(2)
+            .map(|w| time_s[w[1]] - time_s[w[0]])
+            .filter(|s| *s > 0.0)
+            .collect();
+        Visits {
+            time_s,
+            values,
+            cells,
+            usual_s: stats::median(&steps),
+        }
+    }
+
+    /// In order of time.
+    fn iter(&self) -> impl Iterator<Item = Visit> {
+        let alike = |a: &usize, b: &usize| self.values[*a] == self.values[*b];
+        self.cells.chunk_by(alike).scan(0, |start, same| {
+            let cells = *start..*start + same.len();
+            *start = cells.end;
+            Some(self.visit(cells))
+        })
+    }
+
+    /// Distance and time between two cells: value, value in a step of usual length, s.
+    fn way(&self, a: usize, b: usize) -> (f64, f64, f64) {
+        let (a, b) = (self.cells[a], self.cells[b]);
+        let (distance, time_s) = (
+            (self.values[b] - self.values[a]).abs(),
+            self.time_s[b] - self.time_s[a],
+        );
+        let rows = time_s / self.usual_s;
+        let per_row = if rows > 1.0 {
+            distance / rows
+        } else {
+            distance
+        };
+        (distance, per_row, time_s)
+    }
+
+    fn visit(&self, cells: Range<usize>) -> Visit {
+        let before = cells.start.checked_sub(1).map(|a| self.way(a, cells.start));
+        let after = (cells.end < self.cells.len()).then(|| self.way(cells.end - 1, cells.end));
         let sides = || before.iter().chain(&after);
-        let least = |f: fn(&(f64, f64)) -> f64| sides().map(f).fold(f64::INFINITY, f64::min);
-        out.push(Visit {
-            value,
-            cells: (start as u32, (end - start) as u32),
+        let least = |of: fn(&(f64, f64, f64)) -> f64| sides().map(of).fold(f64::INFINITY, f64::min);
+        Visit {
+            value: self.values[self.cells[cells.start]],
+            cells,
             distance: least(|s| s.0),
             per_row: least(|s| s.1),
-            way_s: way(before_s).min(way(after_s)),
+            way_s: least(|s| s.2),
             inner: before.is_some() && after.is_some(),
-        });
-        start = end;
+        }
     }
-    out
 }
 
 /// How the readings of a channel move.
@@ -343,12 +353,11 @@ struct Scale {
 impl Scale {
     /// Of the given cells; `None` where they are too few to tell.
     fn of(time_s: &[f64], values: &[f64], cells: &[usize]) -> Option<Scale> {
-        let visits = visits(time_s, values, cells);
-        Scale::of_visits(&visits)
+        Scale::of_visits(&Visits::of(time_s, values, cells))
     }
 
     /// Each different value counts once: readings have many, errors few.
-    fn of_visits(visits: &[Visit]) -> Option<Scale> {
+    fn of_visits(visits: &Visits) -> Option<Scale> {
         let mut by_value: Vec<(f64, f64)> = visits.iter().map(|v| (v.value, v.per_row)).collect();
         by_value.retain(|v| v.1.is_finite());
         by_value.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
@@ -389,7 +398,7 @@ impl Scale {
     fn is_cut_off(&self, visit: &Visit, all: usize) -> bool {
         !visit.inner
             && visit.distance.is_finite()
-            && 10 * visit.cells().len() <= all
+            && 10 * visit.cells.len() <= all
             && visit.per_row > DOZENS * self.usual
             && visit.distance > LEAST_OF_RANGE * self.range
             && self.is_out_of_reach(visit)
@@ -413,16 +422,16 @@ struct Seen {
 }
 
 /// The visits by the bits of their value; `is_far` is told whether the value is one of an error elsewhere.
-fn seen(visits: &[Visit], is_far: impl Fn(&Visit, bool) -> bool) -> BTreeMap<u64, Seen> {
+fn seen(visits: &Visits, is_far: impl Fn(&Visit, bool) -> bool) -> BTreeMap<u64, Seen> {
     let mut out: BTreeMap<u64, Seen> = BTreeMap::new();
     for inner in [true, false] {
         for visit in visits.iter().filter(|v| v.inner == inner) {
             let seen = out.entry(visit.value.to_bits()).or_default();
             seen.visits += 1;
-            if is_far(visit, seen.inner > 0) {
+            if is_far(&visit, seen.inner > 0) {
                 seen.far += 1;
                 seen.inner += usize::from(inner);
-                seen.far_cells += visit.cells().len();
+                seen.far_cells += visit.cells.len();
                 seen.farthest = seen.farthest.max(visit.distance);
             }
         }
@@ -435,7 +444,7 @@ fn apart(time_s: &[f64], values: &[f64], aside: &[bool], inert: bool) -> Vec<usi
     let cells: Vec<usize> = (0..values.len())
         .filter(|i| values[*i].is_finite() && !aside[*i])
         .collect();
-    let visits = visits(time_s, values, &cells);
+    let visits = Visits::of(time_s, values, &cells);
     let Some(scale) = Scale::of_visits(&visits) else {
         return few_readings(values, &cells);
     };
@@ -453,7 +462,7 @@ fn apart(time_s: &[f64], values: &[f64], aside: &[bool], inert: bool) -> Vec<usi
         let often = a.1.far.cmp(&b.1.far);
         often.then(a.1.farthest.total_cmp(&b.1.farthest))
     });
-    let single = |v: &&Visit| {
+    let single = |v: &Visit| {
         let alone = of(v).far_cells == 1;
         inert && alone && far(v) && scale.is_out_of_reach(v)
     };
@@ -467,7 +476,7 @@ fn apart(time_s: &[f64], values: &[f64], aside: &[bool], inert: bool) -> Vec<usi
         None => single(v) && 2.0 * v.distance >= most,
     });
     let found: Vec<usize> = found
-        .flat_map(|v| cells.get(v.cells()).unwrap_or(&[]))
+        .flat_map(|v| cells.get(v.cells).unwrap_or(&[]))
         .copied()
         .collect();
     // Where so much stands apart it is how the record is.
