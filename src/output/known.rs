@@ -63,8 +63,8 @@ impl Known {
     /// Such a file among the planned ones.
     pub fn refuse(&self, folder: &Path, planned: &[&str]) -> Result<()> {
         let is_own = |name: &&str| RESULTS.contains(name) && self.digest(Path::new(name)).is_some();
-        let has_own = planned.iter().any(|name| is_own(name));
-        let others = RESULTS.into_iter().find(|name| is_own(&name));
+        let has_own = planned.iter().any(is_own);
+        let others = RESULTS.into_iter().find(|name| is_own(name));
         for name in planned.iter().filter(|name| **name != WALL_TIMES) {
             let path = folder.join(name);
             if !path.is_file() {

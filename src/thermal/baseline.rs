@@ -41,7 +41,7 @@ pub struct BaselineFit {
     /// Lowest first, in powers of x = (T - centre) / half_span, deg/s.
     pub coefficients_scaled: Vec<f64>,
     /// Of `coefficients_scaled`, (deg/s)^2: weighted least squares under noise with the
-    /// residuals' own memory ([`correlation`]).
+    /// residuals' own memory ([`crate::statistics::correlation`]).
     pub covariance: DMatrix<f64>,
     /// The noise that the covariance stands for.
     pub noise: NoiseModel,
