@@ -9,7 +9,7 @@
  * CORDIC 20 iterations, 6 guard bits, width 32, angle 24 bits, gain 24 bits
  * amplitude loop: setpoint 1048576, error >> 7, integrator >> 12 from 67108864, gain 16 bits
  * compensation: input phase, p in half turns, coefficients [114923930, 800391448, 1415954326] Q12.20, lowest order first
- * accumulator Q13.27 half_up saturate, output Q12.12 half_up saturate, rate full scale 2048 deg/s
+ * accumulator Q13.27 half_up saturate, output Q12.12 half_up saturate, uncompensated rate = value of its word * 2048 deg/s
  * no calibrated range: the polynomial is evaluated at every input
  * The firmware's bias is at most 0.000123 deg/s (0.501 output LSB) from the polynomial as given (proved, unless a word saturates). Of this the coefficients' words make 0, the rounding of the steps 7.46e-9 and that of the output 0.000123 deg/s.
  * words are two's complement; ranges beside them are proved, not observed
