@@ -116,8 +116,9 @@ fn a_design_with_a_correction_emits_it_or_says_that_it_is_missing() {
     }
     let (status, said) = emitted(&["design.toml"], &["--part", "correction"], at);
     let lines: Vec<&str> = said.lines().collect();
-    assert_eq!((status, lines.len()), (Some(0), 2), "{said}");
-    assert!(lines[0].starts_with("wrote ") && lines[1].starts_with("digest "));
+    assert_eq!((status, lines.len()), (Some(0), 3), "{said}");
+    assert!(lines[0].starts_with("note: the bundle that was here is gone"));
+    assert!(lines[1].starts_with("wrote ") && lines[2].starts_with("digest "));
 }
 
 /// A polynomial that no record was fitted for is said to be one; a fitted one goes without a word.

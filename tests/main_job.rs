@@ -320,7 +320,8 @@ fn gaps_in_the_applied_rate_and_the_fitted_design() {
     );
 
     // Its thermometer is not what the own thermal run has.
-    let own = gyrogen(&["run", text(&design), "--out", text(&again)]);
+    let other = folder.path().join("other");
+    let own = gyrogen(&["run", text(&design), "--out", text(&other)]);
     assert_eq!(own.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&own.stderr).contains("--record"));
 }

@@ -182,7 +182,14 @@ fn what_cannot_be_printed_is_an_error_unless_nobody_reads() {
     }
     assert_eq!(
         names(&top.path().join("gyrogen-approx")),
-        ["approx.json", "c", "report.html", "rust", "timing.json"]
+        [
+            "SHA256SUMS",
+            "approx.json",
+            "c",
+            "report.html",
+            "rust",
+            "timing.json"
+        ]
     );
 }
 
