@@ -242,10 +242,9 @@ class Bench:
             wrong.append(f"status {status}")
         if status == 2 and not self.stderr.strip():
             wrong.append("status 2 without a word")
-        # A design of the user's own in the folder of the results is not written over.
-        guarded = hostility == "same folder" and "no result of an earlier run" in self.stderr
-        # Nor a file that is none of a bundle where one of a bundle goes.
-        guarded = guarded or (stale_first and "this folder is no unedited bundle" in self.stderr)
+        # A file of the user's own in a result's place is not written over, nor one that is none of a bundle in a bundle's.
+        refused = ("no result of an earlier run", "files here were edited")
+        guarded = (stale_first or hostility == "same folder") and any(text in self.stderr for text in refused)
         if hostility in ("none", "same folder") and status == 2 and not guarded:
             wrong.append("status 2 of a run that nothing disturbs")
         if hostility == "read-only" and status != 2:
