@@ -134,7 +134,7 @@ impl Pairs for Drawn {
     }
 }
 
-/// Pairs in a chunk of a [`Shared`] stream.
+/// Pairs in a chunk of a [`Shared`] stream (convention: 16 KiB, within a first cache).
 const CHUNK: u64 = 1024;
 
 /// Chunks that a [`Shared`] stream keeps: who walks along it further apart than these draws for himself.

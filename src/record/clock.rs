@@ -112,7 +112,7 @@ pub(super) fn take(
 const MOST_WILD: usize = 3;
 
 /// A step that is no pause between two rows, in steps of usual length; at the end of a record, where no later row tells, in
-/// times of all that was before.
+/// times of all that was before (both convention: pauses of loggers are shorter).
 const LEAP: f64 = 10.0;
 const LEAP_AT_END: f64 = 1000.0;
 

@@ -31,7 +31,7 @@ const HALF: f64 = 0.5;
 /// No die moves faster, K/s.
 const FASTEST_K_PER_S: f64 = 1.5;
 
-/// Usual steps that a value at an end of the record has to stand apart, where it is within half of the range.
+/// Usual steps that a value at an end of the record has to stand apart, where it is within half of the range (convention).
 const DOZENS: f64 = 24.0;
 
 /// Different readings that a channel needs beside the error values, so that its own movement is known.
