@@ -84,6 +84,25 @@ pub fn number(value: f64, digits: usize) -> String {
     format!("{rounded:.decimals$}")
 }
 
+/// [`number`] without zeros at the end of its decimals: for constants, of which nobody asks how exact they are.
+pub fn constant(value: f64, digits: usize) -> String {
+    let text = number(value, digits);
+    let (mantissa, exponent) = match text.split_once('e') {
+        Some((mantissa, exponent)) => (mantissa, format!("e{exponent}")),
+        None => (text.as_str(), String::new()),
+    };
+    match mantissa.contains('.') {
+        true => {
+            mantissa
+                .trim_end_matches('0')
+                .trim_end_matches('.')
+                .to_owned()
+                + &exponent
+        }
+        false => text,
+    }
+}
+
 /// A bound in a sentence: [`number`], rounded away from 0, so that what is printed is never below what was proved.
 pub fn at_most(value: f64, digits: usize) -> String {
     number(away_from_zero(value, digits), digits)

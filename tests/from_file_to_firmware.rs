@@ -229,3 +229,49 @@ fn a_simulated_run_and_its_own_record_say_why_their_orders_differ() {
     };
     assert_eq!(floor(&own), floor(&again));
 }
+
+/// A design is given to `close` as to every other command, or as an option; a file alone is asked about.
+#[test]
+fn a_design_stands_before_the_options_or_is_one() {
+    let top = tempfile::tempdir().expect("a folder");
+    let here = top.path();
+    fs::write(here.join("r.csv"), table("time_s,gyro,temperature")).expect("written");
+    let design = "[record.columns]\nrate_out_dps = \"gyro\"\ndie_degc = \"temperature\"\n";
+    fs::write(here.join("d.toml"), design).expect("written");
+    let closed = |arguments: &[&str], out: &str| {
+        let all = [&["close", "--record", "r.csv", "--out", out], arguments].concat();
+        let (status, _, said) = gyrogen(here, &all);
+        assert_eq!(status, Some(0), "{said}");
+        fs::read(here.join(out).join("residuals.csv")).expect("residuals")
+    };
+    assert_eq!(
+        closed(&["d.toml"], "a"),
+        closed(&["--design", "d.toml"], "b")
+    );
+    let (status, _, said) = gyrogen(here, &["check", "--design", "d.toml"]);
+    assert_eq!(status, Some(0), "{said}");
+    for (arguments, due) in [
+        (&["close", "r.csv"][..], "--record r.csv"),
+        (&["close", "d.toml"], "gyrogen close d.toml --record FILE"),
+        (
+            &["close", "d.toml", "--design", "d.toml", "--record", "r.csv"],
+            "cannot be used with",
+        ),
+        (
+            &["close", "r.csv", "--record", "r.csv"],
+            "this is no design",
+        ),
+        (
+            &["run", "r.csv", "d.toml"],
+            "a record is given with --record FILE",
+        ),
+        (
+            &["simulate", "--duration", "1h"],
+            "give one without its unit",
+        ),
+    ] {
+        let (status, _, said) = gyrogen(here, arguments);
+        assert!(status == Some(2) && said.contains(due), "{said}");
+        assert!(!here.join("gyrogen-close").exists());
+    }
+}

@@ -2,7 +2,7 @@
 
 use super::CHANNELS;
 use super::amplitude_loop::{AmplitudeLoop, AmplitudeLoopState};
-use super::compensation::{Bias, Rate, in_dps};
+use super::compensation::{Bias, Rate, port_in_dps};
 use super::cordic::Vectoring;
 use super::decimator::{Cic, CicState, Decimate, Integrate};
 use super::demodulator::Mixer;
@@ -377,12 +377,12 @@ fn meanings(circuit: &Circuit, compensation: Option<&Compensation>) -> Vec<Port>
         "magnitude",
         format!("drive magnitude in units of 2^-{lsb}"),
     ));
-    let absent = Port::new("", "");
+    let absent = Port::absent();
     match compensation {
         Some(c) => {
-            let shown = |what| in_dps(what, 0, c.output.format, &c.output);
-            ports.push(Port::new("bias", shown("bias")));
-            ports.push(Port::new("rate", shown("compensated rate")));
+            let port = |name, what| port_in_dps(name, what, 0, c.output.format, &c.output);
+            ports.push(port("bias", "bias"));
+            ports.push(port("rate", "compensated rate"));
         }
         None => ports.extend([absent.clone(), absent.clone()]),
     }

@@ -32,7 +32,7 @@ pub struct Bias {
     read_exponent: i32,
     /// From the variable to the bias.
     pub evaluation: Evaluation,
-    meanings: [String; 2],
+    ports: [Port; 2],
 }
 
 /// How the bias follows from the variable.
@@ -77,15 +77,20 @@ impl Bias {
     /// From the design's `[compensation]`.
     pub fn new(circuit: &Circuit, compensation: &Compensation) -> Self {
         let angle_bits = circuit.cordic.angle_bits;
+        let port = |meaning: String| Port::new("thermometer", meaning);
         // (raw range, fraction bits as they come, offset, exponent of the reading, in words)
-        let (input_range, input_fraction_bits, offset, read_exponent, meaning) =
+        let (input_range, input_fraction_bits, offset, read_exponent, thermometer) =
             match &compensation.input {
                 CompensationInput::Phase => (
                     Interval::of_bits(angle_bits),
                     angle_bits as i32,
                     0,
                     1,
-                    format!("phase in units of 2^-{angle_bits} turn"),
+                    port(format!("phase in units of 2^-{angle_bits} turn")).in_unit(
+                        "phase",
+                        -(angle_bits as i32),
+                        "turn",
+                    ),
                 ),
                 CompensationInput::TuningWord(tuning) => {
                     let bits = circuit.nco.phase_bits;
@@ -94,7 +99,7 @@ impl Bias {
                         bits as i32,
                         tuning.offset_raw,
                         bits as i32 - tuning.scale_bits as i32,
-                        "what the phase loop adds to the tuning word".to_owned(),
+                        port("what the phase loop adds to the tuning word".to_owned()),
                     )
                 }
                 CompensationInput::Channel(channel) => {
@@ -104,10 +109,11 @@ impl Bias {
                         fraction_bits,
                         channel.offset_raw,
                         fraction_bits - channel.scale_bits as i32,
-                        format!(
+                        port(format!(
                             "{} = raw * 2^-{fraction_bits}, {}",
                             channel.column, channel.format
-                        ),
+                        ))
+                        .in_unit(&channel.column, -fraction_bits, ""),
                     )
                 }
             };
@@ -125,9 +131,15 @@ impl Bias {
             offset,
             read_exponent,
             evaluation,
-            meanings: [
-                meaning,
-                in_dps("bias", 0, compensation.output.format, &compensation.output),
+            ports: [
+                thermometer,
+                port_in_dps(
+                    "bias",
+                    "bias",
+                    0,
+                    compensation.output.format,
+                    &compensation.output,
+                ),
             ],
         }
     }
@@ -242,8 +254,8 @@ impl Bias {
 
     /// What the thermometer's word is, for emitted code.
     pub fn input_meaning(&self) -> &str {
-        let [input, _] = &self.meanings;
-        input
+        let [input, _] = &self.ports;
+        &input.meaning
     }
 
     /// Every cast, in a fixed order.
@@ -268,11 +280,11 @@ impl<A: Arithmetic> Block<A, 1, 1> for Bias {
     const NAME: &'static str = "bias";
 
     fn inputs(&self) -> [Port; 1] {
-        [Port::new("thermometer", self.meanings[0].clone())]
+        [self.ports[0].clone()]
     }
 
     fn outputs(&self) -> [Port; 1] {
-        [Port::new("bias", self.meanings[1].clone())]
+        [self.ports[1].clone()]
     }
 
     #[inline(always)]
@@ -306,10 +318,17 @@ fn by_form<A: Arithmetic>(ar: &A, form: &Form, p: A::Word) -> A::Word {
     bias
 }
 
-/// What a word is in deg/s: full scale is 2^`exponent` deg/s.
-pub(super) fn in_dps(what: &str, exponent: i32, format: Format, shown: &dyn Display) -> String {
+/// A port whose words are `what` in deg/s: full scale is 2^`exponent` deg/s.
+pub(super) fn port_in_dps(
+    name: &'static str,
+    what: &str,
+    exponent: i32,
+    format: Format,
+    shown: &dyn Display,
+) -> Port {
     let exponent = exponent - format.fraction_bits as i32;
-    format!("{what} = raw * 2^{exponent} deg/s, {shown}")
+    let meaning = format!("{what} = raw * 2^{exponent} deg/s, {shown}");
+    Port::new(name, meaning).in_unit(what, exponent, "deg/s")
 }
 
 /// The subtraction's configuration.
@@ -321,7 +340,7 @@ pub struct Rate {
     pub scale: Cast,
     /// q - bias to the output format.
     pub output: Cast,
-    meanings: [String; 3],
+    ports: [Port; 3],
 }
 
 impl Rate {
@@ -346,15 +365,16 @@ impl Rate {
                 None,
             ),
             output: Cast::to(OUTPUT, fraction_bits, 0, output),
-            meanings: [
-                in_dps(
+            ports: [
+                port_in_dps(
+                    "raw_rate",
                     what,
                     compensation.rate_full_scale_exponent(),
                     format,
                     &format,
                 ),
-                in_dps("bias", 0, output.format, &output),
-                in_dps("compensated rate", 0, output.format, &output),
+                port_in_dps("bias", "bias", 0, output.format, &output),
+                port_in_dps("rate", "compensated rate", 0, output.format, &output),
             ],
         }
     }
@@ -372,14 +392,11 @@ impl<A: Arithmetic> Block<A, 2, 1> for Rate {
     const NAME: &'static str = "rate";
 
     fn inputs(&self) -> [Port; 2] {
-        [
-            Port::new("raw_rate", self.meanings[0].clone()),
-            Port::new("bias", self.meanings[1].clone()),
-        ]
+        [self.ports[0].clone(), self.ports[1].clone()]
     }
 
     fn outputs(&self) -> [Port; 1] {
-        [Port::new("rate", self.meanings[2].clone())]
+        [self.ports[2].clone()]
     }
 
     #[inline(always)]

@@ -58,7 +58,7 @@ pub struct Arguments {
     #[arg(long, value_enum, default_value = "polynomial")]
     form: Asked,
     /// The most that the proved error may be, in the function's unit.
-    #[arg(long, value_name = "X", allow_negative_numbers = true)]
+    #[arg(long, value_name = "X", value_parser = super::values::number, allow_negative_numbers = true)]
     bound: Option<f64>,
     /// Which error the coefficients keep small.
     #[arg(long, value_enum, default_value = "absolute")]

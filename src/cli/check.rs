@@ -15,8 +15,8 @@ use std::path::PathBuf;
 /// Prove the range of every word of a design, say what overflows, what each rounding and each part costs.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Design file (TOML); the embedded default if left out.
-    design: Option<PathBuf>,
+    #[command(flatten)]
+    design: super::common::DesignFile,
     /// ADC samples of the design's own gyro that are run, 1000 to 100000000; 1000000 if left out.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1_000..=100_000_000))]
     samples: Option<u64>,
@@ -37,7 +37,7 @@ const PLANNED: [&str; 2] = ["check.json", timing::NAME];
 /// An unusable design (exit 2); a word that overflows for certain, a requirement that is not met (exit 1).
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let watch = Stages::start("proving and running");
-    let design = super::design(arguments.design.as_deref())?;
+    let design = arguments.design.read()?;
     let claim = |out: &PathBuf| Results::claim(out, &PLANNED, &recorded.inputs);
     let results = arguments.out.as_ref().map(claim).transpose()?;
     let samples = arguments.samples.map_or(SAMPLES, |n| n as usize);

@@ -30,7 +30,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// A measured thermal record (CSV, PX4 ULog, ArduPilot DataFlash).
-    #[arg(long, value_name = "FILE", required_unless_present_any = ["capture", "self_test", "stray"])]
+    #[arg(long, value_name = "FILE", required_unless_present_any = ["capture", "self_test", "design"])]
     pub(super) record: Option<PathBuf>,
     /// Captured ADC codes in place of a record: CSV, or NPY with its keys in a TOML file beside it.
     #[arg(long, value_name = "FILE", conflicts_with = "record")]
@@ -53,12 +53,8 @@ pub struct Arguments {
     /// Which search names the causes of a thermal record: for comparisons of the two.
     #[arg(long, value_enum, hide = true, default_value = "stepwise")]
     search: Naming,
-    /// Not a way to give a record; says which one is.
-    #[arg(value_name = "FILE", hide = true)]
-    stray: Option<PathBuf>,
-    /// Design file (TOML); the embedded default if left out.
-    #[arg(long, value_name = "FILE")]
-    pub(super) design: Option<PathBuf>,
+    #[command(flatten)]
+    design: super::common::DesignFile,
     /// Folder for the results; made if it does not exist. If left out, gyrogen-close; a self-test then
     /// writes no files.
     #[arg(long, value_name = "DIR")]
@@ -100,8 +96,12 @@ const PLANNED: [&str; 6] = [
 /// and with `--controls` a name for a column without meaning (exit 1).
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let watch = Stages::start("reading the input");
-    if let Some(stray) = &arguments.stray {
-        return Err(stray_file(stray));
+    let measured = arguments.record.is_some() || arguments.capture.is_some();
+    if let Some(alone) = arguments.design.path()
+        && !measured
+        && !arguments.self_test
+    {
+        return Err(nothing_measured(alone));
     }
     for (file, option) in [
         (&arguments.record, "--record"),
@@ -111,7 +111,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
             super::common::refuse_design(file, option)?;
         }
     }
-    let mut design = super::design(arguments.design.as_deref())?;
+    let mut design = arguments.design.read()?;
     design.record.undo_correction = arguments.undo_correction;
     if arguments.self_test {
         return super::self_test::run(arguments, &design, recorded, &watch);
@@ -211,21 +211,19 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     Err(Error::Check(failures.join("; ")))
 }
 
-/// What is said of a file that no option names.
-fn stray_file(path: &Path) -> Error {
+/// A file alone: whether it is the design or the measurement, the other one is missing or has no option.
+fn nothing_measured(path: &Path) -> Error {
     let toml = path
         .extension()
         .is_some_and(|e| e.eq_ignore_ascii_case("toml"));
     let file = name_of(path);
     let help = match toml {
-        true => {
-            format!("a design is given with --design {file}, and the record with --record FILE")
-        }
+        true => format!("give the record beside the design: gyrogen close {file} --record FILE"),
         false => format!(
             "a record is given with --record {file}, a capture of ADC codes with --capture {file}"
         ),
     };
-    InputError::new("`close` does not know what this file is")
+    InputError::new("`close` needs a measurement, and which one is said by an option")
         .in_file(path)
         .help(help)
         .into()

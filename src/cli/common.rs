@@ -7,7 +7,33 @@ use crate::firmware::files::EmittedFile;
 use crate::firmware::replace;
 use crate::output::Results;
 use crate::verify::compare::{Compared, language_name};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+/// The design, as every command takes it.
+#[derive(Debug, clap::Args)]
+pub struct DesignFile {
+    /// Design file (TOML); the embedded default if left out.
+    #[arg(value_name = "DESIGN", conflicts_with = "design_option")]
+    design: Option<PathBuf>,
+    /// The same design file, as an option.
+    #[arg(long = "design", id = "design_option", value_name = "FILE")]
+    option: Option<PathBuf>,
+}
+
+impl DesignFile {
+    /// The file that was named.
+    pub(super) fn path(&self) -> Option<&Path> {
+        self.design.as_deref().or(self.option.as_deref())
+    }
+
+    /// As [`design`].
+    ///
+    /// # Errors
+    /// A design that cannot be read or used.
+    pub(super) fn read(&self) -> Result<crate::design::Design> {
+        design(self.path())
+    }
+}
 
 /// Reads the design named on the command line, or the embedded default.
 pub(super) fn design(path: Option<&Path>) -> Result<crate::design::Design> {

@@ -18,8 +18,8 @@ use std::path::PathBuf;
 /// Write a firmware bundle: sources, self-test, test vectors and a manifest of its files.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Design file (TOML); the embedded default if left out.
-    design: Option<PathBuf>,
+    #[command(flatten)]
+    design: super::common::DesignFile,
     /// Language of the sources.
     #[arg(long, value_enum)]
     lang: Language,
@@ -42,7 +42,7 @@ pub struct Arguments {
 /// # Errors
 /// An unusable design, a folder that cannot be written.
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
-    let design = super::design(arguments.design.as_deref())?;
+    let design = arguments.design.read()?;
     let part = arguments.part.unwrap_or(match design.correction {
         Some(_) => Part::Correction,
         None => Part::Chain,

@@ -19,8 +19,8 @@ use std::path::{Path, PathBuf};
 /// Compare the fixed-point circuit with its float twin, every word within a bound, and the emitted code with the model.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Design file (TOML); the embedded default if left out.
-    design: Option<PathBuf>,
+    #[command(flatten)]
+    design: super::common::DesignFile,
     /// Captured ADC codes, drive and sense (CSV or NPY); codes made by `--stimulus` if left out.
     #[arg(long, value_name = "FILE")]
     capture: Option<PathBuf>,
@@ -66,7 +66,7 @@ const SAMPLES: usize = 10_000_000;
 /// code that differs, a difference from the design given with `--against` (exit 1).
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let watch = Stages::start("making the stimulus");
-    let design = super::design(arguments.design.as_deref())?;
+    let design = arguments.design.read()?;
     let planned = [
         "equiv.json",
         "equiv.html",

@@ -80,7 +80,7 @@ pub fn main() -> ExitCode {
             });
             run(&cli.command, &recorded::recorded(&parser, &matches))
         }
-        Err(e) if e.use_stderr() => e.exit(),
+        Err(e) if e.use_stderr() => with_advice(e).exit(),
         // Help, the version.
         Err(e) => {
             crate::output::standard::keep(e.print());
@@ -104,6 +104,22 @@ pub fn main() -> ExitCode {
             ExitCode::from(e.exit_status())
         }
     }
+}
+
+/// Says where a second file belongs: one file alone, the design, has no option.
+fn with_advice(mut error: clap::Error) -> clap::Error {
+    use clap::error::{ContextKind, ContextValue, ErrorKind};
+    let argument = match error.get(ContextKind::InvalidArg) {
+        Some(ContextValue::String(argument)) => argument.clone(),
+        _ => return error,
+    };
+    if error.kind() == ErrorKind::UnknownArgument && !argument.starts_with('-') {
+        let advice = "a record is given with --record FILE, a capture with --capture FILE, a folder for results with --out DIR; the \
+                      design is the file without an option";
+        let advice = vec![advice.into()];
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(advice));
+    }
+    error
 }
 
 /// Runs a subcommand; `recorded` is what its files say of how they were made.

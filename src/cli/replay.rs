@@ -16,8 +16,8 @@ use std::time::{Duration, Instant};
 /// Run captured ADC codes through the circuit: one row of its words for each decimated sample.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Design file (TOML); the embedded default if left out.
-    design: Option<PathBuf>,
+    #[command(flatten)]
+    design: super::common::DesignFile,
     /// Captured ADC codes, drive and sense (CSV or NPY).
     #[arg(long, value_name = "FILE")]
     capture: PathBuf,
@@ -60,7 +60,7 @@ const BLOCK: usize = 1 << 14;
 /// no file is written then.
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let stages = Stages::start("replaying");
-    let design = super::design(arguments.design.as_deref())?;
+    let design = arguments.design.read()?;
     super::common::refuse_design(&arguments.capture, "--capture")?;
     let kind = ArithmeticKind::from(arguments.arith);
     crate::output::refuse_inputs(&arguments.out, &recorded.inputs)?;

@@ -10,15 +10,15 @@ use crate::job;
 use crate::job::bound::Line;
 use crate::job::outcome::{Drift, Outcome};
 use crate::output::Results;
-use crate::text::{at_most, number};
+use crate::text::{at_most, constant};
 use crate::timing;
 use std::path::PathBuf;
 
 /// Fit the bias to a thermal record, round it to fixed point, emit C and Rust, build and compare them, report.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Design file (TOML); the embedded default if left out.
-    design: Option<PathBuf>,
+    #[command(flatten)]
+    design: super::common::DesignFile,
     /// A measured thermal record (CSV, PX4 ULog, ArduPilot DataFlash); the simulated thermal run of the
     /// design if left out.
     #[arg(long, value_name = "FILE")]
@@ -59,7 +59,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     if let Some(record) = &arguments.record {
         super::common::refuse_design(record, "--record")?;
     }
-    let mut design = super::design(arguments.design.as_deref())?;
+    let mut design = arguments.design.read()?;
     design.record.undo_correction = arguments.undo_correction;
     let mut results = Results::claim(&arguments.out, &PLANNED, &recorded.inputs)?;
     if !arguments.force {
@@ -116,15 +116,6 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     )))
 }
 
-/// A reading of a thermometer, to seven digits, without zeros at its end.
-fn plain(reading: f64) -> String {
-    let text = number(reading, 7);
-    match text.contains('.') {
-        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
-        false => text,
-    }
-}
-
 fn print(outcome: &Outcome, out: &std::path::Path) {
     let s = &outcome.summary;
     if let Some(columns) = &outcome.parts.understood {
@@ -135,7 +126,7 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
         "rate output at rest",
         "drift pp, deg/s",
         "rms, deg/s",
-        "of before",
+        "pp, of before",
     ]);
     let before = s.before.drift_pp_dps;
     let mut row = |name: &str, drift: Drift| {
@@ -193,8 +184,8 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
     }
     say!(
         "calibrated for {} .. {} {}",
-        plain(s.fit.range.0),
-        plain(s.fit.range.1),
+        constant(s.fit.range.0, 7),
+        constant(s.fit.range.1, 7),
         s.fit.unit
     );
     say!(

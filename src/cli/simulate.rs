@@ -17,13 +17,14 @@ use std::path::{Path, PathBuf};
 /// Simulate the gyro and its circuit in closed loop, in float and in fixed point: thermal record, traces, figures.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Design file (TOML); the embedded default if left out.
-    design: Option<PathBuf>,
+    #[command(flatten)]
+    design: super::common::DesignFile,
     /// Simulate every ADC sample of the first S seconds of the design's thermal run, instead of its averaged readings.
     #[arg(
         long,
         value_name = "S",
         conflicts_with = "profile",
+        value_parser = super::values::number,
         allow_negative_numbers = true
     )]
     duration: Option<f64>,
@@ -85,7 +86,7 @@ impl TraceFormat {
 /// An unusable design or profile (exit 2); a circuit that stops on an overflow, a phase loop that does not lock (exit 1).
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let watch = Stages::start("reading the design");
-    let design = super::design(arguments.design.as_deref())?;
+    let design = arguments.design.read()?;
     let trace = arguments.trace_format.file_name();
     let planned = [
         "record.csv",
@@ -185,8 +186,12 @@ fn print(outcome: &Outcome, out: &Path) {
         }
         super::terminal::show(&table);
     }
-    let mut table =
-        super::terminal::table(&["rate output", "drift pp, deg/s", "rms, deg/s", "of before"]);
+    let mut table = super::terminal::table(&[
+        "rate output",
+        "drift pp, deg/s",
+        "rms, deg/s",
+        "pp, of before",
+    ]);
     let mut rows = |name: &str, both: &Both| {
         for (path, drift, before) in [
             ("float", both.float, s.before.float),

@@ -20,8 +20,8 @@ use std::time::Instant;
 /// Study the word lengths: the cheapest designs for each error, verified bit for bit, and what each bit does.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Design file (TOML); the embedded default if left out.
-    design: Option<PathBuf>,
+    #[command(flatten)]
+    design: super::common::DesignFile,
     /// What the word lengths may add, as "bias_dps<=0.01 arw_deg_rth<=0.01", in place of the design's `[requirements]`.
     #[arg(long = "for", value_name = "LIMITS")]
     limits: Option<String>,
@@ -52,7 +52,7 @@ const PLANNED: [&str; 3] = ["study.json", "report.html", timing::NAME];
 /// requirement that cannot be met (exit 1).
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let watch = Stages::start("searching and verifying");
-    let design = super::design(arguments.design.as_deref())?;
+    let design = arguments.design.read()?;
     let limits = match &arguments.limits {
         Some(text) => Limits::parse(text)?,
         None => design.requirements.clone(),

@@ -3,6 +3,15 @@
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
 
+/// A number of an option, which is in the option's own unit.
+///
+/// # Errors
+/// What is none, such as a number with a unit.
+pub(super) fn number(text: &str) -> Result<f64, String> {
+    let parsed = text.trim().parse();
+    parsed.map_err(|_| "it is no number; give one without its unit, such as 0.5 or 3600".to_owned())
+}
+
 /// A choice of the library's as a value of the command line: variant, spelling, what it means.
 macro_rules! values {
     ($choice:ty { $($variant:ident = $spelled:literal $(| $other:literal)?, $means:literal;)+ }) => {

@@ -339,7 +339,7 @@ pub fn sentences(design: &Design, bounds: &Bounds) -> Vec<String> {
 pub fn run_sentence(design: &Design, certainty: &Certainty) -> String {
     let c = certainty;
     format!(
-        "Run over {}{} calibrated inputs, it is at most {} from the polynomial, at input word {}{}.",
+        "Run over {}{} calibrated inputs, the firmware's bias was at most {} from the polynomial (at input word {}){}.",
         if c.exhaustive { "all " } else { "" },
         c.inputs_checked,
         figure(design, c.exhaustive_max_dps),

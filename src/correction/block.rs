@@ -9,9 +9,9 @@ use super::rate_terms::{OnRate, passes};
 use super::states::Followed;
 use super::terms::{OnBias, Slots, exact, raw};
 use crate::error::Result;
-use crate::numeric::arithmetic::{Arithmetic, Block, Port, StateVisitor};
+use crate::numeric::arithmetic::{Arithmetic, Block, Port, Scale, StateVisitor};
 use crate::numeric::cast::{Cast, Label};
-use crate::numeric::format::Quantizer;
+use crate::numeric::format::{Quantizer, pow2};
 use crate::numeric::trace::ir::Interval;
 
 /// The emitted function.
@@ -58,7 +58,8 @@ pub struct Step {
     formats: Formats,
     align: Cast,
     output: Cast,
-    meanings: Vec<String>,
+    /// Of the inputs, the rate and the output.
+    ports: Vec<Port>,
 }
 
 /// What a correction remembers from one reading to the next.
@@ -121,12 +122,7 @@ impl Step {
                 0,
                 Quantizer::default_of(formats.rate),
             ),
-            meanings: plan
-                .inputs
-                .iter()
-                .zip(&formats.inputs)
-                .map(|(i, f)| format!("{}, {f}", i.formula()))
-                .collect(),
+            ports: ports(plan, formats),
             formats: formats.clone(),
         };
         for (id, cast) in step.casts_mut().into_iter().enumerate() {
@@ -282,27 +278,51 @@ impl Step {
     }
 }
 
+/// The ports of the inputs in order, of the rate, and of what comes out.
+fn ports(plan: &Plan, formats: &Formats) -> Vec<Port> {
+    let inputs = plan.inputs.iter().zip(&formats.inputs).zip(INPUTS);
+    let mut ports: Vec<Port> = inputs
+        .map(|((input, format), name)| {
+            let scale = Scale {
+                quantity: input.column.clone(),
+                offset: input.offset,
+                factor: input.scale * pow2(-(format.fraction_bits as i32)),
+                unit: "",
+            };
+            Port {
+                scale: Some(scale),
+                ..Port::new(name, format!("{}, {format}", input.formula()))
+            }
+        })
+        .collect();
+    let exponent = -(formats.rate.fraction_bits as i32);
+    let in_dps = |name, what: &str, further: &str| {
+        let meaning = format!(
+            "{what} = raw * 2^{exponent} deg/s, {}{further}",
+            formats.rate
+        );
+        Port::new(name, meaning).in_unit(what, exponent, "deg/s")
+    };
+    ports.push(in_dps("rate", "rate", ""));
+    ports.push(in_dps("corrected", "corrected rate", ", saturated"));
+    ports
+}
+
 impl<A: Arithmetic, const I: usize> Block<A, I, 1> for Step {
     type State = State<A>;
     const NAME: &'static str = STEP;
     const STATE: &'static str = STATE;
 
     fn inputs(&self) -> [Port; I] {
-        std::array::from_fn(|k| {
-            let of_input = k
-                .checked_sub(1)
-                .and_then(|k| self.meanings.get(k).zip(INPUTS.get(k)));
-            match of_input {
-                Some((meaning, name)) => Port::new(name, meaning.clone()),
-                None if k == 0 => Port::new("restart", "1 = first reading after power-on, else 0"),
-                None => Port::new("rate", format!("rate in deg/s, {}", self.formats.rate)),
-            }
+        let restart = Port::new("restart", "1 = first reading after power-on, else 0");
+        std::array::from_fn(|k| match k.checked_sub(1) {
+            Some(k) => self.ports.get(k).cloned().unwrap_or_else(Port::absent),
+            None => restart.clone(),
         })
     }
 
     fn outputs(&self) -> [Port; 1] {
-        let meaning = format!("corrected rate in deg/s, {}, saturated", self.formats.rate);
-        [Port::new("corrected", meaning)]
+        [self.ports.last().cloned().unwrap_or_else(Port::absent)]
     }
 
     #[inline(always)]

@@ -2,6 +2,7 @@
 
 pub use crate::design::correction::{Input, Plan, Term};
 use crate::error::{InputError, Result};
+use crate::text::constant;
 
 /// Most inputs of a plan.
 pub const MOST_INPUTS: usize = 8;
@@ -19,15 +20,27 @@ pub const SHORTEST_TAU_PERIODS: f64 = 0.01;
 /// The highest power of an input in a product.
 pub const HIGHEST_POWER: u32 = 9;
 
+/// Digits of a constant in a sentence (convention: a step of the words is 1e-9 of their range at least; `design.toml` has every digit).
+const SHOWN_DIGITS: usize = 9;
+
+/// A constant of a plan in a sentence.
+pub(super) fn in_words(value: f64) -> String {
+    constant(value, SHOWN_DIGITS)
+}
+
 impl Input {
-    /// x as a formula in the column, every digit: `(die_degc - 25.0) / 40.0`.
+    /// x as a formula in the column, to [`SHOWN_DIGITS`]: `(die_degc - 25) / 40`.
     pub fn formula(&self) -> String {
         let sign = if self.offset < 0.0 { '+' } else { '-' };
         let scale = match self.scale < 0.0 {
-            true => format!("({:?})", self.scale),
-            false => format!("{:?}", self.scale),
+            true => format!("({})", in_words(self.scale)),
+            false => in_words(self.scale),
         };
-        format!("({} {sign} {:?}) / {scale}", self.column, self.offset.abs())
+        format!(
+            "({} {sign} {}) / {scale}",
+            self.column,
+            in_words(self.offset.abs())
+        )
     }
 }
 

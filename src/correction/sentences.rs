@@ -1,7 +1,7 @@
 //! A correction in sentences: what the head of its emitted sources says.
 
 use super::curve::name;
-use super::plan::{Plan, Term};
+use super::plan::{Plan, Term, in_words};
 use super::run::Correction;
 use crate::text::{at_most, number};
 
@@ -39,7 +39,7 @@ pub fn facts(correction: &Correction) -> Vec<String> {
 }
 
 fn called(plan: &Plan) -> String {
-    let period = format!("one call a reading, every {:?} s", plan.period_s);
+    let period = format!("one call a reading, every {} s", in_words(plan.period_s));
     // Without a memory the number of calls changes nothing.
     match plan.terms.iter().any(Term::remembers) {
         true => format!(
@@ -92,7 +92,11 @@ fn on_bias(term: &Term, curves: &mut usize) -> String {
                 1 => format!(" * {}", name(*input)),
                 _ => format!(" * {}^{power}", name(*input)),
             });
-            format!("{gain_dps:?} deg/s{}", powers.collect::<String>())
+            format!(
+                "{gain_dps} deg/s{}",
+                powers.collect::<String>(),
+                gain_dps = in_words(*gain_dps)
+            )
         }
         Term::Lag {
             gain_dps,
@@ -102,8 +106,9 @@ fn on_bias(term: &Term, curves: &mut usize) -> String {
         } => {
             let x = name(*input);
             format!(
-                "{gain_dps:?} deg/s * ({x} - y), y = {x} after {}",
-                lag(*tau_s, *kept)
+                "{gain_dps} deg/s * ({x} - y), y = {x} after {}",
+                lag(*tau_s, *kept),
+                gain_dps = in_words(*gain_dps)
             )
         }
         Term::LagOfCurve {
@@ -113,9 +118,10 @@ fn on_bias(term: &Term, curves: &mut usize) -> String {
             tau_s,
             kept,
         } => format!(
-            "{gain_dps:?} deg/s * (c - y), c = {}, y = c after {}",
+            "{gain_dps} deg/s * (c - y), c = {}, y = c after {}",
             curve(*input, values, curves),
-            lag(*tau_s, *kept)
+            lag(*tau_s, *kept),
+            gain_dps = in_words(*gain_dps)
         ),
         Term::CurveOfLag {
             gain_dps,
@@ -126,9 +132,10 @@ fn on_bias(term: &Term, curves: &mut usize) -> String {
         } => {
             let x = name(*input);
             format!(
-                "{gain_dps:?} deg/s * (c({x}) - c(y)), c = {}, y = {x} after {}",
+                "{gain_dps} deg/s * (c({x}) - c(y)), c = {}, y = {x} after {}",
                 curve(*input, values, curves),
-                lag(*tau_s, *kept)
+                lag(*tau_s, *kept),
+                gain_dps = in_words(*gain_dps)
             )
         }
         Term::Slope {
@@ -136,11 +143,16 @@ fn on_bias(term: &Term, curves: &mut usize) -> String {
             input,
             rows,
         } => format!(
-            "{gain_dps_s:?} deg/s per 1/s * slope of {} over the last {rows} readings",
-            name(*input)
+            "{gain_dps_s} deg/s per 1/s * slope of {} over the last {rows} readings",
+            name(*input),
+            gain_dps_s = in_words(*gain_dps_s)
         ),
         Term::Decay { gain_dps, tau_s } => {
-            format!("{gain_dps:?} deg/s * exp(-t / {tau_s:?} s), t since power-on")
+            format!(
+                "{gain_dps} deg/s * exp(-t / {tau_s} s), t since power-on",
+                gain_dps = in_words(*gain_dps),
+                tau_s = in_words(*tau_s)
+            )
         }
         Term::Curve { input, values_dps } => {
             format!("{}, deg/s", curve(*input, values_dps, curves))
@@ -164,9 +176,17 @@ fn step(term: &Term) -> String {
     };
     let (x, on, off) = (name(*input), centre + gap / 2.0, centre - gap / 2.0);
     match once {
-        true => format!("{gain_dps:?} deg/s from the first {x} >= {on:?} on, never off again"),
+        true => format!(
+            "{gain_dps} deg/s from the first {x} >= {on} on, never off again",
+            gain_dps = in_words(*gain_dps),
+            on = in_words(on)
+        ),
         false => format!(
-            "{gain_dps:?} deg/s while on: on from {x} >= {on:?}, off below {off:?}; at power-on, on from {centre:?}"
+            "{gain_dps} deg/s while on: on from {x} >= {on}, off below {off}; at power-on, on from {centre}",
+            gain_dps = in_words(*gain_dps),
+            on = in_words(on),
+            off = in_words(off),
+            centre = in_words(*centre)
         ),
     }
 }
@@ -177,7 +197,10 @@ fn lag(tau_s: f64, kept: bool) -> String {
     } else {
         ""
     };
-    format!("a first-order lag of {tau_s:?} s{kept}")
+    format!(
+        "a first-order lag of {tau_s} s{kept}",
+        tau_s = in_words(tau_s)
+    )
 }
 
 /// The next curve: its table holds the knots.
@@ -194,17 +217,36 @@ fn curve(input: usize, values: &[f64], curves: &mut usize) -> String {
 fn on_rate(term: &Term) -> String {
     match term {
         Term::ScaleBy { input, s0, s1, s2 } => match input.map(name) {
-            Some(x) if *s2 == 0.0 => format!("r * ({s0:?} + {s1:?} * {x})"),
-            Some(x) => format!("r * ({s0:?} + {s1:?} * {x} + {s2:?} * {x}^2)"),
-            None => format!("r * {s0:?}"),
+            Some(x) if *s2 == 0.0 => format!(
+                "r * ({s0} + {s1} * {x})",
+                s0 = in_words(*s0),
+                s1 = in_words(*s1)
+            ),
+            Some(x) => format!(
+                "r * ({s0} + {s1} * {x} + {s2} * {x}^2)",
+                s0 = in_words(*s0),
+                s1 = in_words(*s1),
+                s2 = in_words(*s2)
+            ),
+            None => format!("r * {s0}", s0 = in_words(*s0)),
         },
         Term::Cubic { ppm, rate_max_dps } => {
-            format!("{ppm:?} ppm * r * (r / {rate_max_dps:?} deg/s)^2")
+            format!(
+                "{ppm} ppm * r * (r / {rate_max_dps} deg/s)^2",
+                ppm = in_words(*ppm),
+                rate_max_dps = in_words(*rate_max_dps)
+            )
         }
-        Term::Even { ppm, absolute, .. } if *absolute => format!("{ppm:?} ppm * abs(r)"),
+        Term::Even { ppm, absolute, .. } if *absolute => {
+            format!("{ppm} ppm * abs(r)", ppm = in_words(*ppm))
+        }
         Term::Even {
             ppm, rate_max_dps, ..
-        } => format!("{ppm:?} ppm * r^2 / {rate_max_dps:?} deg/s"),
+        } => format!(
+            "{ppm} ppm * r^2 / {rate_max_dps} deg/s",
+            ppm = in_words(*ppm),
+            rate_max_dps = in_words(*rate_max_dps)
+        ),
         _ => String::new(),
     }
 }
@@ -253,7 +295,7 @@ mod tests {
         assert_eq!(said(product(1.5, vec![])), "subtracted: 1.5 deg/s");
         assert_eq!(
             said(product(-2.0, vec![(0, 1), (2, 3)])),
-            "subtracted: -2.0 deg/s * input_1 * input_3^3"
+            "subtracted: -2 deg/s * input_1 * input_3^3"
         );
         let values_dps = vec![0.0, 1.0, 0.5];
         assert_eq!(

@@ -4,7 +4,11 @@ use crate::emit::bundle::Bundle;
 use crate::emit::c;
 use crate::emit::machine::{Type, Width};
 use crate::emit::views::Language;
-use crate::vectors::model::Model;
+use crate::numeric::arithmetic::{Port, Scale};
+use crate::text::{Place, constant, shown};
+
+/// Digits of a quantity in a comment (convention).
+const SHOWN_DIGITS: usize = 6;
 
 /// A call with what comes of it.
 #[derive(Debug, Clone)]
@@ -17,57 +21,86 @@ pub struct ExampleView {
     pub faults: bool,
     /// Between the brackets.
     pub arguments: String,
+    /// What the arguments stand for; empty where they are words of the circuit alone.
+    pub given: String,
     /// Parts of the result `out` and their values.
     pub results: Vec<(String, String)>,
+    /// What the result stands for.
+    pub found: String,
 }
 
-/// A call of the last function, each of whose inputs lies at five eighths of its range; `result` is the type of its result.
+/// A call of the last function, each of whose inputs lies at five eighths of its range (a flag is set); `result` is the type
+/// of its result, `model` gives the words that are due. `None` where a word has more than 64 bits, or the model has no result.
 pub(super) fn example(
     bundle: &Bundle,
-    models: &[Model],
     result: &str,
     language: Language,
+    model: impl FnOnce(&[i128]) -> Vec<i128>,
 ) -> Option<ExampleView> {
     let (function, lowered) = (bundle.program.functions.last()?, bundle.lowered.last()?);
-    let model = models.iter().find(|m| m.name == function.name)?;
     let literal = |raw: i128| match language {
         Language::C if i32::try_from(raw).is_err() => {
             c::constant("", raw, Type::Signed(Width::W64))
         }
         _ => raw.to_string(),
     };
-    let inputs: Vec<i128> = model
-        .inputs
-        .iter()
-        .map(|range| range.low + (range.high - range.low) / 8 * 5)
-        .collect();
-    let mut outputs = vec![0; model.outputs];
-    model.call(&inputs, &mut outputs);
     let is_wide = |ty: &Type| matches!(ty, Type::Signed(Width::W128) | Type::Unsigned(Width::W128));
     let types = lowered.inputs.iter();
-    if model.state > 0
-        || types
-            .chain(lowered.outputs.iter().map(|(_, v)| &v.ty))
-            .any(is_wide)
+    if types
+        .chain(lowered.outputs.iter().map(|(_, v)| &v.ty))
+        .any(is_wide)
     {
         return None;
     }
-    let part = |name: &str| match lowered.outputs.len() {
+    let ranges = function.inputs.iter().map(|(_, range)| range);
+    let inputs: Vec<i128> = ranges
+        .map(|range| match range.high - range.low {
+            1 => range.high,
+            span => range.low + span / 8 * 5,
+        })
+        .collect();
+    let outputs = model(&inputs);
+    let named = function.outputs.iter().map(|(port, _)| port);
+    let named: Vec<&Port> = named.filter(|port| !port.name.is_empty()).collect();
+    if outputs.is_empty() || outputs.len() != named.len() {
+        return None;
+    }
+    let part = |port: &&Port| match named.len() {
         1 => "out".to_owned(),
-        _ => format!("out.{name}"),
+        _ => format!("out.{}", port.name),
     };
-    let named = lowered.outputs.iter().zip(outputs);
+    let ports = function.inputs.iter().map(|(port, _)| port);
     Some(ExampleView {
         name: function.name.clone(),
         result: result.to_owned(),
         faults: lowered.may_fault,
+        given: quantities(ports.zip(&inputs)),
+        found: quantities(named.iter().copied().zip(&outputs)),
         arguments: inputs
             .into_iter()
             .map(literal)
             .collect::<Vec<_>>()
             .join(", "),
         results: named
-            .map(|((name, _), raw)| (part(name), literal(raw)))
+            .iter()
+            .map(part)
+            .zip(outputs.into_iter().map(literal))
             .collect(),
     })
+}
+
+/// What words stand for: `die_degc = 31.98, rate = 12.5 deg/s`.
+fn quantities<'a>(words: impl Iterator<Item = (&'a Port, &'a i128)>) -> String {
+    let quantity = |(port, raw): (&Port, &i128)| {
+        let Scale {
+            quantity,
+            offset,
+            factor,
+            unit,
+        } = port.scale.as_ref()?;
+        let value = constant(offset + factor * *raw as f64, SHOWN_DIGITS);
+        Some(format!("{quantity} = {value} {unit}").trim_end().to_owned())
+    };
+    let all: Vec<String> = words.filter_map(quantity).collect();
+    shown(&all.join(", "), Place::Source)
 }

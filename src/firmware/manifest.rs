@@ -219,9 +219,13 @@ pub fn facts(design: &Design, bundle: &Bundle) -> Vec<String> {
             k.coefficients_raw,
             k.coefficient_format
         ));
+        let rate = match k.rate_full_scale_dps == 1.0 {
+            true => "in deg/s".to_owned(),
+            false => format!("= value of its word * {} deg/s", k.rate_full_scale_dps),
+        };
         facts.push(format!(
-            "accumulator {}, output {}, uncompensated rate = value of its word * {} deg/s",
-            k.accumulator, k.output, k.rate_full_scale_dps
+            "accumulator {}, output {}, uncompensated rate {rate}",
+            k.accumulator, k.output
         ));
         facts.push(match k.clamp_raw {
             Some((low, high)) => {

@@ -81,6 +81,12 @@ pub fn emit(what: &Stepped, language: Language) -> Result<Vec<EmittedFile>> {
     let every: Vec<_> = models.iter().map(vectors::every_of).collect();
     let mut view = View::new(&bundle, &models, &every, language, banner, facts);
     let shown = views::functions(&bundle, language).pop();
+    let result = shown.as_ref().map_or("", |f| f.result.as_str());
+    view.example = super::example::example(&bundle, result, language, |inputs| {
+        let mut outputs = Vec::new();
+        (what.model)().call(inputs, &mut outputs);
+        outputs
+    });
     let words = program.state(last).iter();
     let wide: Vec<bool> = words.clone().map(|word| word.is_wide()).collect();
     view.stream = Some(StreamView {

@@ -132,7 +132,16 @@ impl View {
             _ => Vec::new(),
         };
         let result = functions.last().map_or("", |f| f.result.as_str());
-        let example = example(bundle, models, result, language);
+        // What has a state is called as the bundle's own pages say.
+        let last = bundle.program.functions.last();
+        let last = last.and_then(|f| models.iter().find(|m| m.name == f.name && m.state == 0));
+        let example = last.and_then(|model| {
+            example(bundle, result, language, |inputs| {
+                let mut outputs = vec![0; model.outputs];
+                model.call(inputs, &mut outputs);
+                outputs
+            })
+        });
         View {
             p: bundle.prefix.clone(),
             language,

@@ -15,6 +15,9 @@ use crate::vectors::model::Model;
 use crate::verify::firmware::{Built, Firmware};
 use std::collections::BTreeMap;
 
+/// Rows that go through the emitted code in one call, which holds their words in memory (convention).
+const ROWS_AT_ONCE: usize = 1 << 16;
+
 /// Every usable row of a record through every path.
 ///
 /// # Errors
@@ -30,29 +33,31 @@ pub fn points(
     let rate_out = record.column("rate_out_dps").unwrap_or(&[]);
     check_range(design, c, format, &record, rate_out)?;
     let thermometer = record.column(&fit.thermometer).unwrap_or(&[]);
-    let mut thermometer_words = WordRows::new(1);
-    let mut rate_words = Vec::new();
-    for &row in &fit.rows {
-        thermometer_words.push([thermometer_raw(design, c, thermometer[row])]);
-        let raw = (rate_out[row] / (c.rate_full_scale_dps * format.lsb()) + 0.5).floor() as i128;
-        rate_words.push(raw.clamp(format.min_raw(), format.max_raw()) as i64);
-    }
     let models = model::models(design, &firmware.bundle.program);
-    let fixed = through_model(&models, &thermometer_words, &rate_words);
-    let emitted = |built: &Built| -> Result<BTreeMap<usize, i64>> {
-        let bias = built.call("bias", &thermometer_words)?;
-        let mut inputs = WordRows::new(2);
-        for (rate, bias) in rate_words.iter().zip(bias) {
-            inputs.push([i128::from(*rate), i128::from(bias)]);
+    let builds = [Language::C, Language::Rust].map(|language| firmware.built(language));
+    let mut fixed = Vec::with_capacity(fit.rows.len());
+    let mut other_words = builds.map(|built| built.map(|_| BTreeMap::new()));
+    for rows in fit.rows.chunks(ROWS_AT_ONCE) {
+        let mut thermometer_words = WordRows::new(1);
+        let mut rate_words = Vec::with_capacity(rows.len());
+        for &row in rows {
+            thermometer_words.push([thermometer_raw(design, c, thermometer[row])]);
+            let raw = rate_out[row] / (c.rate_full_scale_dps * format.lsb());
+            let raw = (raw + 0.5).floor() as i128;
+            rate_words.push(raw.clamp(format.min_raw(), format.max_raw()) as i64);
         }
-        let words = built.call("rate", &inputs)?;
-        let others = words.into_iter().zip(&fixed).enumerate();
-        let differs = others.filter(|(_, (word, due))| word != *due);
-        Ok(differs.map(|(k, (word, _))| (k, word)).collect())
-    };
-    let of = |language| firmware.built(language).map(emitted).transpose();
-    let other_words = [of(Language::C)?, of(Language::Rust)?];
-    drop((thermometer_words, rate_words));
+        let due = through_model(&models, &thermometer_words, &rate_words);
+        for (built, others) in builds.iter().zip(&mut other_words) {
+            let (Some(built), Some(others)) = (built, others) else {
+                continue;
+            };
+            let words = emitted(built, &thermometer_words, &rate_words)?;
+            let differing = words.into_iter().zip(&due).enumerate();
+            let differing = differing.filter(|(_, (word, due))| word != *due);
+            others.extend(differing.map(|(k, (word, _))| (fixed.len() + k, word)));
+        }
+        fixed.extend(due);
+    }
 
     let heating = trend(&fit.rows, thermometer);
     let bias: Vec<f64> = (fit.rows.iter())
@@ -96,6 +101,16 @@ pub fn points(
             rust_dps: emitted_dps(&other_words[1]),
         }
     }))
+}
+
+/// The rates that emitted code makes of thermometer and rate words.
+fn emitted(built: &Built, thermometer: &WordRows, rates: &[i64]) -> Result<Vec<i64>> {
+    let bias = built.call("bias", thermometer)?;
+    let mut inputs = WordRows::new(2);
+    for (rate, bias) in rates.iter().zip(bias) {
+        inputs.push([i128::from(*rate), i128::from(bias)]);
+    }
+    built.call("rate", &inputs)
 }
 
 /// The word in which firmware reads the uncompensated rate.

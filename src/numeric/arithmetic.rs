@@ -6,6 +6,7 @@
 //! no more; each says what an arithmetic without quantisation makes of it.
 
 use super::cast::Cast;
+use super::format::pow2;
 
 /// A ring of integers modulo 2^bits: NCO phase and CIC accumulators.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -215,13 +216,28 @@ pub trait Block<A: Arithmetic, const I: usize, const O: usize> {
     fn visit(&self, _state: &mut Self::State, _visitor: &mut dyn StateVisitor<A>) {}
 }
 
+/// What a word stands for: `quantity = offset + factor * raw`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scale {
+    /// What is measured, such as a column of a record.
+    pub quantity: String,
+    /// Of the word 0, in `unit`.
+    pub offset: f64,
+    /// Of one step of the word, in `unit`.
+    pub factor: f64,
+    /// Empty where the quantity's name has it.
+    pub unit: &'static str,
+}
+
 /// An input or output of a block, as emitted code documents it.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Port {
     /// An identifier.
     pub name: &'static str,
     /// Format and unit in words.
     pub meaning: String,
+    /// What its words stand for, where that is a quantity outside the circuit.
+    pub scale: Option<Scale>,
 }
 
 impl Port {
@@ -230,7 +246,24 @@ impl Port {
         Port {
             name,
             meaning: meaning.into(),
+            scale: None,
         }
+    }
+
+    /// A port that is not there: without a name.
+    pub fn absent() -> Self {
+        Port::new("", "")
+    }
+
+    /// The same port, whose words are `quantity = raw * 2^exponent`, in `unit`.
+    pub fn in_unit(mut self, quantity: &str, exponent: i32, unit: &'static str) -> Self {
+        self.scale = Some(Scale {
+            quantity: quantity.to_owned(),
+            offset: 0.0,
+            factor: pow2(exponent),
+            unit,
+        });
+        self
     }
 }
 

@@ -1,7 +1,7 @@
 //! The clock of a thermal record: required, never backwards, repeated times averaged.
 
 use super::cells;
-use super::columns::Roles;
+use super::columns::{Line, Roles};
 use super::lines::Lines;
 use super::thermal::ThermalRecord;
 use super::warning::Warning;
@@ -35,20 +35,16 @@ pub(super) fn take(
     let last_line = record.lines.last().copied().unwrap_or(1);
     if let Some((row, said)) = wild(&time, &record.lines) {
         let line = lines.at(record.lines.get(row).copied().unwrap_or(1));
-        let column = cells::split(line.text)
-            .ok()
-            .and_then(|c| c.get(index).map(|c| c.column))
-            .unwrap_or(1);
         return Err(line
             .error(
-                column,
+                column_of(line, index),
                 said,
                 "repair this time, or leave the cell empty: its row is left out then".to_owned(),
             )
             .into());
     }
     let mut last: Option<(f64, usize)> = None;
-    for (t, number) in time.iter().zip(&record.lines) {
+    for (row, (t, number)) in time.iter().zip(&record.lines).enumerate() {
         if t.is_nan() {
             continue;
         }
@@ -56,17 +52,22 @@ pub(super) fn take(
             && *t < before
         {
             let line = lines.at(*number);
-            let column = cells::split(line.text)
-                .ok()
-                .and_then(|c| c.get(index).map(|c| c.column))
-                .unwrap_or(1);
+            let mut next = time.iter().skip(row + 1).filter(|t| !t.is_nan());
+            // The rows after it go on from where the time was.
+            let help = match next.next().is_some_and(|next| *next >= before) {
+                true => {
+                    "only this time is out of order: repair it, or leave the cell empty: its row is left out then"
+                }
+                false => {
+                    "put the rows in order of time; a clock that restarts at power-on is time_since_power_on_s, beside a \
+                     time_s that does not"
+                }
+            };
             return Err(line
                 .error(
-                    column,
+                    column_of(line, index),
                     format!("time decreases: {t} s after {before} s (line {at})"),
-                    "put the rows in order of time; a clock that restarts at power-on is \
-                     time_since_power_on_s, beside a time_s that does not"
-                        .to_owned(),
+                    help.to_owned(),
                 )
                 .into());
         }
@@ -108,13 +109,21 @@ pub(super) fn take(
     Ok(())
 }
 
+/// Where the cell of this index begins in its line.
+fn column_of(line: Line<'_>, index: usize) -> usize {
+    let cells = cells::split(line.text).ok();
+    cells
+        .and_then(|c| c.get(index).map(|c| c.column))
+        .unwrap_or(1)
+}
+
 /// Times in a row that can be wild, at most (convention); more are a clock that does something else.
 const MOST_WILD: usize = 3;
 
 /// A step that is no pause between two rows, in steps of usual length; at the end of a record, where no later row tells, in
 /// times of all that was before (both convention: pauses of loggers are shorter).
-const LEAP: f64 = 10.0;
-const LEAP_AT_END: f64 = 1000.0;
+const LEAP_STEPS: f64 = 10.0;
+const LEAP_AT_END_SPANS: f64 = 1000.0;
 
 /// The first row whose time is wild, and what is said of it: the clock leaps there, and the rows after it go on from before the
 /// leap. A clock that goes back by itself is none, nor are rows in disorder.
@@ -136,8 +145,8 @@ fn wild(time: &[f64], lines: &[usize]) -> Option<(usize, String)> {
             .take(MOST_WILD)
             .all(|j| at(j) >= at(j - 1) && at(j) < at(start));
         let leaps = match start {
-            0 => at(0) - at(k) > LEAP * usual,
-            _ => at(start) - at(start - 1) > LEAP * usual,
+            0 => at(0) - at(k) > LEAP_STEPS * usual,
+            _ => at(start) - at(start - 1) > LEAP_STEPS * usual,
         };
         let few = k - start <= MOST_WILD && 10 * (k - start) <= rows.len();
         if !(goes_on && leaps && few) {
@@ -162,7 +171,7 @@ fn wild(time: &[f64], lines: &[usize]) -> Option<(usize, String)> {
     let before = last.checked_sub(1)?;
     let leap = at(last) - at(before);
     let span = at(before) - at(0);
-    let is_wild = rows.len() > 10 && span > 0.0 && leap > LEAP_AT_END * span;
+    let is_wild = rows.len() > 10 && span > 0.0 && leap > LEAP_AT_END_SPANS * span;
     let (row, _) = place(last).filter(|_| is_wild)?;
     Some((
         row,

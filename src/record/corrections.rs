@@ -5,184 +5,14 @@
 //! holds, a cubic without a constant (`INS_TCALn_GYR1` .. `GYR3`, in 1e-6 rad/s, about 35 degC), less its value at the
 //! temperature at which the offset was learnt (`INS_GYRn_CALTEMP`). Written from the public descriptions of both.
 
-use super::thermal::ThermalRecord;
+use super::parameters::Parameters;
+use super::undo::{Cubic, Undo};
 use super::warning::Warning;
 use crate::error::{InputError, Result};
-use std::collections::BTreeMap;
 use std::path::Path;
 
 /// degC that ArduPilot's cubic counts from.
 const ARDUPILOT_REFERENCE_DEGC: f64 = 35.0;
-
-/// Beginnings of the names that are kept.
-const KEPT: [&str; 6] = [
-    "TC_G",
-    "CAL_GYRO",
-    "IMU_GYRO_CAL_EN",
-    "SENS_BOARD_ROT",
-    "INS_TCAL",
-    "INS_GYR",
-];
-
-/// Parameters of a log, each with its values in their order.
-#[derive(Debug, Default)]
-pub(super) struct Parameters {
-    /// (us since power-on, value); only changes.
-    values: BTreeMap<String, Vec<(u64, f64)>>,
-}
-
-impl Parameters {
-    /// Takes a parameter that a message says.
-    pub(super) fn set(&mut self, name: &str, time_us: u64, value: f64) {
-        if !KEPT.iter().any(|k| name.starts_with(k)) || !value.is_finite() {
-            return;
-        }
-        let values = self.values.entry(name.to_owned()).or_default();
-        if values.last().is_none_or(|(_, last)| *last != value) {
-            values.push((time_us, value));
-        }
-    }
-
-    /// The value that it had last.
-    pub(super) fn last(&self, name: &str) -> Option<f64> {
-        Some(self.values.get(name)?.last()?.1)
-    }
-
-    /// The value that holds at a time; before the first that the log says, that one.
-    fn at(&self, name: &str, time_us: u64) -> Option<f64> {
-        let values = self.all(name);
-        let since = values.partition_point(|(from, _)| *from <= time_us);
-        Some(values.get(since.saturating_sub(1))?.1)
-    }
-
-    /// Whether it is 1, from when on: us since power-on; the first from the start. Empty for one that the log does not say.
-    fn switched(&self, name: &str) -> Vec<(u64, bool)> {
-        let values = self.all(name).iter().enumerate();
-        let each = values.map(|(i, (from, value))| (if i == 0 { 0 } else { *from }, *value == 1.0));
-        each.collect()
-    }
-
-    /// "NAME = 0 from the start, 1 from 101.0 s since power-on".
-    fn course(&self, name: &str) -> String {
-        let each: Vec<String> = self
-            .all(name)
-            .iter()
-            .enumerate()
-            .map(|(i, (from, value))| match i {
-                0 => format!("{name} = {value} from the start"),
-                _ => format!("{value} from {:.1} s since power-on", *from as f64 * 1e-6),
-            })
-            .collect();
-        each.join(", ")
-    }
-
-    fn all(&self, name: &str) -> &[(u64, f64)] {
-        self.values.get(name).map_or(&[], Vec::as_slice)
-    }
-
-    /// "NAME = 1 (from the start)", if it ever was one of these values.
-    fn on(&self, name: &str, values: &[f64]) -> Option<String> {
-        let (time_us, value) = self.all(name).iter().find(|(_, v)| values.contains(v))?;
-        let first = self.all(name).first() == Some(&(*time_us, *value));
-        let when = match first {
-            true => "from the start".to_owned(),
-            false => format!("from {:.1} s since power-on", *time_us as f64 * 1e-6),
-        };
-        Some(format!("{name} = {value} ({when})"))
-    }
-
-    /// Where it changes: us since power-on, before and after.
-    fn changes(&self, name: &str) -> impl Iterator<Item = (u64, f64, f64)> + '_ {
-        let values = self.all(name).windows(2);
-        values.map(|w| (w[1].0, w[0].1, w[1].1))
-    }
-}
-
-/// A cubic in the temperature that was subtracted.
-#[derive(Debug, Clone, PartialEq)]
-struct Cubic {
-    /// deg/s per K^k, lowest first.
-    coefficients_dps: [f64; 4],
-    reference_degc: f64,
-    range_degc: (f64, f64),
-    /// deg/s that were added beside it.
-    added_dps: f64,
-}
-
-impl Cubic {
-    fn at(&self, degc: f64) -> f64 {
-        let limited = degc.max(self.range_degc.0).min(self.range_degc.1);
-        let t = limited - self.reference_degc;
-        let [a, b, c, d] = self.coefficients_dps;
-        a + (b + (c + d * t) * t) * t
-    }
-}
-
-/// What was subtracted, and when.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Undo {
-    /// From when on: us since power-on; `None` while the correction was off.
-    pieces: Vec<(u64, Option<Cubic>)>,
-    /// The parameters that it is from.
-    name: String,
-}
-
-impl Undo {
-    fn cubic(&self, time_us: f64) -> Option<&Cubic> {
-        let mut before = self.pieces.iter().filter(|p| p.0 as f64 <= time_us);
-        before.next_back()?.1.as_ref()
-    }
-
-    /// Adds what was subtracted to every row in which it was.
-    ///
-    /// # Errors
-    /// A record without a temperature.
-    pub(super) fn take_off(
-        &self,
-        record: &mut ThermalRecord,
-        path: &Path,
-    ) -> Result<Option<Warning>> {
-        let since = record
-            .column("time_since_power_on_s")
-            .map(<[f64]>::to_vec)
-            .unwrap_or_default();
-        let cubics: Vec<Option<&Cubic>> = since.iter().map(|s| self.cubic(s * 1e6)).collect();
-        let rows = cubics.iter().flatten().count();
-        if rows == 0 {
-            return Ok(None);
-        }
-        let Some(degc) = record.column("die_degc").map(<[f64]>::to_vec) else {
-            return Err(InputError::new(format!(
-                "the correction by {} cannot be taken off: the log has no temperature of its gyro",
-                self.name
-            ))
-            .in_file(path)
-            .help("leave --undo-correction out, or log the temperature")
-            .into());
-        };
-        let mut largest = 0.0f64;
-        if let Some(rate) = record.columns.get_mut("rate_out_dps") {
-            for ((rate, degc), cubic) in rate.iter_mut().zip(degc).zip(&cubics) {
-                let Some(cubic) = cubic else { continue };
-                let off = cubic.at(degc) - cubic.added_dps;
-                *rate += off;
-                largest = largest.max(off.abs());
-            }
-        }
-        let of = match rows == cubics.len() {
-            true => String::new(),
-            false => format!(" in the {rows} of {} rows in which it was on", cubics.len()),
-        };
-        Ok(Some(Warning::on(
-            "correction_undone",
-            "rate_out_dps",
-            format!(
-                "the temperature correction of {} was taken off again{of}: up to {largest:.4} deg/s",
-                self.name
-            ),
-        )))
-    }
-}
 
 /// A correction that was on for a part of the log.
 #[derive(Debug, Clone)]
@@ -371,7 +201,11 @@ fn by_temperature(
             "{course}: {autopilot} corrected the gyro by its temperature; {source} is the driver's own output, before it"
         ),
         false => format!(
-            "{course}: {autopilot} corrected the gyro by its temperature while it is 1, and {source} is after it: {AFTER}{hint}"
+            "{course}: {autopilot} corrected the gyro by its temperature while it is 1, and {source} is after it: {}{hint}",
+            match found.undo {
+                Some(_) => "--undo-correction takes it off again",
+                None => AFTER,
+            }
         ),
     };
     let undo = match of.undo {
@@ -611,63 +445,5 @@ fn learnt<'a>(
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn cubics_are_those_of_the_autopilots() {
-        let mut p = Parameters::default();
-        for (name, value) in [
-            ("TC_G1_X0_2", 0.01),
-            ("TC_G1_X1_2", 1e-4),
-            ("TC_G1_X3_2", 1e-7),
-            ("TC_G1_TREF", 40.0),
-            ("TC_G1_TMIN", 10.0),
-            ("TC_G1_TMAX", 60.0),
-            ("INS_TCAL2_GYR1_X", 123.0),
-            ("INS_TCAL2_GYR2_X", -4.0),
-            ("INS_TCAL2_TMIN", 0.0),
-            ("INS_TCAL2_TMAX", 70.0),
-            ("INS_GYR2_CALTEMP", 30.0),
-        ] {
-            p.set(name, 0, value);
-        }
-        let px4 = px4_cubic(&p, 1, 2, 0).unwrap();
-        let expected = |t: f64| (0.01 + 1e-4 * t + 1e-7 * t * t * t).to_degrees();
-        for (degc, t) in [(50.0, 10.0), (80.0, 20.0), (-5.0, -30.0)] {
-            assert!((px4.at(degc) - expected(t)).abs() < 1e-12);
-        }
-        assert!(px4_cubic(&p, 1, 0, 0).is_none() && px4_cubic(&p, 0, 2, 0).is_none());
-        let of = ardupilot_cubic(&p, "INS_TCAL2", 2, "X", 0).unwrap();
-        let expected = |t: f64| (1e-6 * (123.0 * t - 4.0 * t * t)).to_degrees();
-        assert!((of.at(55.0) - expected(20.0)).abs() < 1e-12);
-        assert!((of.added_dps - expected(-5.0)).abs() < 1e-12);
-    }
-
-    #[test]
-    fn only_changes_count_and_say_when() {
-        let mut p = Parameters::default();
-        for (time, value) in [(5, 0.01), (9, 0.01), (2_000_000, 0.02)] {
-            p.set("INS_GYROFFS_Z", time, value);
-        }
-        p.set("BAT_CAPACITY", 5, 1.0);
-        assert_eq!(p.last("BAT_CAPACITY"), None);
-        let cuts: Vec<_> = learnt(&p, "INS_GYROFFS_Z", 1.0).collect();
-        let [(time, said, step)] = &cuts[..] else {
-            panic!("{cuts:?}")
-        };
-        assert_eq!(*time, 2_000_000);
-        assert!(
-            said.contains("from 0.01 to 0.02") && said.contains("2.0 s"),
-            "{said}"
-        );
-        assert!((step + 0.01f64.to_degrees()).abs() < 1e-12);
-        p.set("TC_G_ENABLE", 7, 0.0);
-        p.set("TC_G_ENABLE", 3_000_000, 1.0);
-        let on = p.on("TC_G_ENABLE", &[1.0]).unwrap();
-        assert!(
-            on.contains("TC_G_ENABLE = 1") && on.contains("3.0 s"),
-            "{on}"
-        );
-    }
-}
+#[path = "corrections_tests.rs"]
+mod tests;

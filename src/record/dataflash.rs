@@ -6,10 +6,11 @@
 //! format and labels of the others.
 
 use super::averager::{Averager, STANDARD_GRAVITY};
-use super::corrections::{self, Parameters};
+use super::corrections;
 use super::log_bytes::{Damage, Scalar, Stream};
 use super::log_clock::{Message, Sample};
 use super::log_gyros::{self, Source};
+use super::parameters::Parameters;
 use super::thermal::ThermalRecord;
 use super::warning::Warning;
 use crate::design::RecordMapping;

@@ -14,10 +14,10 @@
 
 use super::columns::{THERMOMETERS, unit_of};
 use super::thermal::ThermalRecord;
+use super::visits::{Visit, Visits};
 use super::warning::Warning;
 use crate::statistics::stats;
 use std::collections::BTreeMap;
-use std::ops::Range;
 
 /// How many times the usual distance from its neighbours a value has to stand apart.
 const APART: f64 = 8.0;
@@ -258,88 +258,6 @@ fn frequent(values: &[f64], marks: &[bool]) -> Vec<f64> {
         .collect();
     runs.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.total_cmp(&b.1)));
     runs.into_iter().map(|(_, value)| value).take(4).collect()
-}
-
-/// Cells in a row that hold one value, and how far from it the cells before and after them are.
-#[derive(Debug, Clone, PartialEq)]
-struct Visit {
-    value: f64,
-    /// Into the cells that were looked at.
-    cells: Range<usize>,
-    /// The lesser distance.
-    distance: f64,
-    /// The same for a step of usual length in time.
-    per_row: f64,
-    /// Time of the shorter way there, s.
-    way_s: f64,
-    /// Whether there are neighbours on both sides.
-    inner: bool,
-}
-
-/// The visits of some cells. Each is made when it is looked at: a long record has as many as rows.
-struct Visits<'a> {
-    time_s: &'a [f64],
-    values: &'a [f64],
-    cells: &'a [usize],
-    /// Step of usual length in time, s.
-    usual_s: f64,
-}
-
-impl<'a> Visits<'a> {
-    fn of(time_s: &'a [f64], values: &'a [f64], cells: &'a [usize]) -> Self {
-        let steps: Vec<f64> = cells
-            .windows(2)
-            .map(|w| time_s[w[1]] - time_s[w[0]])
-            .filter(|s| *s > 0.0)
-            .collect();
-        Visits {
-            time_s,
-            values,
-            cells,
-            usual_s: stats::median(&steps),
-        }
-    }
-
-    /// In order of time.
-    fn iter(&self) -> impl Iterator<Item = Visit> {
-        let alike = |a: &usize, b: &usize| self.values[*a] == self.values[*b];
-        self.cells.chunk_by(alike).scan(0, |start, same| {
-            let cells = *start..*start + same.len();
-            *start = cells.end;
-            Some(self.visit(cells))
-        })
-    }
-
-    /// Distance and time between two cells: value, value in a step of usual length, s.
-    fn way(&self, a: usize, b: usize) -> (f64, f64, f64) {
-        let (a, b) = (self.cells[a], self.cells[b]);
-        let (distance, time_s) = (
-            (self.values[b] - self.values[a]).abs(),
-            self.time_s[b] - self.time_s[a],
-        );
-        let rows = time_s / self.usual_s;
-        let per_row = if rows > 1.0 {
-            distance / rows
-        } else {
-            distance
-        };
-        (distance, per_row, time_s)
-    }
-
-    fn visit(&self, cells: Range<usize>) -> Visit {
-        let before = cells.start.checked_sub(1).map(|a| self.way(a, cells.start));
-        let after = (cells.end < self.cells.len()).then(|| self.way(cells.end - 1, cells.end));
-        let sides = || before.iter().chain(&after);
-        let least = |of: fn(&(f64, f64, f64)) -> f64| sides().map(of).fold(f64::INFINITY, f64::min);
-        Visit {
-            value: self.values[self.cells[cells.start]],
-            cells,
-            distance: least(|s| s.0),
-            per_row: least(|s| s.1),
-            way_s: least(|s| s.2),
-            inner: before.is_some() && after.is_some(),
-        }
-    }
 }
 
 /// How the readings of a channel move.

@@ -1,9 +1,10 @@
 //! The rows of a log as a thermal record: which are whole, which belong to one stretch, what is told of the others.
 
 use super::averager::Averager;
-use super::corrections::{Switched, Undo};
+use super::corrections::Switched;
 use super::log_bytes::Damage;
 use super::thermal::{LEAST_ROWS, ThermalRecord};
+use super::undo::Undo;
 use super::warning::Warning;
 use super::{dead, error_values, frozen, plausibility, stopped};
 use crate::design::RecordMapping;

@@ -5,10 +5,11 @@
 //! itself: format definitions name the fields of each topic, subscriptions number the topics.
 
 use super::averager::Averager;
-use super::corrections::{self, Parameters};
+use super::corrections;
 use super::log_bytes::{Damage, Scalar, Stream};
 use super::log_clock::Message;
 use super::log_gyros::{self, Source};
+use super::parameters::Parameters;
 use super::thermal::ThermalRecord;
 use super::ulog_fields::{Pick, Wanted, pick, wanted};
 use super::ulog_layout::{Definitions, Layout};

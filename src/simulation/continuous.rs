@@ -11,6 +11,7 @@ use crate::error::{InputError, Result};
 use crate::parallel::both;
 use crate::plant::noise::{Noise, Shared, Walk};
 use crate::plant::profile::{Profile, Reading};
+use crate::text::number;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Temperatures and what surrounds the gyro are brought up to date so often, Hz. In between they
@@ -32,7 +33,8 @@ pub fn run(design: &Design, seconds: f64, threads: usize, progress: Progress) ->
     let least_s = 10.0 / rows_per_s(design);
     if !(seconds >= least_s && seconds <= LONGEST_S) {
         return Err(InputError::new(format!(
-            "a run of {seconds} s is not between {least_s} (ten decimated samples) and {LONGEST_S} s"
+            "a run of {seconds} s is not between {} (ten decimated samples) and {LONGEST_S} s",
+            number(least_s, 3)
         ))
         .help("give `--duration` in seconds")
         .into());

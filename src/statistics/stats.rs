@@ -6,7 +6,7 @@ pub const MAD_TO_STD: f64 = 1.482_602_218_505_602;
 
 /// The measured values, ascending.
 pub fn sorted(values: &[f64]) -> Vec<f64> {
-    let mut v: Vec<f64> = values.iter().copied().filter(|x| !x.is_nan()).collect();
+    let mut v = measured(values);
     v.sort_unstable_by(f64::total_cmp);
     v
 }
@@ -29,7 +29,15 @@ pub fn quantile_sorted(v: &[f64], p: f64) -> f64 {
 
 /// The median.
 pub fn median(values: &[f64]) -> f64 {
-    let mut v: Vec<f64> = values.iter().copied().filter(|x| !x.is_nan()).collect();
+    median_of(&mut measured(values))
+}
+
+fn measured(values: &[f64]) -> Vec<f64> {
+    values.iter().copied().filter(|x| !x.is_nan()).collect()
+}
+
+/// The median of measured values, which are put in another order: a long record is not copied again.
+fn median_of(v: &mut [f64]) -> f64 {
     let Some(last) = v.len().checked_sub(1) else {
         return f64::NAN;
     };
@@ -44,9 +52,12 @@ pub fn median(values: &[f64]) -> f64 {
 /// Median absolute deviation about the median, scaled to a standard deviation; 0 where more than
 /// half of the values are the same.
 pub fn mad_std(values: &[f64]) -> f64 {
-    let centre = median(values);
-    let deviations: Vec<f64> = values.iter().map(|v| (v - centre).abs()).collect();
-    MAD_TO_STD * median(&deviations)
+    let mut v = measured(values);
+    let centre = median_of(&mut v);
+    v.iter_mut().for_each(|v| *v = (*v - centre).abs());
+    // Of infinities.
+    v.retain(|v| !v.is_nan());
+    MAD_TO_STD * median_of(&mut v)
 }
 
 /// As [`mad_std`], but where more than half of the values are the same (a coarse quantiser) the
@@ -117,17 +128,18 @@ pub fn difference_noise(values: &[f64]) -> f64 {
 /// As [`difference_noise`], from second differences / sqrt(6): blind to a slope that changes
 /// slowly or seldom, for series such as a thermometer's under ramps and steps.
 pub fn curvature_noise(values: &[f64]) -> f64 {
-    let measured: Vec<f64> = values.iter().copied().filter(|v| !v.is_nan()).collect();
-    let bends: Vec<f64> = measured
-        .windows(3)
-        .map(|w| w[0] - 2.0 * w[1] + w[2])
-        .collect();
+    // In place: a long record is not copied twice.
+    let mut bends = measured(values);
+    for k in 2..bends.len() {
+        bends[k - 2] = bends[k - 2] - 2.0 * bends[k - 1] + bends[k];
+    }
+    bends.truncate(bends.len().saturating_sub(2));
     if bends.is_empty() {
         return f64::NAN;
     }
     let limit = 5.0 * mad_std(&bends);
-    let kept: Vec<f64> = bends.into_iter().filter(|d| d.abs() <= limit).collect();
-    rms(&kept) / 6f64.sqrt()
+    bends.retain(|d| d.abs() <= limit);
+    rms(&bends) / 6f64.sqrt()
 }
 
 /// The step of a quantised channel: the smallest distance between two different values, if the

@@ -200,7 +200,7 @@ fn without_thermometer(record: &ThermalRecord, has: &[&str]) -> String {
         );
     }
     format!(
-        "the file has: {columns}\n  say in the design which one it is:\n    [record.columns]\n    die_degc = \
+        "the file has: {columns}\n  say in the design (these lines are a whole one) which one it is:\n    [record.columns]\n    die_degc = \
          \"NAME_IN_THE_FILE\""
     )
 }
@@ -239,6 +239,7 @@ pub fn fit_with(
     let half_span = if half > 0.0 { half } else { 1.0 };
     let x: Vec<f64> = t.iter().map(|t| (t - centre) / half_span).collect();
     let e: Vec<f64> = rows.iter().map(|i| error[*i]).collect();
+    drop(error);
     let sample = Sample {
         spike: weights::spike(&x, &e),
         bins: Bins::new(range),
@@ -285,10 +286,14 @@ pub fn fit_with(
         .map(|(i, _)| *i)
         .collect();
     warnings.extend(outlier_warning(record, &outliers, rows.len()));
-    let spread_out = |values: &[f64], missing: f64| -> Vec<f64> {
+    // A long record is not copied where every row is usable.
+    let spread_out = |values: Vec<f64>, missing: f64| -> Vec<f64> {
+        if values.len() == record.len() {
+            return values;
+        }
         let mut out = vec![missing; record.len()];
         for (i, v) in rows.iter().zip(values) {
-            out[*i] = *v;
+            out[*i] = v;
         }
         out
     };
@@ -313,9 +318,9 @@ pub fn fit_with(
         noise_floor_rms_dps: noise_floor(&sample),
         drift_before_pp_dps: drift,
         drift_before_pp_plain_dps: stats::extremes(&sample.e).map_or(0.0, |(a, b)| b - a),
-        residuals: spread_out(&residuals, f64::NAN),
-        heldout_errors: spread_out(&choice.heldout.errors(&sample, &blocks), f64::NAN),
-        weights: spread_out(&row_weights, 0.0),
+        residuals: spread_out(residuals, f64::NAN),
+        heldout_errors: spread_out(choice.heldout.errors(&sample, &blocks), f64::NAN),
+        weights: spread_out(row_weights, 0.0),
         rows,
         blocks,
         orders_tried: choice.trials,

@@ -268,7 +268,7 @@ fn loop_warning(c: &Checked<'_>) -> Option<Warning> {
             &c.fit.thermometer,
             format!(
                 "{seen}. No function of the thermometer can follow that, but a lag, a gradient or a drift in time can. \
-                 `gyrogen close` looks for them"
+                 `gyrogen close`, with the same record and design, looks for them"
             ),
         ))
     } else if l.rms_dps > c.fit.noise_floor_rms_dps.max(l.noise_dps) {

@@ -1,0 +1,104 @@
+//! Which columns of a file are likely meant, as names of columns go; and what of a design would say so.
+
+use super::columns::{THERMOMETERS, is_known, unit_of};
+use crate::design::units;
+
+/// The column among `names` that is likely meant for `role`, as names of columns go.
+pub(super) fn guess<'a>(role: &str, names: &[&'a str]) -> Option<&'a str> {
+    guesses(role, names).first().copied()
+}
+
+/// All that would do as well as the one that [`guess`] gives, which is the first.
+pub(super) fn guesses<'a>(role: &str, names: &[&'a str]) -> Vec<&'a str> {
+    const HEAT: [&str; 5] = ["temp", "degc", "\u{b0}c", "die", "celsius"];
+    let hints: &[&str] = match role {
+        "time_s" => &["time", "sec", "clock"],
+        "rate_out_dps" => &["gyro", "rate", "omega", "dps", "gx", "gz"],
+        "rate_dps" => &["table", "rate", "truth"],
+        "phase_rad" => &["phase", "phi"],
+        "freq_hz" => &["freq", "hz"],
+        "agc" => &["agc", "gain"],
+        "quad_dps" => &["quad"],
+        "supply_v" => &["supply", "vdd", "volt"],
+        "accel_g" => &["acc"],
+        _ => &HEAT,
+    };
+    // "gyro" before "rate": the order of the hints is their strength.
+    let is_heat = |name: &str| {
+        let stated = units::stated(name, "die_degc").is_some_and(|u| u.of == "degC");
+        stated || HEAT.iter().any(|hint| name.contains(hint))
+    };
+    let others = |name: &&&str| {
+        **name != "time_since_power_on_s"
+            && (unit_of(role) != "deg/s" || !is_heat(&name.to_lowercase()))
+    };
+    let of = |hint: &&str| -> Vec<&'a str> {
+        let fit = names.iter().filter(|n| n.to_lowercase().contains(hint));
+        fit.filter(others).copied().collect()
+    };
+    hints
+        .iter()
+        .map(of)
+        .find(|found| !found.is_empty())
+        .unwrap_or_default()
+}
+
+/// Lists the file's columns and shows the part of a design file that would map `role`, and what else it lacks.
+pub(super) fn suggestion(role: &str, names: &[&str]) -> String {
+    let named: Vec<&str> = names.iter().copied().filter(|n| !n.is_empty()).collect();
+    let listed: Vec<&str> = named.iter().copied().take(40).collect();
+    let more = named.len() - listed.len();
+    let mut text = format!("the file has: {}", listed.join(", "));
+    if more > 0 {
+        text.push_str(&format!(" and {more} more"));
+    }
+    let has = |role: &str| {
+        named
+            .iter()
+            .any(|n| *n == role || units::meant(n) == Some(role))
+    };
+    let mut lines = vec![format!(
+        "{role} = \"{}\"",
+        guess(role, &named).unwrap_or("NAME_IN_THE_FILE")
+    )];
+    // What would be asked for next, where a column looks like it.
+    let others = ["time_s", "rate_out_dps", "die_degc"];
+    let others = others
+        .into_iter()
+        .filter(|other| *other != role && !has(other));
+    let others =
+        others.filter(|other| *other != "die_degc" || !THERMOMETERS.iter().any(|t| has(t)));
+    lines.extend(others.filter_map(|o| Some(format!("{o} = \"{}\"", guess(o, &named)?))));
+    text.push_str(&format!(
+        "\n  say in the design which one it is. These lines are a whole design file, say gyro.toml for `gyrogen run gyro.toml --record \
+         ...`:\n    [record.columns]\n    {}",
+        lines.join("\n    ")
+    ));
+    let axes = guesses("rate_out_dps", &named);
+    if let [first @ .., last] = axes.as_slice()
+        && !first.is_empty()
+        && (role == "rate_out_dps" || !has("rate_out_dps"))
+    {
+        text.push_str(&format!(
+            "\n  {} and {last} would do as rate_out_dps; take the axis you want",
+            first.join(", ")
+        ));
+    }
+    if let Some(unitless) = guess(role, &named)
+        && is_known(role)
+        && units::stated(unitless, role).is_none()
+    {
+        text.push_str(&format!(
+            "\n  or, where it is not in {}, with its unit: {role} = {{ column = \"{unitless}\", unit = \"...\" }} ({})",
+            unit_of(role),
+            units::accepted(role)
+        ));
+    }
+    if role == "time_s" {
+        text.push_str(
+            "\n  or, if the rows are evenly spaced and the file has no clock:\n    [record]\n    \
+             row_period_s = 1.0",
+        );
+    }
+    text
+}
