@@ -54,6 +54,9 @@ pub struct FastState<R, const N: usize> {
     pub cics: [CicState<R, N>; 4],
 }
 
+/// What a period leaves at the sample rate: the last integrators by channel, all that the combs take.
+pub type Front = [i128; 4];
+
 /// What changes after every R samples only.
 #[derive(Debug, Clone, Copy)]
 pub struct SlowState<W> {

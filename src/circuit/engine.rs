@@ -2,6 +2,7 @@
 //! traced ranges fit into.
 
 use super::block_kernel::{BlockKernel, Instructions};
+pub use super::chain::Front;
 use super::chain::{Chain, FastState, Held, SlowState};
 use super::ends::{Ends, FloatScale};
 use super::float_kernel::FloatKernel;
@@ -82,9 +83,6 @@ pub trait Engine {
     /// Puts the loops at rest (see [`Chain::hold`]).
     fn hold(&mut self, held: Held);
 }
-
-/// What a period leaves at the sample rate: the last integrators by channel, all that the combs take.
-pub type Front = [i128; 4];
 
 /// The circuit's outputs to the drive.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,14 +1,13 @@
 //! The slow rate over several rows at once, where no loop is closed and no cast can stop the run: the
-//! rows do not wait for one another, so the blocks run on sixteen of them side by side, the combs on the four channels.
+//! rows do not wait for one another, so the blocks run on eight of them side by side, the combs on the four channels.
 //!
 //! In stages, so that designs that are alike up to one share it: combs, CORDIC, then compensation and the row.
 
 use super::block_kernel::Instructions;
-use super::chain::{Chain, compensated};
+use super::chain::{Chain, Front, compensated};
 use super::compensation::{Bias, Rate};
 use super::cordic::Vectoring;
 use super::decimator::{Cic, CicState, Decimate};
-use super::engine::Front;
 use super::in_range::InRange;
 use crate::numeric::arithmetic::Arithmetic;
 use crate::numeric::batch::Batch;
@@ -16,7 +15,7 @@ use crate::numeric::cast::Cast;
 use pulp::NullaryFnOnce;
 
 /// Rows side by side.
-pub const WIDTH: usize = 16;
+pub const WIDTH: usize = 8;
 
 /// One word of each row.
 type Words = [i64; WIDTH];
