@@ -19,7 +19,7 @@ const PRECISION: usize = 256;
 type Decided = Mutex<BTreeMap<(u32, u32), i64>>;
 
 /// The constant of `key`, decided at its first use: a search asks for the same few with every design, and each
-/// takes 50 us.
+/// takes about 0.1 ms.
 fn once(decided: &Decided, key: (u32, u32), decide: impl FnOnce() -> i64) -> i64 {
     let known = || decided.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(constant) = known().get(&key) {
