@@ -85,6 +85,11 @@ pub(crate) fn design(draw: &mut Draw) -> Design {
         integral: gain(9, 11),
         integrator_bits: 48,
     });
+    if draw.one_in(3) {
+        // Words of the CORDIC that wrap, some of them.
+        circuit.cordic.width = draw.within(20, 36);
+        circuit.cordic.guard_bits = draw.within(0, 9);
+    }
     design
 }
 

@@ -54,6 +54,9 @@ pub struct FastState<R, const N: usize> {
     pub cics: [CicState<R, N>; 4],
 }
 
+/// What a period leaves at the sample rate: the last integrators by channel, all that the combs take.
+pub type Front = [i128; 4];
+
 /// What changes after every R samples only.
 #[derive(Debug, Clone, Copy)]
 pub struct SlowState<W> {
@@ -105,6 +108,7 @@ impl<const N: usize> Chain<N> {
                 cast.prove_in_range();
             }
         }
+        chain.cordic.prove(&program);
         chain
     }
 
@@ -286,27 +290,6 @@ impl<const N: usize> Chain<N> {
         channels
     }
 
-    /// Bias and compensated rate, and whether the thermometer is inside the calibrated range, where
-    /// the design asks for them.
-    #[inline(always)]
-    pub fn compensated<A: Arithmetic>(
-        &self,
-        ar: &A,
-        sense_i: A::Word,
-        thermometer: [A::Word; 1],
-    ) -> (Option<[A::Word; 2]>, Option<A::Word>) {
-        let Some((bias, rate)) = &self.compensation else {
-            return (None, None);
-        };
-        let [bias] = ar.call(bias, "", &mut (), thermometer);
-        let [rate] = ar.call(rate, "", &mut (), [sense_i, bias]);
-        let in_range = self.in_range.as_ref().map(|block| {
-            let [inside] = ar.call(block, "", &mut (), thermometer);
-            inside
-        });
-        (Some([bias, rate]), in_range)
-    }
-
     /// True if no row needs the one before it but by the decimators, and no cast can stop the run.
     pub fn is_row_by_row_free(&mut self) -> bool {
         let closed = self.phase_loop.is_some() || self.amplitude_loop.is_some();
@@ -331,7 +314,8 @@ impl<const N: usize> Chain<N> {
         } else {
             [phase]
         };
-        let (compensation, in_range) = self.compensated(ar, sense_i, thermometer);
+        let blocks = (self.compensation.as_ref(), self.in_range.as_ref());
+        let (compensation, in_range) = compensated(ar, blocks, sense_i, thermometer);
         if let (Some(block), Some(state)) = (&self.phase_loop, &mut slow.phase_loop) {
             let [correction] = ar.call(block, "phase_loop", state, [phase]);
             let [] = ar.call(
@@ -357,6 +341,27 @@ impl<const N: usize> Chain<N> {
             gain,
         }
     }
+}
+
+/// Bias and compensated rate, and whether the thermometer is inside the calibrated range, where
+/// the design asks for them.
+#[inline(always)]
+pub fn compensated<A: Arithmetic>(
+    ar: &A,
+    (compensation, in_range): (Option<&(Bias, Rate)>, Option<&InRange>),
+    sense_i: A::Word,
+    thermometer: [A::Word; 1],
+) -> (Option<[A::Word; 2]>, Option<A::Word>) {
+    let Some((bias, rate)) = compensation else {
+        return (None, None);
+    };
+    let [bias] = ar.call(bias, "", &mut (), thermometer);
+    let [rate] = ar.call(rate, "", &mut (), [sense_i, bias]);
+    let in_range = in_range.map(|block| {
+        let [inside] = ar.call(block, "", &mut (), thermometer);
+        inside
+    });
+    (Some([bias, rate]), in_range)
 }
 
 /// The columns of a decimated sample that are words, in the contract's order (bias is not one of the

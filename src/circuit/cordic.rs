@@ -6,12 +6,16 @@ use crate::numeric::arithmetic::{Arithmetic, Block, IndexTable, LoopBody, Port};
 use crate::numeric::cast::{Cast, Label, Target};
 use crate::numeric::constants;
 use crate::numeric::format::{Overflow, Rounding};
+use crate::numeric::trace::Trace;
+use crate::numeric::trace::ir::Program;
 
 /// The CORDIC's configuration.
 #[derive(Debug, Clone)]
 pub struct Vectoring {
     iterations: u32,
     width: u32,
+    /// Ranges have proved that the rotations' x and y never leave the width.
+    stays_inside: bool,
     angle_bits: u32,
     /// Fraction bits of x and y.
     fraction_bits: i32,
@@ -35,6 +39,7 @@ impl Vectoring {
         Vectoring {
             iterations: cordic.iterations,
             width: cordic.width,
+            stays_inside: false,
             angle_bits: cordic.angle_bits,
             fraction_bits,
             widen: Cast::new(
@@ -66,6 +71,14 @@ impl Vectoring {
                 format!("magnitude in units of 2^-{from}"),
             ],
         }
+    }
+}
+
+impl Vectoring {
+    /// Takes from the program that this block is traced in whether x and y may leave their width.
+    pub fn prove(&mut self, program: &Program) {
+        let idle = program.idle_wraps(<Self as Block<Trace, 2, 2>>::NAME);
+        self.stays_inside = matches!(idle[..], [true, true, ..]);
     }
 }
 
@@ -125,6 +138,7 @@ impl<A: Arithmetic> Block<A, 2, 2> for Vectoring {
         ];
 
         let [x, _, phase] = ar.repeat(self.iterations, start, radius, self);
+        let phase = ar.settled(phase, self.angle_bits);
         let gain = ar.constant(i128::from(self.gain), self.gain_bits as i32);
         let magnitude = ar.cast(ar.mul(x, gain), &self.magnitude, &[x]);
         [phase, magnitude]
@@ -155,10 +169,13 @@ impl<A: Arithmetic> LoopBody<A, 3> for Vectoring {
         // Toward y = 0 means that x grows by |y|, floored: from x >= 0 it stays there, unless it wraps.
         let next_x = ar.not_negative(ar.bounded(next_x, longer), longer, self.width);
         let next_x = ar.named(next_x, "next_x");
+        let next_y = ar.bounded(next_y, longer);
+        let (inside, point) = (self.stays_inside, self.fraction_bits);
         let next = [
-            ar.wrap(next_x, self.width, self.fraction_bits),
-            ar.wrap(ar.bounded(next_y, longer), self.width, self.fraction_bits),
-            ar.wrap(next_z, self.angle_bits, self.angle_bits as i32),
+            ar.wrap_unless(inside, next_x, self.width, point),
+            ar.wrap_unless(inside, next_y, self.width, point),
+            // Nothing but the next sum looks at the angle.
+            ar.wrap_in_sum(next_z, self.angle_bits, self.angle_bits as i32),
         ];
         *radius = ar.wrapped_radius(longer, self.width);
         next

@@ -42,10 +42,6 @@ pub(super) trait Ends: Arithmetic {
     fn narrow(word: i128) -> Self::Residue;
     /// A drive gain, 0 to 1.
     fn gain(word: Self::Word, scale: &FloatScale) -> f64;
-    /// The raw word of a row, in 64 bits; of no meaning without quantisation.
-    fn raw(_word: Self::Word) -> i64 {
-        0
-    }
     /// Runs the samples that a kernel left nothing over of.
     fn run_kernel<const N: usize>(
         _kernel: &mut BlockKernel<N>,
@@ -99,9 +95,6 @@ impl<W: HasKernel, R: Lane, const IDLE: bool> Ends for Fixed<W, R, IDLE> {
     }
     fn gain(word: W, scale: &FloatScale) -> f64 {
         word.wide() as f64 * scale.gain_lsb
-    }
-    fn raw(word: W) -> i64 {
-        word.wide() as i64
     }
     fn run_kernel<const N: usize>(
         kernel: &mut BlockKernel<N>,

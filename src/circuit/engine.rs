@@ -2,10 +2,11 @@
 //! traced ranges fit into.
 
 use super::block_kernel::{BlockKernel, Instructions};
+pub use super::chain::Front;
 use super::chain::{Chain, FastState, Held, SlowState};
 use super::ends::{Ends, FloatScale};
 use super::float_kernel::FloatKernel;
-use super::row_batch::RowBatch;
+use super::row_batch::{RowBatch, Stages};
 use crate::design::Design;
 use crate::numeric::arithmetic::{Arithmetic, Block};
 use crate::numeric::fixed::{Fixed, Overflowed};
@@ -73,6 +74,8 @@ pub trait Engine {
     /// # Errors
     /// As [`Engine::process`].
     fn follow(&mut self, fronts: &[Front], rows: &mut Rows) -> Result<(), Box<Overflowed>>;
+    /// What makes rows of fronts stage by stage, where no row waits for the one before and no cast can stop the run.
+    fn stages(&mut self) -> Option<&mut dyn Stages>;
     /// No rows, of the kind that this engine makes.
     fn no_rows(&self) -> Rows;
     /// What the circuit excites the drive with until the end of the next period.
@@ -80,9 +83,6 @@ pub trait Engine {
     /// Puts the loops at rest (see [`Chain::hold`]).
     fn hold(&mut self, held: Held);
 }
-
-/// What a period leaves at the sample rate: the last integrators by channel, all that the combs take.
-pub type Front = [i128; 4];
 
 /// The circuit's outputs to the drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -238,7 +238,7 @@ where
 }
 
 /// The kernel of the sample rate and the batch of the decimated rate, where they apply.
-type FastWays<const N: usize> = (Option<BlockKernel<N>>, Option<RowBatch>);
+type FastWays<const N: usize> = (Option<BlockKernel<N>>, Option<RowBatch<N>>);
 
 /// A chain at work: `F` at the sample rate, `S` at the decimated rate.
 struct Running<F: Arithmetic, S: Arithmetic<Residue = F::Residue>, const N: usize> {
@@ -253,7 +253,7 @@ struct Running<F: Arithmetic, S: Arithmetic<Residue = F::Residue>, const N: usiz
     /// What runs whole periods of inputs without quantisation.
     float_kernel: Option<FloatKernel<N>>,
     /// Rows that wait; none do between two calls.
-    batch: Option<RowBatch>,
+    batch: Option<RowBatch<N>>,
     /// Samples so far.
     samples: u64,
     /// Samples of the period at hand.
@@ -370,7 +370,7 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Runnin
     /// Appends the rows that wait.
     fn put_waiting(&mut self, rows: &mut Rows) {
         if let (Some(batch), Rows::Integer(rows)) = (&mut self.batch, rows) {
-            batch.put(&self.chain, rows);
+            batch.put_waiting(rows);
         }
     }
 
@@ -381,11 +381,9 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Runnin
     }
 
     fn end_of_period(&mut self, rows: &mut Rows) {
+        let front = self.front();
         if let (Some(batch), Rows::Integer(rows)) = (&mut self.batch, &mut *rows) {
-            let channels = self.chain.decimated(&self.slow, &mut self.fast_state);
-            if batch.push(channels.map(S::raw)) {
-                batch.put(&self.chain, rows);
-            }
+            batch.push(front, rows);
             return;
         }
         self.slow.at(self.samples - 1);
@@ -443,6 +441,10 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Engine
         }
         self.put_waiting(rows);
         Ok(())
+    }
+
+    fn stages(&mut self) -> Option<&mut dyn Stages> {
+        self.batch.as_mut().map(|batch| batch as &mut dyn Stages)
     }
 
     fn process_inputs(

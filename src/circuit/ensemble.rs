@@ -1,10 +1,12 @@
 //! Many designs over the same codes: what they have in common at the sample rate is done once.
 //!
 //! Up to the decimator's sums a circuit is ADC format, oscillator, product and decimator. Designs that are alike
-//! so far, and in which no phase loop moves the oscillator, share that work; each makes its own rows of the sums, by
-//! its own chain as it does alone. So the rows are those of each design alone, bit for bit, and so are its overflows.
+//! so far, and in which no phase loop moves the oscillator, share that work; of the stages after it they share those
+//! up to which they are alike too (see [`super::followers`]). The rows are those of each design alone, bit for bit,
+//! and so are its overflows.
 
 use super::engine::{self, ArithmeticKind, Engine, Front, Rows};
+use super::followers::Followers;
 use crate::design::{Circuit, Design};
 use crate::numeric::fixed::Overflowed;
 
@@ -59,8 +61,8 @@ struct Group {
     /// What runs the sample rate for all; `None`: a design by itself.
     fast: Option<Box<dyn Engine>>,
     fronts: Vec<Front>,
-    /// With their places among the designs.
-    members: Vec<(usize, Box<dyn Engine>)>,
+    /// Their places are those among the designs.
+    members: Followers,
 }
 
 impl Ensemble {
@@ -68,10 +70,14 @@ impl Ensemble {
     pub fn new(designs: &[Design], kind: ArithmeticKind) -> Self {
         let alike = |a: &Design, b: &Design| share_a_front(&a.circuit, &b.circuit);
         let of = |places: Vec<usize>| {
-            let engine = |k: usize| Some((k, engine::engine(designs.get(k)?, kind)));
-            let members: Vec<_> = places.into_iter().filter_map(engine).collect();
-            let first = members.first().filter(|_| members.len() > 1);
-            let first = first.and_then(|(k, _)| designs.get(*k));
+            let mut members = Followers::default();
+            for k in &places {
+                if let Some(design) = designs.get(*k) {
+                    members.add(design, kind, *k);
+                }
+            }
+            let first = places.first().filter(|_| places.len() > 1);
+            let first = first.and_then(|k| designs.get(*k));
             Group {
                 fast: first.map(|design| engine::engine(design, kind)),
                 fronts: Vec::new(),
@@ -85,8 +91,11 @@ impl Ensemble {
 
     /// No rows of each design.
     pub fn no_rows(&self) -> Vec<Rows> {
-        let members = self.groups.iter().flat_map(|g| &g.members);
-        let mut rows: Vec<_> = members.map(|(k, e)| (*k, e.no_rows())).collect();
+        let mut rows: Vec<_> = self
+            .groups
+            .iter()
+            .flat_map(|g| g.members.no_rows())
+            .collect();
         rows.sort_by_key(|(k, _)| *k);
         rows.into_iter().map(|(_, rows)| rows).collect()
     }
@@ -101,21 +110,29 @@ impl Ensemble {
     ) -> Vec<Result<(), Box<Overflowed>>> {
         let mut results: Vec<_> = rows.iter().map(|_| Ok(())).collect();
         for group in &mut self.groups {
-            group.fronts.clear();
-            let front = match &mut group.fast {
-                Some(fast) => fast.fronts(drive, sense, &mut group.fronts),
-                None => Ok(()),
+            let Some(fast) = &mut group.fast else {
+                for (k, engine) in group.members.engines() {
+                    if let (Some(rows), Some(result)) = (rows.get_mut(k), results.get_mut(k)) {
+                        *result = engine.process(drive, sense, rows);
+                    }
+                }
+                continue;
             };
-            for (k, engine) in &mut group.members {
-                let (Some(rows), Some(result)) = (rows.get_mut(*k), results.get_mut(*k)) else {
-                    continue;
-                };
-                *result = match &group.fast {
-                    // An overflow at the sample rate is after the periods that came before it.
-                    Some(_) => engine.follow(&group.fronts, rows).and(front.clone()),
-                    None => engine.process(drive, sense, rows),
-                };
+            group.fronts.clear();
+            let front = fast.fronts(drive, sense, &mut group.fronts);
+            // An overflow at the sample rate is after the periods that came before it.
+            if let Err(overflowed) = front {
+                for (k, _) in group.members.engines() {
+                    if let Some(result) = results.get_mut(k) {
+                        *result = Err(overflowed.clone());
+                    }
+                }
             }
+            group.members.follow(&group.fronts, rows, |k, overflowed| {
+                if let Some(result) = results.get_mut(k) {
+                    *result = Err(overflowed);
+                }
+            });
         }
         results
     }

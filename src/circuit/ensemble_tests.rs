@@ -1,27 +1,36 @@
 //! Every design of an ensemble against the same design alone, over random designs.
 
 use super::Ensemble;
+use crate::circuit::block_kernel::Instructions;
 use crate::circuit::block_kernel::tests::{Draw, codes, design};
 use crate::circuit::engine::{self, ArithmeticKind};
 use crate::design::{Design, limits};
-use crate::numeric::format::Overflow;
+use crate::numeric::format::{Overflow, Rounding};
 
-/// The design with other words after the decimator's sums.
+/// The design with other words at one place after the codes, or at none.
 fn varied(draw: &mut Draw, design: &Design) -> Design {
     let mut other = design.clone();
+    let place = draw.within(0, 14);
     let circuit = &mut other.circuit;
-    circuit.decimator.output.format.fraction_bits = draw.within(4, 22);
-    if draw.within(0, 3) == 0 {
-        circuit.decimator.output.overflow = Overflow::Error;
-    }
-    circuit.cordic.iterations = draw.within(6, 24);
-    circuit.cordic.guard_bits = draw.within(0, 8);
-    if draw.within(0, 3) == 0 {
-        other.compensation = None;
-    }
-    if draw.within(0, 3) == 0 {
-        // Another front.
-        other.circuit.nco.tuning_word ^= 1;
+    let (output, cordic) = (&mut circuit.decimator.output, &mut circuit.cordic);
+    match place {
+        0 => circuit.nco.tuning_word ^= 1,
+        1 => output.format.fraction_bits = draw.within(4, 22),
+        2 => output.rounding = Rounding::Floor,
+        3 => output.overflow = Overflow::Error,
+        4 => output.overflow = Overflow::Wrap,
+        5 => cordic.iterations = draw.within(6, 24),
+        6 => cordic.guard_bits = draw.within(0, 8),
+        7 => cordic.width -= draw.within(0, 6),
+        8 => cordic.angle_bits -= draw.within(1, 3),
+        9 => cordic.gain_bits -= draw.within(1, 6),
+        10 => other.compensation = None,
+        11 | 12 => {
+            if let Some(compensation) = &mut other.compensation {
+                compensation.output.format.fraction_bits = draw.within(3, 9);
+            }
+        }
+        _ => (),
     }
     other
 }
@@ -29,10 +38,20 @@ fn varied(draw: &mut Draw, design: &Design) -> Design {
 #[test]
 fn an_ensemble_is_its_designs_alone() {
     let (mut compared, mut shared, mut stopped) = (0, 0, 0);
+    // Members that take their combs and their CORDIC from another.
+    let mut by_stages = [0, 0];
     for case in 0..300u64 {
         let mut draw = Draw(case << 32 | 77);
         let first = design(&mut draw);
-        let designs = (0..6).map(|_| varied(&mut draw, &first));
+        let designs = (0..6).map(|k| {
+            // Every other one differs in two places, perhaps.
+            let one = varied(&mut draw, &first);
+            if k % 2 == 0 {
+                one
+            } else {
+                varied(&mut draw, &one)
+            }
+        });
         let designs: Vec<Design> = std::iter::once(first.clone())
             .chain(designs)
             .filter(|d| limits::check(d).is_ok())
@@ -44,6 +63,10 @@ fn an_ensemble_is_its_designs_alone() {
         for kind in [ArithmeticKind::Fixed, ArithmeticKind::Float] {
             let mut ensemble = Ensemble::new(&designs, kind);
             shared += usize::from(ensemble.groups.len() < designs.len());
+            for group in &ensemble.groups {
+                let [combs, cordics] = group.members.shared();
+                by_stages = [by_stages[0] + combs, by_stages[1] + cordics];
+            }
             let mut rows = ensemble.no_rows();
             let mut results: Vec<Result<(), _>> = designs.iter().map(|_| Ok(())).collect();
             for (d, s) in drive.chunks(piece).zip(sense.chunks(piece)) {
@@ -71,4 +94,8 @@ fn an_ensemble_is_its_designs_alone() {
         compared > 4000 && shared > 200 && stopped > 4,
         "{compared} {shared} {stopped}"
     );
+    // Without SIMD each makes its rows one by one.
+    let [combs, cordics] = by_stages;
+    let staged = Instructions::best(true) != Instructions::Plain;
+    assert!(!staged || combs > cordics && cordics > 100, "{by_stages:?}");
 }

@@ -12,7 +12,7 @@
 //!
 //! [`chain`] wires the blocks; [`engine`] runs a chain in the arithmetic and the lanes that fit it,
 //! the sample rate by [`block_kernel`] where that applies, without quantisation by `float_kernel`; [`ensemble`] runs many designs
-//! over the same codes and does once what they share.
+//! over the same codes and does once what they share, after the sample rate by [`followers`].
 //! The behaviour is that of `docs/manual.md`, step by step.
 
 pub mod amplitude_loop;
@@ -27,6 +27,7 @@ mod ends;
 pub mod engine;
 pub mod ensemble;
 mod float_kernel;
+pub mod followers;
 pub mod in_range;
 pub mod nco;
 pub mod phase_loop;

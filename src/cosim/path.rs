@@ -3,6 +3,7 @@
 use super::inexact::Inexact;
 use super::rest::{self, Rest};
 use crate::circuit::engine::{self, ArithmeticKind, Engine, Rows};
+use crate::circuit::followers::Followers;
 use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::numeric::fixed::Overflowed;
@@ -34,7 +35,10 @@ pub struct RealRow {
 pub struct Path {
     engine: Box<dyn Engine>,
     /// Circuits that are alike in what is done at the sample rate and in how they excite the gyro.
-    others: Vec<Other>,
+    others: Followers,
+    /// Of these, by their places.
+    other_units: Vec<Units>,
+    other_rows: Vec<Rows>,
     kind: ArithmeticKind,
     /// The gyro.
     pub gyroscope: Gyroscope,
@@ -53,13 +57,6 @@ pub struct Path {
     /// What the last period's samples were taken under.
     last_drive: Drive,
     sample: u64,
-}
-
-/// A circuit that takes its sample rate from another.
-struct Other {
-    engine: Box<dyn Engine>,
-    units: Units,
-    rows: Rows,
 }
 
 /// From a row's columns to physical units.
@@ -155,7 +152,9 @@ impl Path {
         Path {
             rows: engine.no_rows(),
             engine,
-            others: Vec::new(),
+            others: Followers::default(),
+            other_units: Vec::new(),
+            other_rows: Vec::new(),
             kind,
             gyroscope: Gyroscope::new(&design.gyro, run, reference),
             converters: [Channel::Drive, Channel::Sense]
@@ -180,18 +179,15 @@ impl Path {
     /// Has another design's circuit make rows of the same run, before the first period: one that
     /// [shares the closed loop](crate::circuit::ensemble::share_a_closed_loop) with this, around the same gyro.
     pub fn share_with(&mut self, design: &Design) {
-        let engine = engine::engine(design, self.kind);
-        self.others.push(Other {
-            rows: engine.no_rows(),
-            engine,
-            units: Units::new(design, self.kind),
-        });
+        self.others.add(design, self.kind, self.other_units.len());
+        self.other_units.push(Units::new(design, self.kind));
+        self.other_rows.push(self.engine.no_rows());
     }
 
     /// The rows of those circuits for the last period, in the order in which they came.
     pub fn other_rows(&self) -> impl Iterator<Item = RealRow> {
-        let row = |o: &Other| o.units.row(&o.rows, self.last_drive);
-        self.others.iter().map(row)
+        let others = self.other_units.iter().zip(&self.other_rows);
+        others.map(|(units, rows)| units.row(rows, self.last_drive))
     }
 
     /// Puts gyro, loops and decimator into the steady state under `conditions`: the loops are held at
@@ -220,8 +216,8 @@ impl Path {
 
     fn hold(&mut self, rest: Rest) {
         self.engine.hold(rest.held);
-        for other in &mut self.others {
-            other.engine.hold(rest.held);
+        for (_, engine) in self.others.engines() {
+            engine.hold(rest.held);
         }
     }
 
@@ -284,12 +280,16 @@ impl Path {
         .map_err(stopped)?;
         self.last_drive = drive;
         if !self.others.is_empty() {
+            self.other_rows.iter_mut().for_each(clear);
+            let mut result = Ok(());
             let front = [self.engine.front()];
-            for other in &mut self.others {
-                clear(&mut other.rows);
-                let followed = other.engine.follow(&front, &mut other.rows);
-                followed.map_err(stopped)?;
-            }
+            self.others
+                .follow(&front, &mut self.other_rows, |_, overflowed| {
+                    if result.is_ok() {
+                        result = Err(stopped(overflowed));
+                    }
+                });
+            result?;
         }
         Ok(self.units.row(&self.rows, drive))
     }

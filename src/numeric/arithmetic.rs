@@ -108,6 +108,22 @@ pub trait Arithmetic: Sized {
     fn cast(&self, a: Self::Word, cast: &Cast, operands: &[Self::Word]) -> Self::Word;
     /// Modulo 2^bits LSB, two's complement: a cyclic quantity, in every arithmetic.
     fn wrap(&self, a: Self::Word, bits: u32, fraction_bits: i32) -> Self::Word;
+    /// [`Arithmetic::wrap`] of a word that ranges may have proved to be inside; `idle` where they have.
+    #[inline(always)]
+    fn wrap_unless(&self, _idle: bool, a: Self::Word, bits: u32, fraction_bits: i32) -> Self::Word {
+        self.wrap(a, bits, fraction_bits)
+    }
+    /// [`Arithmetic::wrap`] of a word that nothing but sums and such wraps take until it is
+    /// [`settled`](Arithmetic::settled): an arithmetic may put the wrap off until then.
+    #[inline(always)]
+    fn wrap_in_sum(&self, a: Self::Word, bits: u32, fraction_bits: i32) -> Self::Word {
+        self.wrap(a, bits, fraction_bits)
+    }
+    /// The word after the last [`Arithmetic::wrap_in_sum`] to `bits`.
+    #[inline(always)]
+    fn settled(&self, a: Self::Word, _bits: u32) -> Self::Word {
+        a
+    }
     /// Limited to `low ..= high` LSB: a limit that belongs to the circuit's function, in every
     /// arithmetic.
     fn limit(&self, a: Self::Word, low: i128, high: i128, fraction_bits: i32) -> Self::Word;

@@ -7,11 +7,28 @@
 use dashu_float::FBig;
 use dashu_float::round::mode::HalfEven;
 use dashu_int::IBig;
+use std::collections::BTreeMap;
+use std::sync::{Mutex, PoisonError};
 
 type Real = FBig<HalfEven, 2>;
 
 /// Bits of the working precision.
 const PRECISION: usize = 256;
+
+/// Constants that have been decided, by what they depend on.
+type Decided = Mutex<BTreeMap<(u32, u32), i64>>;
+
+/// The constant of `key`, decided at its first use: a search asks for the same few with every design, and each
+/// takes about 0.1 ms.
+fn once(decided: &Decided, key: (u32, u32), decide: impl FnOnce() -> i64) -> i64 {
+    let known = || decided.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(constant) = known().get(&key) {
+        return *constant;
+    }
+    let constant = decide();
+    known().insert(key, constant);
+    constant
+}
 
 fn real(value: i128) -> Real {
     Real::from(IBig::from(value))
@@ -73,27 +90,31 @@ fn sine_entry(k: usize, count: usize, peak: i64) -> i64 {
 
 /// Entry i is the integer nearest to `atan(2^-i) / (2 pi) * 2^angle_bits`.
 pub fn arc_tangents(iterations: u32, angle_bits: u32) -> Vec<i64> {
-    let turn = pi() * real(2);
+    static DECIDED: Decided = Mutex::new(BTreeMap::new());
+    let decide = |i| {
+        if i == 0 {
+            return 1i64 << (angle_bits - 3);
+        }
+        let tangent = real(1) / power_of_two(i);
+        nearest(&(tangent.atan() * power_of_two(angle_bits) / (pi() * real(2)))) as i64
+    };
     (0..iterations)
-        .map(|i| {
-            if i == 0 {
-                return 1i64 << (angle_bits - 3);
-            }
-            let tangent = real(1) / power_of_two(i);
-            nearest(&(tangent.atan() * power_of_two(angle_bits) / &turn)) as i64
-        })
+        .map(|i| once(&DECIDED, (i, angle_bits), || decide(i)))
         .collect()
 }
 
 /// The integer nearest to `2^gain_bits / prod over i = 0..n-1 of sqrt(1 + 4^-i)`: what a CORDIC
 /// magnitude after n iterations is multiplied by.
 pub fn cordic_gain(iterations: u32, gain_bits: u32) -> i64 {
-    let mut square = real(1);
-    for i in 0..iterations {
-        square *= real(1) + real(1) / power_of_two(2 * i);
-    }
-    let root = dashu_float::ops::SquareRoot::sqrt(&square);
-    nearest(&(power_of_two(gain_bits) / root)) as i64
+    static DECIDED: Decided = Mutex::new(BTreeMap::new());
+    once(&DECIDED, (iterations, gain_bits), || {
+        let mut square = real(1);
+        for i in 0..iterations {
+            square *= real(1) + real(1) / power_of_two(2 * i);
+        }
+        let root = dashu_float::ops::SquareRoot::sqrt(&square);
+        nearest(&(power_of_two(gain_bits) / root)) as i64
+    })
 }
 
 #[cfg(test)]

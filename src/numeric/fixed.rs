@@ -144,6 +144,22 @@ impl<W: HasKernel, R: Lane, const IDLE: bool> Arithmetic for Fixed<W, R, IDLE> {
         a.sign_extend(bits.min(W::BITS))
     }
     #[inline(always)]
+    fn wrap_unless(&self, idle: bool, a: W, bits: u32, fraction_bits: i32) -> W {
+        if idle {
+            return a;
+        }
+        self.wrap(a, bits, fraction_bits)
+    }
+    #[inline(always)]
+    fn wrap_in_sum(&self, a: W, _bits: u32, _fraction_bits: i32) -> W {
+        // A lane has at least as many bits, and sums keep the low ones.
+        a
+    }
+    #[inline(always)]
+    fn settled(&self, a: W, bits: u32) -> W {
+        self.wrap(a, bits, 0)
+    }
+    #[inline(always)]
     fn limit(&self, a: W, low: i128, high: i128, _fraction_bits: i32) -> W {
         a.clamp(W::saturated(low), W::saturated(high))
     }

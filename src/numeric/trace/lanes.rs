@@ -43,6 +43,23 @@ impl Program {
         let (low, high) = self.casts[number].limits();
         self.cast_ranges[number].is_some_and(|r| r.is_within(low, high))
     }
+
+    /// By what the first loop of a function carries: true where an iteration ends with a wrap of it that never
+    /// changes a word.
+    pub fn idle_wraps(&self, function: &str) -> Vec<bool> {
+        let Some(function) = self.function(function) else {
+            return Vec::new();
+        };
+        let is_idle = |id: &usize| match function.nodes[*id].op {
+            Op::Wrap(before, bits) => {
+                let all = Interval::of_bits(bits);
+                function.nodes[before].range.is_within(all.low, all.high)
+            }
+            _ => false,
+        };
+        let first = function.loops.first();
+        first.map_or(Vec::new(), |l| l.outs.iter().map(is_idle).collect())
+    }
 }
 
 /// The bits of what a cast computes on the way from a word in `before` to its result.
