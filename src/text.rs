@@ -134,8 +134,15 @@ pub fn away_from_zero_decimals(value: f64, decimals: usize) -> String {
     let sign = if value < 0.0 { "-" } else { "" };
     match nearest.parse::<f64>() {
         Ok(below) if below < value.abs() => {
-            let step = 10f64.powi(decimals as i32).recip();
-            format!("{sign}{:.decimals$}", below + step)
+            let mut step = 10f64.powi(decimals as i32).recip();
+            loop {
+                let above = format!("{:.decimals$}", below + step);
+                // Of a large value the last decimals are beyond what a number holds, and one step may be none.
+                if above.parse().is_ok_and(|above: f64| above >= value.abs()) || !step.is_finite() {
+                    return format!("{sign}{above}");
+                }
+                step *= 2.0;
+            }
         }
         _ => format!("{sign}{nearest}"),
     }

@@ -362,7 +362,7 @@ fn print(c: &Closure, compared: Option<&Emitted>, controls: Option<&Controls>, o
     );
     if let Some(rms) = c.firmware.heldout_rms {
         say!(
-            "firmware, bit for bit: held-out rms {rms:.5} {}",
+            "firmware's model, bit for bit (--verify compiles and compares): held-out rms {rms:.5} {}",
             c.unit_text()
         );
     } else if c.unit == "deg/s" {
@@ -405,7 +405,7 @@ fn sentence(c: &Closure) -> String {
             )
         }
         Verdict::Unexplained => {
-            format!("unexplained: structure is left that no candidate earns{channel}")
+            format!("unexplained: something is left that none of the known effects makes{channel}")
         }
     }
 }

@@ -113,7 +113,7 @@ fn remarks(design: &Design, part: Part, asked: bool) -> Vec<String> {
             false => "the embedded default's, published for its simulated gyro",
         };
         remarks.push(format!(
-            "note: the coefficients of [compensation] are {whose}, not fitted to a record: `gyrogen run` fits them and \
+            "warning: the coefficients of [compensation] are {whose}, not fitted to a record: `gyrogen run` fits them and \
              writes a design.toml to emit from"
         ));
     }

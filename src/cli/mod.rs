@@ -113,9 +113,21 @@ fn with_advice(mut error: clap::Error) -> clap::Error {
         Some(ContextValue::String(argument)) => argument.clone(),
         _ => return error,
     };
-    if error.kind() == ErrorKind::UnknownArgument && !argument.starts_with('-') {
-        let advice = "a record is given with --record FILE, a capture with --capture FILE, a folder for results with --out DIR; the \
-                      design is the file without an option";
+    if error.kind() != ErrorKind::UnknownArgument {
+        return error;
+    }
+    let advice = match argument.as_str() {
+        "--record" => "records are taken by `run` and `close`",
+        "--capture" => "captures are taken by `replay`, `equiv` and `close`",
+        // A similar option, if there is one, is named beside this.
+        option if option.starts_with('-') => "",
+        _ => {
+            "a record is given with --record FILE, a capture with --capture FILE, a folder for results with --out DIR; the \
+             design is the one file without an option"
+        }
+    };
+    error.remove(ContextKind::Suggested);
+    if !advice.is_empty() {
         let advice = vec![advice.into()];
         error.insert(ContextKind::Suggested, ContextValue::StyledStrs(advice));
     }

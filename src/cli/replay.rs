@@ -10,7 +10,7 @@ use crate::output::name_of;
 use crate::record::capture::{CaptureReader, mismatch_warnings};
 use crate::record::replayed::Replayed;
 use crate::record::rows::{Kind, RowWriter};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// Run captured ADC codes through the circuit: one row of its words for each decimated sample.
@@ -53,6 +53,33 @@ impl From<Arith> for ArithmeticKind {
 /// ADC samples that are read, processed and written at a time.
 const BLOCK: usize = 1 << 14;
 
+/// Refuses a file in the place of the rows that is none of an earlier replay.
+fn refuse_foreign(out: &Path, header: &[&str]) -> Result<()> {
+    use std::io::Read;
+    // What is no regular file is the writer's to refuse.
+    if !std::fs::metadata(out).is_ok_and(|m| m.is_file() && m.len() > 0) {
+        return Ok(());
+    }
+    let mut start = Vec::new();
+    let opened = std::fs::File::open(out);
+    let read = opened.and_then(|f| f.take(256).read_to_end(&mut start));
+    let array = format!(", {})", header.len());
+    let start = String::from_utf8_lossy(&start);
+    // Designs differ in the columns at the end.
+    let is_csv = start.starts_with("index,drive_i,");
+    let is_npy = start.contains("NUMPY")
+        && (start.contains(&array) || start.contains("'<i8'") || start.contains("'<f8'"));
+    if read.is_err() || is_csv || is_npy {
+        return Ok(());
+    }
+    Err(crate::error::InputError::new(
+        "this file is there, and is no result of an earlier `replay`",
+    )
+    .in_file(out)
+    .help("name another file with --out, or move this one away")
+    .into())
+}
+
 /// Runs the command.
 ///
 /// # Errors
@@ -74,6 +101,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         ArithmeticKind::Fixed => Kind::Integer,
         ArithmeticKind::Float => Kind::Float,
     };
+    refuse_foreign(&arguments.out, &header)?;
     let mut writer = RowWriter::create(&arguments.out, &header, written)?;
 
     let mut engine = engine::engine(&design, kind);

@@ -153,6 +153,12 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
     }
     super::terminal::numbers(&mut table, 1..);
     super::terminal::show(&table);
+    if s.warnings.iter().any(|w| w.code == "heating_cooling_loop") {
+        say!(
+            "The peak to peak is of means over bins of temperature, in which heating and cooling cancel: see the warning on their \
+             loop."
+        );
+    }
     say!(
         "fit in {}: {}. Rows that the fit has not seen are {:.4} deg/s rms from it, where noise alone makes {:.4}.",
         s.fit.thermometer,

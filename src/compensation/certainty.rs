@@ -323,7 +323,7 @@ pub fn sentences(design: &Design, bounds: &Bounds) -> Vec<String> {
     }
     if let Some(outside) = &bounds.outside {
         lines.push(format!(
-            "Outside the calibrated inputs {}. At some input word the bias is then {} deg/s from the continued polynomial.",
+            "Outside the calibrated inputs {}. Nothing was measured there; the continued polynomial is up to {} deg/s away.",
             match outside.contract {
                 "clamp" => "the bias keeps its value at the nearer end (clamp)".to_owned(),
                 "hold_slope" => "the bias goes on with the nearer end's slope (hold_slope)".to_owned(),

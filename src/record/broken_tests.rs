@@ -279,6 +279,16 @@ fn broken_records_are_refused_with_their_place() {
             Some((11, 1)),
             &[
                 "time decreases: 7.5 s after 8 s (line 10)",
+                "only this time is out of order",
+            ],
+        ),
+        (
+            "time decreases, and no row shows that it goes on",
+            with_row(19, "7.5,0.1,39"),
+            plain.clone(),
+            Some((21, 1)),
+            &[
+                "time decreases: 7.5 s after 18 s (line 20)",
                 "time_since_power_on_s",
             ],
         ),

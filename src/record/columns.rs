@@ -1,7 +1,7 @@
 //! Which column of a file plays which part (`docs/manual.md`, "Thermal records").
 
 use super::cells::{self, Cell};
-use super::guesses::suggestion;
+use super::guesses::{self, suggestion};
 use super::warning::Warning;
 use crate::design::RecordMapping;
 pub use crate::design::record_columns::{KNOWN, THERMOMETERS, is_known, unit_of};
@@ -219,6 +219,19 @@ fn converted(
                             a.name, b.name
                         ),
                         "rename the column, or correct the unit in [record.columns]".to_owned(),
+                    )
+                    .into());
+            }
+            if asked.is_none() && stated.is_none() && guesses::is_of_codes(name) {
+                return Err(line
+                    .error(
+                        1,
+                        format!("column \"{name}\" holds raw codes by its name, and {role} is in {}", unit_of(role)),
+                        format!(
+                            "multiply it by the sensor's scale first; if it is no code, say its unit: {role} = {{ column = \"{name}\", \
+                             unit = \"{}\" }}",
+                            unit_of(role)
+                        ),
                     )
                     .into());
             }

@@ -3,8 +3,20 @@
 use super::columns::{THERMOMETERS, is_known, unit_of};
 use crate::design::units;
 
+/// Ends of names that say that a column holds an ADC's or a register's codes.
+const CODES: [&str; 6] = ["lsb", "raw", "counts", "count", "codes", "code"];
+
+/// The name says that the column is in no unit but in codes.
+pub(super) fn is_of_codes(name: &str) -> bool {
+    let lower = name.trim().to_lowercase();
+    let mut words = lower
+        .rsplit(|c: char| !c.is_alphanumeric())
+        .filter(|w| !w.is_empty());
+    words.next().is_some_and(|last| CODES.contains(&last)) && words.next().is_some()
+}
+
 /// The column among `names` that is likely meant for `role`, as names of columns go.
-pub(super) fn guess<'a>(role: &str, names: &[&'a str]) -> Option<&'a str> {
+pub fn guess<'a>(role: &str, names: &[&'a str]) -> Option<&'a str> {
     guesses(role, names).first().copied()
 }
 
@@ -30,6 +42,7 @@ pub(super) fn guesses<'a>(role: &str, names: &[&'a str]) -> Vec<&'a str> {
     };
     let others = |name: &&&str| {
         **name != "time_since_power_on_s"
+            && !is_of_codes(name)
             && (unit_of(role) != "deg/s" || !is_heat(&name.to_lowercase()))
     };
     let of = |hint: &&str| -> Vec<&'a str> {

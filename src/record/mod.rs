@@ -30,7 +30,7 @@ mod dataflash;
 mod dead;
 mod error_values;
 mod frozen;
-mod guesses;
+pub mod guesses;
 mod lines;
 mod log_bytes;
 mod log_clock;

@@ -1,6 +1,6 @@
 //! A thermal record: rows of averaged readings.
 
-use crate::design::record_columns;
+use crate::design::{record_columns, units};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -75,7 +75,15 @@ impl ThermalRecord {
     /// How a column's unit is said in the design, with the file's own name of the column.
     pub(super) fn unit_in_design(&self, column: &str, unit: &str) -> String {
         let named = self.renamed.get(column).map_or(column, String::as_str);
-        format!("[record.columns] {column} = {{ column = {named:?}, unit = \"{unit}\" }}")
+        match units::stated(named, column) {
+            // Two statements that contradict each other are refused.
+            Some(said) if said.name != unit => format!(
+                "its name says {}, so rename the column in the file, such as to \"x\", and write [record.columns] {column} = \
+                 {{ column = \"x\", unit = \"{unit}\" }}",
+                said.name
+            ),
+            _ => format!("[record.columns] {column} = {{ column = {named:?}, unit = \"{unit}\" }}"),
+        }
     }
 
     /// True without rows; [`super::read`] gives no such record.

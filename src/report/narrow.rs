@@ -39,11 +39,21 @@ fn headings(head: &str) -> Vec<String> {
             let text = text.split("</th>").next().unwrap_or("");
             let (name, small) = text.split_once("<small>").unwrap_or((text, ""));
             match small.split("</small>").next() {
-                Some("") | None => name.to_owned(),
-                Some(unit) => format!("{name} ({unit})"),
+                Some("") | None => without_marks(name),
+                Some(unit) => without_marks(&format!("{name} ({unit})")),
             }
         })
         .collect()
+}
+
+/// A heading as an attribute can have it: no marks, a power behind `^`.
+fn without_marks(text: &str) -> String {
+    let text = text.replace("<sup>", "^");
+    let mut parts = text.split('<');
+    let first = parts.next().unwrap_or("").to_owned();
+    parts.fold(first, |text, part| {
+        text + part.split_once('>').map_or("", |p| p.1)
+    })
 }
 
 fn cells(out: &mut String, body: &str, headings: &[String]) {

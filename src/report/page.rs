@@ -220,12 +220,16 @@ fn headline(shown: &Shown) -> String {
         (false, false) => "does not carry",
     };
     format!(
-        "Bias drift over temperature {change} from {} to {} deg/s peak to peak ({} of what it was), \
+        "Bias drift over temperature {change} from {} to {} deg/s peak to peak ({} of what it was; means over bins of temperature{}), \
          computed in fixed point; the emitted {} {verdict} the model's bits: {} in {} words \
          compared. What is left: {}.",
         fixed(before, decimals),
         fixed(after, decimals),
         percent(after, before),
+        match s.warnings.iter().any(|w| w.code == "heating_cooling_loop") {
+            true => ", in which heating and cooling cancel: see the warning on their loop",
+            false => "",
+        },
         s.built(),
         mismatches(s.equivalence.mismatches),
         grouped(s.equivalence.compared),

@@ -110,19 +110,20 @@ pub fn extremes(values: &[f64]) -> Option<(f64, f64)> {
 /// White noise gives its own standard deviation; noise with memory gives less (an AR(1) with
 /// coefficient r: sqrt(1 - r) of it); a trend gives nothing. Same unit as the values.
 pub fn difference_noise(values: &[f64]) -> f64 {
-    let measured: Vec<f64> = values.iter().copied().filter(|v| !v.is_nan()).collect();
-    let differences: Vec<f64> = measured.windows(2).map(|w| w[1] - w[0]).collect();
+    // In place: a long record is not copied twice.
+    let mut differences = measured(values);
+    for k in 1..differences.len() {
+        differences[k - 1] = differences[k] - differences[k - 1];
+    }
+    differences.pop();
     if differences.is_empty() {
         return f64::NAN;
     }
     let centre = median(&differences);
     let limit = 5.0 * robust_std(&differences);
-    let kept: Vec<f64> = differences
-        .iter()
-        .map(|d| d - centre)
-        .filter(|d| d.abs() <= limit)
-        .collect();
-    rms(&kept) / std::f64::consts::SQRT_2
+    differences.iter_mut().for_each(|d| *d -= centre);
+    differences.retain(|d| d.abs() <= limit);
+    rms(&differences) / std::f64::consts::SQRT_2
 }
 
 /// As [`difference_noise`], from second differences / sqrt(6): blind to a slope that changes

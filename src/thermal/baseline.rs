@@ -8,6 +8,7 @@ use crate::design::{FitOptions, FitOrder, RecordMapping};
 use crate::error::{InputError, Result};
 use crate::numeric::polynomial;
 use crate::record::columns::{self, THERMOMETERS};
+use crate::record::guesses::guess;
 use crate::record::thermal::LEAST_ROWS;
 use crate::record::{ThermalRecord, Warning};
 use crate::statistics::correlation::{NoiseModel, Rows};
@@ -201,7 +202,8 @@ fn without_thermometer(record: &ThermalRecord, has: &[&str]) -> String {
     }
     format!(
         "the file has: {columns}\n  say in the design (these lines are a whole one) which one it is:\n    [record.columns]\n    die_degc = \
-         \"NAME_IN_THE_FILE\""
+         \"{}\"",
+        guess("die_degc", has).unwrap_or("NAME_IN_THE_FILE")
     )
 }
 

@@ -6,7 +6,7 @@ use super::product;
 use super::target::{self, Target};
 use super::toolchain::{self, Harness};
 use crate::emit::views::Language;
-use crate::error::{InputError, Result, io_error};
+use crate::error::{Error, InputError, Result, io_error};
 use crate::firmware::files::EmittedFile;
 use crate::firmware::folder::Folder;
 use crate::firmware::manifest::{self, Manifest};
@@ -142,16 +142,28 @@ pub fn verify(
             }
             crate::output::write_whole(&to, &folder.read(source)?)?;
         }
-        let harness = match target::build(target, made.path(), &sources)? {
-            Some(emulated) => emulated,
-            None => toolchain::build(language, &manifest.prefix, made.path(), &sources)?,
-        };
-        let status = harness.run(&["selftest".to_owned()], Vec::new(), (1, 64), &mut |_| ())?;
-        selftest = Some(status == Some(0));
-        toolchain_name = harness.toolchain.clone();
-        run.all(&harness)?;
-        let empty = run.functions.iter().filter(|f| f.compared == 0);
-        problems.extend(empty.map(|f| format!("nothing of `{}` was compared", f.name)));
+        let built =
+            target::build(target, made.path(), &sources).and_then(|emulated| match emulated {
+                Some(emulated) => Ok(emulated),
+                None => toolchain::build(language, &manifest.prefix, made.path(), &sources),
+            });
+        match built {
+            Ok(harness) => {
+                let status =
+                    harness.run(&["selftest".to_owned()], Vec::new(), (1, 64), &mut |_| ())?;
+                selftest = Some(status == Some(0));
+                toolchain_name = harness.toolchain.clone();
+                run.all(&harness)?;
+                let empty = run.functions.iter().filter(|f| f.compared == 0);
+                problems.extend(empty.map(|f| format!("nothing of `{}` was compared", f.name)));
+            }
+            // Which file was changed says more than what a compiler thinks of it.
+            Err(Error::Check(_)) if !changed_files.is_empty() => {
+                toolchain_name = String::from("none: the changed files do not compile");
+                problems.push("the changed files do not compile".to_owned());
+            }
+            Err(error) => return Err(error),
+        }
     } else {
         run.tables_alone(&mut problems)?;
     }

@@ -388,7 +388,10 @@ fn banners(manifest: &Manifest, folder: &Folder, problems: &mut Vec<String>) {
             manifest.part != PRODUCT || !paths::PARTS.contains(&folder)
         })
     {
-        let text = folder.read_text(&file.path).unwrap_or_default();
+        // A file that is missing is told as such.
+        let Ok(text) = folder.read_text(&file.path) else {
+            continue;
+        };
         if !text.lines().take(3).any(|line| line.contains(&banner)) {
             problems.push(format!(
                 "{} does not say that it comes from the manifest's command and design",

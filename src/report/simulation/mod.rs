@@ -96,7 +96,7 @@ fn headline(outcome: &Outcome) -> String {
             percent(after.fixed.drift_pp_dps, before)
         ),
         None => format!(
-            "Drive at {drive}: the rate output's error goes over {} deg/s.",
+            "Drive at {drive}: the rate output's error varies by {} deg/s, peak to peak.",
             significant(before, 4)
         ),
     }

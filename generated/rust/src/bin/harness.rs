@@ -448,6 +448,12 @@ fn rows(input: &mut impl BufRead, skip: usize) -> Vec<Vec<u64>> {
     rows
 }
 
+/// Of what is held against one checksum, which covers `what`.
+fn by_checksum(name: &str, what: &str, good: bool) -> bool {
+    println!("{name}: {}, {what} by a checksum", if good { "pass" } else { "FAIL" });
+    good
+}
+
 fn verdict(name: &str, compared: u64, differing: u64) -> bool {
     let good = compared > 0 && differing == 0;
     println!("{name}: {}, {compared} compared, {differing} differ", if good { "pass" } else { "FAIL" });
@@ -517,11 +523,11 @@ fn check(name: &str, input: &mut impl BufRead) -> bool {
     match name {
         "every" => {
             let exhausted = FUNCTIONS.iter().filter(|f| !f.domain.is_empty());
-            exhausted.map(|f| verdict(f.name, 1, u64::from(every(f) != f.every))).fold(true, |all, good| all && good)
+            exhausted.map(|f| by_checksum(f.name, "every input", every(f) == f.every)).fold(true, |all, good| all && good)
         }
         "tables" => check_tables(input),
         "chain" => check_chain(input),
-        "long" => verdict("long", 1000000, u64::from(long_run() != 0x121093298435d32c)),
+        "long" => by_checksum("long", "a run of 1000000 samples", long_run() == 0x121093298435d32c),
         _ => false,
     }
 }
