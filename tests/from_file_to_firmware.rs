@@ -81,7 +81,7 @@ fn a_record_of_each_kind_becomes_compiled_firmware() {
                 "time_s = \"time\"",
                 "rate_out_dps = \"gyro_z\"",
                 "die_degc = \"temp\"",
-                "--design FILE",
+                "gyrogen run gyro.toml --record",
             ] {
                 assert!(complaints.contains(key), "{key}: {complaints}");
             }
