@@ -291,7 +291,8 @@ fn overflow_stops_in_samples_after_the_last_period() {
 fn existing_files_are_replaced_whole_or_stay() {
     let mut rng = Rng::new(1);
     let good = CsvStyle::default().print(&mut rng, &golden::capture(64));
-    let old = "old contents, longer than the new ones\n".repeat(100);
+    let old = "index,drive_i,drive_q\n".to_owned()
+        + &"of an earlier replay, longer than the new one\n".repeat(100);
 
     let case = Case::new(&golden_text(), "capture.csv", &good);
     std::fs::write(case.path("out.csv"), &old).expect("a writable folder");
@@ -301,6 +302,14 @@ fn existing_files_are_replaced_whole_or_stay() {
     let text = case.read("out.csv").expect("an output");
     assert!(text.starts_with("index,") && text.lines().count() == 2);
     assert_eq!(case.files(), ["capture.csv", "design.toml", "out.csv"]);
+
+    // What no replay has written is the user's.
+    let own = "time_s,die_degc,rate_out_dps\n0,25,0.5\n";
+    std::fs::write(case.path("out.csv"), own).expect("a writable folder");
+    let refused = case.run("out.csv", None);
+    refused.expect_status(2).expect("a refusal");
+    assert!(refused.stderr.contains("no result of an earlier"));
+    assert_eq!(case.read("out.csv").expect("the user's file"), own);
 
     let stopping = Case::new(&stopping_text(), "capture.csv", &good);
     let refused = Case::new(
