@@ -29,7 +29,7 @@ pub(super) fn in_words(value: f64) -> String {
 }
 
 impl Input {
-    /// x as a formula in the column, to [`SHOWN_DIGITS`]: `(die_degc - 25) / 40`.
+    /// x as a formula in the column, to nine digits: `(die_degc - 25) / 40`.
     pub fn formula(&self) -> String {
         let sign = if self.offset < 0.0 { '+' } else { '-' };
         let scale = match self.scale < 0.0 {
