@@ -22,6 +22,36 @@ fn what_nobody_holds_is_swept_and_nothing_else() {
 
 #[cfg(unix)]
 #[test]
+fn what_is_made_while_others_sweep_stays() {
+    let top = tempfile::tempdir().unwrap();
+    let sweepers_end = std::sync::atomic::AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        for _ in 0..4 {
+            scope.spawn(|| {
+                while !sweepers_end.load(std::sync::atomic::Ordering::Relaxed) {
+                    sweep(top.path());
+                }
+            });
+        }
+        let mut held = Vec::new();
+        for _ in 0..400 {
+            held.push((
+                TemporaryFolder::new(top.path()).unwrap(),
+                TemporaryFile::new(top.path()).unwrap(),
+            ));
+        }
+        sweepers_end.store(true, std::sync::atomic::Ordering::Relaxed);
+        std::thread::sleep(std::time::Duration::from_millis(50));
+        let lost = held
+            .iter()
+            .filter(|(folder, file)| !folder.path().exists() || !file.file.path().exists())
+            .count();
+        assert_eq!(lost, 0);
+    });
+}
+
+#[cfg(unix)]
+#[test]
 fn a_child_that_is_dropped_ends_with_all_that_it_started() {
     let top = tempfile::tempdir().unwrap();
     let mark = top.path().join("mark");

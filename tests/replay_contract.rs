@@ -310,6 +310,19 @@ fn existing_files_are_replaced_whole_or_stay() {
     refused.expect_status(2).expect("a refusal");
     assert!(refused.stderr.contains("no result of an earlier"));
     assert_eq!(case.read("out.csv").expect("the user's file"), own);
+    // So is an array of the same numbers with other columns.
+    let dictionary = "{'descr': '<i8', 'fortran_order': False, 'shape': (2, 3), }";
+    let own = [npy_header(1, dictionary), vec![7; 48]].concat();
+    std::fs::write(case.path("out.npy"), &own).expect("a writable folder");
+    let refused = case.run("out.npy", None);
+    refused.expect_status(2).expect("a refusal");
+    assert_eq!(std::fs::read(case.path("out.npy")).expect("theirs"), own);
+    std::fs::remove_file(case.path("out.npy")).expect("a writable folder");
+    for _ in 0..2 {
+        let again = case.run("out.npy", None);
+        again.expect_status(0).expect("a replay over a replay");
+    }
+    std::fs::remove_file(case.path("out.npy")).expect("a writable folder");
 
     let stopping = Case::new(&stopping_text(), "capture.csv", &good);
     let refused = Case::new(

@@ -262,6 +262,20 @@ fn dropped_outputs_and_states_are_noticed() {
 }
 
 #[test]
+fn a_changed_file_is_named_also_where_it_does_not_compile() {
+    let (_folder, at) = bundle();
+    let path = at.join("tested_correction.c");
+    let text = std::fs::read_to_string(&path).expect("a source");
+    std::fs::write(&path, format!("{text}}}\n")).expect("written");
+    refused(
+        &at,
+        1,
+        "files differ from the manifest: tested_correction.c",
+    );
+    refused(&at, 1, "the changed files do not compile");
+}
+
+#[test]
 fn manifests_that_cannot_be_are_refused_without_a_panic() {
     let damages: [Damage; 7] = [
         ("more than", |m| {

@@ -45,9 +45,7 @@ impl TemporaryFile {
             let file = builder.tempfile_in(folder)?;
             let ticket = registry.register(Leftover::Path(file.path().to_path_buf()));
             drop(registry);
-            lock(file.as_file());
-            // Another process may have swept it away before it was locked.
-            if file.path().exists() {
+            if is_kept(file.as_file(), file.path()) {
                 return Ok(TemporaryFile {
                     file,
                     _ticket: ticket,
@@ -85,10 +83,11 @@ impl TemporaryFolder {
             let ticket = registry.register(Leftover::Path(folder.path().to_path_buf()));
             drop(registry);
             let handle = File::open(folder.path()).ok();
-            if let Some(handle) = &handle {
-                lock(handle);
-            }
-            if folder.path().exists() {
+            let is_ours = match &handle {
+                Some(handle) => is_kept(handle, folder.path()),
+                None => folder.path().exists(),
+            };
+            if is_ours {
                 return Ok(TemporaryFolder {
                     folder,
                     _lock: handle,
@@ -137,21 +136,40 @@ fn remove_if_left(path: &PathBuf) {
     let Ok(handle) = File::open(path) else {
         return;
     };
-    if lock(&handle) {
+    if lock(&handle) == Lock::Ours {
         is_removed(path);
     }
 }
 
-/// Takes the lock that ends with its process; false if another process holds it, or if there are none here.
-fn lock(file: &File) -> bool {
+/// Whether a new file or folder belongs to this process: between its making and its lock another one's [`sweep`] may
+/// have taken it, and removes it a moment later.
+fn is_kept(file: &File, path: &Path) -> bool {
+    lock(file) != Lock::Others && path.exists()
+}
+
+/// What came of asking for a lock.
+#[derive(Debug, PartialEq, Eq)]
+enum Lock {
+    Ours,
+    Others,
+    /// There are no locks on this system or file system.
+    Unknown,
+}
+
+/// Takes the lock that ends with its process.
+fn lock(file: &File) -> Lock {
     #[cfg(unix)]
     {
         use rustix::fs::{FlockOperation, flock};
-        flock(file, FlockOperation::NonBlockingLockExclusive).is_ok()
+        match flock(file, FlockOperation::NonBlockingLockExclusive) {
+            Ok(()) => Lock::Ours,
+            Err(rustix::io::Errno::WOULDBLOCK) => Lock::Others,
+            Err(_) => Lock::Unknown,
+        }
     }
     #[cfg(not(unix))]
     {
         let _ = file;
-        false
+        Lock::Unknown
     }
 }

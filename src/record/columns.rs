@@ -442,6 +442,27 @@ mod tests {
     }
 
     #[test]
+    fn raw_codes_are_no_rate() {
+        let mapped = |name: &str| RecordMapping {
+            columns: [("rate_out_dps".to_owned(), name.into())].into(),
+            ..RecordMapping::default()
+        };
+        for name in ["gyro_z_lsb", "GyroZ raw", "rate_counts", "z.code"] {
+            let header = format!("time_s,die_degc,{name}");
+            let error = resolve(at(&header), &mapped(name)).unwrap_err().to_string();
+            assert!(error.contains("holds raw codes"), "{name}: {error}");
+            // Nor is it proposed for one.
+            let error = resolve(at(&header), &RecordMapping::default()).unwrap_err();
+            let proposed = format!("rate_out_dps = \"{name}\"");
+            assert!(!error.to_string().contains(&proposed), "{name}");
+        }
+        for name in ["raw", "gyro_z", "rawrate", "lsbgyro_z"] {
+            let header = format!("time_s,die_degc,{name}");
+            assert!(resolve(at(&header), &mapped(name)).is_ok(), "{name}");
+        }
+    }
+
+    #[test]
     fn units_come_from_the_name() {
         assert_eq!(unit_of("phase_rad"), "rad");
         assert_eq!(unit_of("pressure_hpa"), "hPa");

@@ -86,25 +86,6 @@ impl NoiseModel {
         model
     }
 
-    /// cov * v, in time proportional to its length.
-    fn times(&self, v: &[f64]) -> Vec<f64> {
-        let mut out: Vec<f64> = v
-            .iter()
-            .map(|v| (self.white - self.correlated) * v)
-            .collect();
-        let mut run = 0.0;
-        for (o, v) in out.iter_mut().zip(v) {
-            run = self.rho * run + v;
-            *o += self.correlated * run;
-        }
-        run = 0.0;
-        for (o, v) in out.iter_mut().zip(v).rev() {
-            run = self.rho * run + v;
-            *o += self.correlated * run;
-        }
-        out
-    }
-
     /// The variance of the mean of `n` rows in a row, (deg/s)^2.
     pub fn variance_of_mean(&self, n: usize) -> f64 {
         let m = n.max(1) as f64;
@@ -187,12 +168,21 @@ impl<F: Fn(usize, &mut [f64])> Rows<F> {
             return DMatrix::zeros(size, size);
         };
         let inverse = normal.inverse();
+        // With u_i the weighted row i and r_i = rho r_(i-1) + u_i: A' W C W A is the sum over i of
+        // w u_i u_i' + b (u_i r_i' + r_i u_i' - u_i u_i').
         let mut middle = DMatrix::zeros(size, size);
-        let mut column = vec![0.0; self.count];
-        for k in 0..size {
-            self.each(weights, |i, w, row| column[i] = w * row[k]);
-            middle.set_column(k, &self.score(weights, &noise.times(&column)));
-        }
+        let mut weighted = DVector::zeros(size);
+        let mut run = DVector::zeros(size);
+        self.each(weights, |_, w, row| {
+            for (u, a) in weighted.iter_mut().zip(row) {
+                *u = w * a;
+            }
+            run *= noise.rho;
+            run += &weighted;
+            middle.ger(noise.white - noise.correlated, &weighted, &weighted, 1.0);
+            middle.ger(noise.correlated, &weighted, &run, 1.0);
+            middle.ger(noise.correlated, &run, &weighted, 1.0);
+        });
         let full = &inverse * middle * &inverse;
         // Rounding leaves it a little asymmetric.
         (&full + full.transpose()) * 0.5
@@ -219,24 +209,37 @@ mod tests {
     use crate::thermal::synthetic::Random;
 
     #[test]
-    fn the_product_is_that_of_the_matrix() {
+    fn the_covariance_is_that_of_the_matrices() {
         let noise = NoiseModel {
             white: 2.0,
             correlated: 3.0,
             rho: 0.7,
             effective_rows: 5.0,
         };
-        let v = [1.0, -2.0, 0.5, 4.0, 0.0];
-        for (i, value) in noise.times(&v).into_iter().enumerate() {
-            let expected: f64 = (0..5)
-                .map(|j: usize| {
-                    let white = if i == j { 2.0 } else { 0.0 };
-                    (white + 3.0 * 0.7f64.powi(i.abs_diff(j) as i32)) * v[j]
-                })
-                .sum();
-            assert!((value - expected).abs() < 1e-12);
+        let matrix = DMatrix::from_fn(5, 5, |i, j| {
+            let white = if i == j { 2.0 } else { 0.0 };
+            white + 3.0 * 0.7f64.powi(i.abs_diff(j) as i32)
+        });
+        let weights = [1.0, 0.5, 0.0, 2.0, 1.0];
+        let row = |i: usize, row: &mut [f64]| {
+            row.copy_from_slice(&[1.0, i as f64 - 1.5, ((i * i) as f64).sin()]);
+        };
+        let rows = Rows {
+            count: 5,
+            columns: 3,
+            row,
+        };
+        let mut a = DMatrix::zeros(5, 3);
+        let mut values = [0.0; 3];
+        for i in 0..5 {
+            row(i, &mut values);
+            (0..3).for_each(|k| a[(i, k)] = values[k]);
         }
-        let mean: f64 = noise.times(&[0.2; 5]).iter().map(|v| v * 0.2).sum();
+        let w = DMatrix::from_diagonal(&DVector::from_row_slice(&weights));
+        let inverse = (a.transpose() * &w * &a).try_inverse().unwrap();
+        let expected = &inverse * a.transpose() * &w * &matrix * &w * &a * &inverse;
+        assert!((rows.covariance(&weights, &noise) - expected).amax() < 1e-12);
+        let mean = matrix.mean();
         assert!((noise.variance_of_mean(5) - mean).abs() < 1e-12);
     }
 

@@ -375,7 +375,10 @@ fn usable_rows(
         warnings.push(glitches(record, name, &found));
     }
     let rows = measured.into_iter().zip(glitch);
-    rows.filter(|(_, g)| !g).map(|(i, _)| i).collect()
+    let mut rows: Vec<usize> = rows.filter(|(_, g)| !g).map(|(i, _)| i).collect();
+    // Grown by doubling, and kept as long as the fit.
+    rows.shrink_to_fit();
+    rows
 }
 
 /// What is said of a thermometer's readings that [`weights::thermometer_glitches`] marks.

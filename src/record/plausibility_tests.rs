@@ -1,0 +1,184 @@
+use super::super::thermal::parse;
+use crate::design::RecordMapping;
+use std::path::Path;
+
+/// The codes for a record of 40 rows made by `row`.
+fn codes(header: &str, row: impl Fn(f64) -> String) -> Vec<&'static str> {
+    let mut text = format!("{header}\n");
+    for k in 0..40 {
+        text.push_str(&row(f64::from(k)));
+        text.push('\n');
+    }
+    let mapping = RecordMapping::default();
+    let (_, warnings) = parse(text.as_bytes(), Path::new("r.csv"), &mapping).unwrap();
+    warnings.iter().map(|w| w.code).collect()
+}
+
+/// Something that moves like a reading.
+fn wiggle(k: f64) -> f64 {
+    (k * 1.7).sin() * 0.01 + (k * 0.9).cos() * 0.013
+}
+
+#[test]
+fn a_remedy_never_contradicts_the_columns_name() {
+    let said = |name: &str| {
+        let mut text = format!("time_s,{name},rate_out_dps\n");
+        for k in 0..40 {
+            let k = f64::from(k);
+            text.push_str(&format!("{k},{},{}\n", 290.0 + k, wiggle(k)));
+        }
+        let mapping = RecordMapping {
+            columns: [("die_degc".to_owned(), name.into())].into(),
+            ..RecordMapping::default()
+        };
+        let (_, warnings) = parse(text.as_bytes(), Path::new("r.csv"), &mapping).unwrap();
+        let all: Vec<String> = warnings.into_iter().map(|w| w.message).collect();
+        all.join("\n")
+    };
+    // Kelvin under a name that says degC: the name has to go before the unit can be said.
+    let text = said("die_degc");
+    assert!(
+        text.contains("rename the column") && text.contains("unit = \"K\""),
+        "{text}"
+    );
+    let text = said("die");
+    assert!(
+        !text.contains("rename the column")
+            && text.contains("die_degc = { column = \"die\", unit = \"K\" }"),
+        "{text}"
+    );
+}
+
+#[test]
+fn each_mistake_has_its_warning() {
+    // (column, values, warning)
+    type Case = (&'static str, fn(f64) -> f64, Option<&'static str>);
+    let cases: [Case; 36] = [
+        ("phase_rad", |k| -90.0 + k * 0.1, Some("phase_in_degrees")),
+        ("phase_rad", |k| -2.0 + k * 0.13, Some("phase_in_degrees")),
+        ("phase_rad", |k| -1.6 + k * 0.002, None),
+        (
+            "phase_rad",
+            |k| if k == 7.0 { 99.0 } else { -1.6 + k * 0.002 },
+            Some("error_values"),
+        ),
+        (
+            "phase_rad",
+            |k| {
+                let p = 3.1 + k * 0.002;
+                if p > std::f64::consts::PI {
+                    p - std::f64::consts::TAU
+                } else {
+                    p
+                }
+            },
+            Some("phase_wraps"),
+        ),
+        (
+            "die_degc",
+            |k| 273.15 + 25.0 + k,
+            Some("temperature_in_kelvin"),
+        ),
+        (
+            "chamber_degc",
+            |k| 233.15 + k,
+            Some("temperature_in_kelvin"),
+        ),
+        ("board_degc", |k| 300.0 + k, Some("temperature_in_kelvin")),
+        ("die_degc", |k| 2500.0 + k, Some("temperature_out_of_range")),
+        ("die_degc", |k| -40.0 + 1.4 * k, None),
+        (
+            "die_degc",
+            |k| if k == 3.0 { -273.15 } else { 20.0 + k },
+            Some("error_values"),
+        ),
+        ("rate_out_dps", |k| 30_000.0 + k, Some("rate_out_of_range")),
+        ("rate_out_dps", |k| 1900.0 + k, Some("rate_in_millidegrees")),
+        ("rate_out_dps", |k| 19.0 + wiggle(k), None),
+        (
+            "rate_out_dps",
+            |k| 0.005 + 1e-3 * wiggle(k),
+            Some("rate_in_radians"),
+        ),
+        (
+            "die_degc",
+            |k| 70.0 + 1.2 * k,
+            Some("temperature_in_fahrenheit"),
+        ),
+        (
+            "freq_hz",
+            |k| 17.5 + k * 1e-4,
+            Some("frequency_in_kilohertz"),
+        ),
+        ("freq_hz", |k| 17_500.0 + k * 0.1, None),
+        ("freq_hz", |k| k * 100.0, Some("error_values")),
+        (
+            "freq_hz",
+            |k| -k * 100.0 - 1.0,
+            Some("frequency_out_of_range"),
+        ),
+        ("agc", |k| 20_000.0 + k, Some("agc_not_relative")),
+        ("agc", |k| 98.0 + k * 0.1, Some("agc_not_relative")),
+        ("agc", |k| 45.0 + k * 0.01, Some("agc_not_relative")),
+        ("agc", |k| 1.0 + k * 1e-3, None),
+        ("supply_v", |k| 3300.0 + k, Some("supply_out_of_range")),
+        ("supply_v", |k| 3.3 + k * 0.01, None),
+        (
+            "accel_g",
+            |k| 9.8 + k * 1e-4,
+            Some("acceleration_in_m_per_s2"),
+        ),
+        (
+            "accel_g",
+            |k| 9.807 * ((k % 3.0) - 1.0) + k * 1e-4,
+            Some("acceleration_in_m_per_s2"),
+        ),
+        ("accel_g", |k| 1.0 + k * 1e-4, None),
+        ("accel_g", |k| (k % 3.0) - 1.0 + k * 1e-4, None),
+        ("accel_g", |k| 20.0 * (k * 0.7).sin(), None),
+        ("time_s", |k| 1.7e9 + k, Some("time_is_calendar_time")),
+        (
+            "time_s",
+            |k| 1.7e12 + 1e3 * k,
+            Some("time_is_calendar_time"),
+        ),
+        ("time_s", |k| 15_000.0 * k, Some("time_step_implausible")),
+        ("time_s", |k| 1800.0 * k, None),
+        ("quad_dps", |k| 1e6 + k, Some("rate_out_of_range")),
+    ];
+    for (name, value, expected) in cases {
+        let found = match name {
+            "time_s" => codes("time_s,rate_out_dps", |k| {
+                format!("{},{}", value(k), wiggle(k))
+            }),
+            "rate_out_dps" => codes("time_s,rate_out_dps", |k| format!("{k},{}", value(k))),
+            _ => codes(&format!("time_s,rate_out_dps,{name}"), |k| {
+                format!("{k},{},{}", wiggle(k), value(k))
+            }),
+        };
+        let expected: Vec<&str> = expected.into_iter().collect();
+        assert_eq!(found, expected, "{name} {} .. {}", value(0.0), value(39.0));
+    }
+}
+
+#[test]
+fn the_applied_rate_shows_sign_and_unit() {
+    let header = "time_s,rate_out_dps,rate_dps";
+    for (factor, expected) in [
+        (1.02, None),
+        (-1.0, Some("rate_sign_reversed")),
+        (0.017453, Some("rate_in_radians")),
+        (57.3, Some("rate_in_radians")),
+        (16.4, Some("scale_not_nominal")),
+    ] {
+        let found = codes(header, |k| {
+            let rate = (k - 20.0) * 5.0;
+            format!("{k},{},{rate}", factor * rate + wiggle(k))
+        });
+        let expected: Vec<&str> = expected.into_iter().collect();
+        assert_eq!(found, expected, "{factor}");
+    }
+    // A small rate under a large drift decides nothing.
+    let found = codes(header, |k| format!("{k},{},{}", k * 10.0, wiggle(k)));
+    assert!(found.is_empty(), "{found:?}");
+}
