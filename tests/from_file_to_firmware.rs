@@ -203,11 +203,10 @@ fn a_simulated_run_and_its_own_record_say_why_their_orders_differ() {
     let of = |arguments: &[&str]| {
         let (status, said, complaints) = gyrogen(top.path(), arguments);
         assert_eq!(status, Some(0), "{said}{complaints}");
-        let line = said
+        let lines = said
             .lines()
-            .find(|l| l.starts_with("fit in "))
-            .expect("a fit");
-        line.to_owned()
+            .filter(|l| l.starts_with("fit in ") || l.starts_with("held-out rms "));
+        lines.collect::<Vec<_>>().join("\n")
     };
     let own = of(&["run", "--out", "own"]);
     let again = of(&["run", "--record", "own/record.csv", "--out", "again"]);
@@ -223,11 +222,15 @@ fn a_simulated_run_and_its_own_record_say_why_their_orders_differ() {
         again.contains(": order 3 ") && again.contains("the simulated run of a design takes 2"),
         "{again}"
     );
-    let floor = |line: &str| {
-        line.rsplit_once("noise alone makes ")
-            .map(|l| l.1.to_owned())
+    let floor = |lines: &str| {
+        let floor = lines.rsplit_once("Noise alone makes ");
+        floor.expect("a noise floor").1.to_owned()
     };
     assert_eq!(floor(&own), floor(&again));
+    assert!(
+        own.contains("of 10 blocks in time was predicted from the others"),
+        "{own}"
+    );
 }
 
 /// A design is given to `close` as to every other command, or as an option; a file alone is asked about.

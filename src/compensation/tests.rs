@@ -30,6 +30,7 @@ fn random(seed: u64) -> Design {
         coefficients_dps: fitted,
         std_max_dps: 0.0,
         heldout_rms_dps: 0.0,
+        loop_rms_dps: None,
     });
     design
 }

@@ -27,7 +27,7 @@ pub struct Fake {
     pub values: Vec<f64>,
 }
 
-/// [`COUNT`] columns for a closed record: like what the declared model leaves, what the steps leave, the thermometer, and
+/// [`COUNT`] columns for a closed record: like what the declared model leaves, what the causes leave, the thermometer, and
 /// the other columns that move, in turn. Fewer only where nothing moves.
 pub fn of(closed: &Closed) -> Vec<Fake> {
     let sources = sources(closed);
