@@ -278,3 +278,44 @@ fn a_design_stands_before_the_options_or_is_one() {
         assert!(!here.join("gyrogen-close").exists());
     }
 }
+
+/// What is nearly right is refused with what is right; where nothing else can be meant, it is taken.
+#[test]
+fn arguments_that_are_nearly_right_are_shown_right() {
+    let top = tempfile::tempdir().expect("a folder");
+    let approx = ["approx", "--function", "x", "--degree", "1"];
+    let formats = ["--output", "Q1.15", "--coefficients", "Q1.15"];
+    let of = |more: &[&'static str]| [&approx[..], &formats[..], more].concat();
+    for (arguments, part) in [
+        (vec!["help", "clsoe"], "'close'"),
+        (vec!["clsoe"], "'close'"),
+        (
+            vec!["check", "--samples", "200k"],
+            "write the number in digits alone: 200000",
+        ),
+        (
+            of(&["--domain=0,1", "--input", "Q15"]),
+            "did you mean `Q1.15`",
+        ),
+        (
+            of(&["--domain=0,5,0,7", "--input", "Q1.15"]),
+            "the decimal mark is a point: `--domain=0.5,0.7`",
+        ),
+        (
+            of(&["--domain=0,1", "--input", "Q1.15", "--bound", "0,01"]),
+            "give 0.01",
+        ),
+    ] {
+        let (status, said, complaints) = gyrogen(top.path(), &arguments);
+        assert_eq!(status, Some(2), "{arguments:?}: {said}{complaints}");
+        assert!(complaints.contains(part), "{part}: {complaints}");
+    }
+    for arguments in [
+        &["init", "--out", "my.toml"][..],
+        &["emit", "--lang", "C", "--part", "tables", "--out", "fw"],
+    ] {
+        let (status, said, complaints) = gyrogen(top.path(), arguments);
+        assert_eq!(status, Some(0), "{arguments:?}: {said}{complaints}");
+    }
+    assert!(top.path().join("my.toml").is_file());
+}

@@ -455,3 +455,25 @@ pub const BASIS: u64 = 0xcbf2_9ce4_8422_2325;
 pub fn mix(h: u64, word: u64) -> u64 {
     (h ^ word).wrapping_mul(0x100_0000_01b3)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_port_says_its_range_in_words_and_in_its_quantity() {
+        let port = Port::new("rate", "sense I = raw * 2^-11 deg/s, Q2.22");
+        let plain = described(&port, Interval::new(-2048, 4096));
+        assert_eq!(
+            plain,
+            "rate: -2048 .. 4096; sense I = raw * 2^-11 deg/s; word format Q2.22"
+        );
+        let scaled = described(
+            &port.in_unit("sense I", -11, "deg/s"),
+            Interval::new(-2048, 4096),
+        );
+        assert!(scaled.starts_with("rate: -2048 .. 4096 (-1 .. 2 deg/s); sense I = "));
+        let other = Port::new("carrier", "NCO output, Q1.15");
+        assert!(described(&other, Interval::new(0, 1)).ends_with("; NCO output, Q1.15"));
+    }
+}

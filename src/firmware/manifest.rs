@@ -424,3 +424,30 @@ impl Manifest {
         text::json(self)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::design::{ChannelInput, reader};
+    use crate::emit::bundle::Part;
+    use crate::numeric::format::Format;
+
+    #[test]
+    fn the_calibrated_range_is_told_in_its_quantity() {
+        let mut design = reader::read(None).expect("the default");
+        let c = design.compensation.as_mut().expect("a compensation");
+        c.clamp_raw = Some((-4194304, -2097152));
+        let said = facts(&design, &Bundle::new(&design, Part::Compensation)).join("\n");
+        let told = "inputs -4194304 .. -2097152 (-1.570796 .. -0.7853982 rad); outside, the input is clamped";
+        assert!(said.contains(told), "{said}");
+        let channel = CompensationInput::Channel(ChannelInput {
+            column: "die_degc".into(),
+            format: Format::q(8, 8),
+            offset_raw: 0,
+            scale_bits: 15,
+            rate_format: Format::q(4, 28),
+        });
+        let die = in_quantity(&design, &channel, (-2560, 16640));
+        assert_eq!(die, "-10 .. 65 die_degc");
+    }
+}

@@ -36,7 +36,7 @@ fn drawn(scored: &[(&Evidence, f64)], width: f64) -> Figure {
             high: interval.high + 0.45 * (interval.high - interval.low),
         },
         quantity: "gain of log-likelihood, alone".to_owned(),
-        unit: "nat".to_owned(),
+        unit: "nats".to_owned(),
     };
     svg.legend([
         ("bar-of", Swatch::Area, "taken".to_owned()),
