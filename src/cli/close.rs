@@ -364,7 +364,6 @@ fn print(c: &Closure, compared: Option<&Emitted>, controls: Option<&Controls>, o
         c.unit_text(),
         c.noise_floor_rms
     );
-    say!("{}", held_out(c));
     if let Some(rms) = c.firmware.heldout_rms {
         say!(
             "firmware's model, bit for bit (--verify compiles and compares): held-out rms {rms:.5} {}",
@@ -373,6 +372,7 @@ fn print(c: &Closure, compared: Option<&Emitted>, controls: Option<&Controls>, o
     } else if c.unit == "deg/s" {
         say!("firmware cannot carry this: the warnings say why");
     }
+    say!("{}", held_out(c));
     if let Some(compared) = compared {
         super::terminal::show(&super::comparison_table(&compared.functions));
         say!("emitted C and Rust: {}", compared.sentence());
@@ -387,12 +387,9 @@ fn print(c: &Closure, compared: Option<&Emitted>, controls: Option<&Controls>, o
 fn held_out(c: &Closure) -> &'static str {
     match c.unit {
         "deg/s" => {
-            "held out: one part of the record, the same before and after, which no estimate used. (`run` predicts each of its blocks \
-             from the others in turn, so that its held-out rms is another figure.)"
+            "held out: a part of the record that no estimate used, the same before and after (`run` takes each of its blocks in turn)"
         }
-        _ => {
-            "held out: one part of the capture, the same before and after, which no estimate used."
-        }
+        _ => "held out: a part of the capture that no estimate used, the same before and after",
     }
 }
 

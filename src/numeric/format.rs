@@ -99,15 +99,16 @@ impl From<Format> for String {
 
 /// What `Q15` (the sign bit left out) and `q1.15` mean.
 fn short(text: &str) -> Option<String> {
-    let (sign, rest) = match text.to_uppercase() {
-        upper if upper.starts_with("UQ") => ("U", upper[2..].to_owned()),
-        upper => ("", upper.strip_prefix('Q')?.to_owned()),
+    let upper = text.to_uppercase();
+    let (sign, rest) = match upper.strip_prefix("UQ") {
+        Some(rest) => ("U", rest),
+        None => ("", upper.strip_prefix('Q')?),
     };
     let is_number = |s: &str| !s.is_empty() && s.len() < 3 && s.bytes().all(|b| b.is_ascii_digit());
     match rest.split_once('.') {
         Some((m, n)) if is_number(m) && is_number(n) => Some(format!("{sign}Q{rest}")),
-        None if is_number(&rest) && sign.is_empty() => Some(format!("Q1.{rest}")),
-        None if is_number(&rest) => Some(format!("UQ0.{rest}")),
+        None if is_number(rest) && sign.is_empty() => Some(format!("Q1.{rest}")),
+        None if is_number(rest) => Some(format!("UQ0.{rest}")),
         _ => None,
     }
 }

@@ -113,7 +113,7 @@ fn parse_text(
         .iter()
         .take_while(|l| l.number < header.number)
         .last();
-    if is_of_channels(header.text) {
+    if is_of_channels(header.text, mapping) {
         return Err(header
             .error(1, CAPTURE.0.to_owned(), CAPTURE.1.to_owned())
             .into());
@@ -178,15 +178,21 @@ pub(super) const CAPTURE: (&str, &str) = (
     "give it with `close --capture`, `replay --capture` or `equiv --capture`",
 );
 
-/// Names of a capture's two channels, and none of a record's rate.
-fn is_of_channels(header: &str) -> bool {
+/// Names of a capture's two channels, and none that a record has.
+fn is_of_channels(header: &str, mapping: &RecordMapping) -> bool {
+    const OF_RECORDS: [&str; 6] = ["time_s", "rate", "gyro", "dps", "deg", "temp"];
     let lower = header.to_lowercase();
-    let names: Vec<&str> = lower
-        .split([',', '\t'])
-        .map(|n| n.trim_matches([' ', '"']))
-        .collect();
-    let begins = |word: &str| names.iter().any(|n| n.starts_with(word));
-    begins("drive") && begins("sense") && !lower.contains("rate")
+    if lower.contains("drive_code") && lower.contains("sense_code") {
+        return true;
+    }
+    let begins = |word: &str| {
+        let mut names = lower.split([',', '\t']);
+        names.any(|n| n.trim_matches([' ', '"']).starts_with(word))
+    };
+    mapping.columns.is_empty()
+        && begins("drive")
+        && begins("sense")
+        && !OF_RECORDS.iter().any(|word| lower.contains(word))
 }
 
 /// A header behind `#`, as `numpy.savetxt` writes it, said to be one.
