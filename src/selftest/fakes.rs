@@ -57,7 +57,7 @@ fn sources(closed: &Closed) -> Vec<(String, Vec<f64>)> {
         residual(&closed.before),
     )];
     if !closed.after.terms.is_empty() {
-        out.push(("what the steps leave".to_owned(), residual(&closed.after)));
+        out.push(("what the causes leave".to_owned(), residual(&closed.after)));
     }
     out.push((c.thermometer.clone(), c.u.clone()));
     let columns = c.columns.iter();
