@@ -156,7 +156,7 @@ impl fmt::Display for InputError {
 
 /// An [`Error`] for an operating-system failure on `path`, such as a missing file.
 pub fn io_error(path: impl AsRef<Path>, doing: &str, e: &std::io::Error) -> Error {
-    InputError::new(format!("cannot {doing}: {e}"))
+    InputError::new(format!("cannot {doing}: {}", cause(e)))
         .in_file(path)
         .help(match e.kind() {
             std::io::ErrorKind::NotFound => "check the path",
@@ -169,9 +169,28 @@ pub fn io_error(path: impl AsRef<Path>, doing: &str, e: &std::io::Error) -> Erro
         .into()
 }
 
+/// What the system said, without the name of a temporary file that nobody knows.
+pub fn cause(e: &std::io::Error) -> String {
+    let text = e.to_string();
+    match text.split_once(" at path \"") {
+        Some((cause, _)) => cause.to_owned(),
+        None => text,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_temporary_file_is_not_named() {
+        let said = "Permission denied (os error 13) at path \"/data/out/.tmpAbC\"";
+        let e = std::io::Error::new(std::io::ErrorKind::PermissionDenied, said);
+        assert_eq!(
+            io_error("out", "write the file", &e).to_string(),
+            "out: error: cannot write the file: Permission denied (os error 13)\n  help: check the permissions"
+        );
+    }
 
     #[test]
     fn an_offset_becomes_line_column_and_caret() {

@@ -12,7 +12,7 @@ pub use results::Results;
 pub use same::refuse as refuse_inputs;
 
 pub use crate::base_name::{base_name, name_of};
-use crate::error::{Error, InputError, Result, io_error};
+use crate::error::{Error, InputError, Result, cause, io_error};
 use crate::leftovers::TemporaryFile;
 use std::fmt;
 use std::fs::{self, File, OpenOptions, Permissions};
@@ -157,7 +157,19 @@ impl Target {
                 .help(format!("make it first: `mkdir -p {}`", folder.display()))
                 .into());
         }
-        let temporary = TemporaryFile::new(folder).map_err(|e| write_failed(named, &e))?;
+        let temporary = TemporaryFile::new(folder).map_err(|e| match e.kind() {
+            io::ErrorKind::PermissionDenied => {
+                let shown = folder.display();
+                InputError::new(format!(
+                    "cannot write into the folder `{shown}`: {}",
+                    cause(&e)
+                ))
+                .in_file(named)
+                .help("check the folder's permissions, or name a file in another one")
+                .into()
+            }
+            _ => write_failed(named, &e),
+        })?;
         Ok(Target::Replace {
             temporary,
             path: real,

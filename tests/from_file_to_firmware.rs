@@ -203,11 +203,10 @@ fn a_simulated_run_and_its_own_record_say_why_their_orders_differ() {
     let of = |arguments: &[&str]| {
         let (status, said, complaints) = gyrogen(top.path(), arguments);
         assert_eq!(status, Some(0), "{said}{complaints}");
-        let line = said
+        let lines = said
             .lines()
-            .find(|l| l.starts_with("fit in "))
-            .expect("a fit");
-        line.to_owned()
+            .filter(|l| l.starts_with("fit in ") || l.starts_with("held-out rms "));
+        lines.collect::<Vec<_>>().join("\n")
     };
     let own = of(&["run", "--out", "own"]);
     let again = of(&["run", "--record", "own/record.csv", "--out", "again"]);
@@ -223,11 +222,15 @@ fn a_simulated_run_and_its_own_record_say_why_their_orders_differ() {
         again.contains(": order 3 ") && again.contains("the simulated run of a design takes 2"),
         "{again}"
     );
-    let floor = |line: &str| {
-        line.rsplit_once("noise alone makes ")
-            .map(|l| l.1.to_owned())
+    let floor = |lines: &str| {
+        let floor = lines.rsplit_once("Noise alone makes ");
+        floor.expect("a noise floor").1.to_owned()
     };
     assert_eq!(floor(&own), floor(&again));
+    assert!(
+        own.contains("of 10 blocks in time was predicted from the others"),
+        "{own}"
+    );
 }
 
 /// A design is given to `close` as to every other command, or as an option; a file alone is asked about.
@@ -274,4 +277,45 @@ fn a_design_stands_before_the_options_or_is_one() {
         assert!(status == Some(2) && said.contains(due), "{said}");
         assert!(!here.join("gyrogen-close").exists());
     }
+}
+
+/// What is nearly right is refused with what is right; where nothing else can be meant, it is taken.
+#[test]
+fn arguments_that_are_nearly_right_are_shown_right() {
+    let top = tempfile::tempdir().expect("a folder");
+    let approx = ["approx", "--function", "x", "--degree", "1"];
+    let formats = ["--output", "Q1.15", "--coefficients", "Q1.15"];
+    let of = |more: &[&'static str]| [&approx[..], &formats[..], more].concat();
+    for (arguments, part) in [
+        (vec!["help", "clsoe"], "'close'"),
+        (vec!["clsoe"], "'close'"),
+        (
+            vec!["check", "--samples", "200k"],
+            "write the number in digits alone: 200000",
+        ),
+        (
+            of(&["--domain=0,1", "--input", "Q15"]),
+            "did you mean `Q1.15`",
+        ),
+        (
+            of(&["--domain=0,5,0,7", "--input", "Q1.15"]),
+            "the decimal mark is a point: `--domain=0.5,0.7`",
+        ),
+        (
+            of(&["--domain=0,1", "--input", "Q1.15", "--bound", "0,01"]),
+            "give 0.01",
+        ),
+    ] {
+        let (status, said, complaints) = gyrogen(top.path(), &arguments);
+        assert_eq!(status, Some(2), "{arguments:?}: {said}{complaints}");
+        assert!(complaints.contains(part), "{part}: {complaints}");
+    }
+    for arguments in [
+        &["init", "--out", "my.toml"][..],
+        &["emit", "--lang", "C", "--part", "tables", "--out", "fw"],
+    ] {
+        let (status, said, complaints) = gyrogen(top.path(), arguments);
+        assert_eq!(status, Some(0), "{arguments:?}: {said}{complaints}");
+    }
+    assert!(top.path().join("my.toml").is_file());
 }

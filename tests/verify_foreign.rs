@@ -299,6 +299,29 @@ fn manifests_that_cannot_be_are_refused_without_a_panic() {
     }
 }
 
+/// What mends a bundle names every command that writes one.
+#[test]
+fn a_bundle_that_is_cut_off_or_lacks_a_file_is_told_to_be_written_again() {
+    let (folder, at) = bundle();
+    let manifest = at.join("manifest.json");
+    let text = std::fs::read_to_string(&manifest).expect("a manifest");
+    let remedy = "the command that made it: `gyrogen run`, `close`, `emit` or `approx`";
+    std::fs::write(&manifest, &text[..text.len() / 2]).expect("written");
+    let output = gyrogen(&["verify", "c"], folder.path());
+    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+    assert!(said(&output).contains(remedy), "{}", said(&output));
+    std::fs::write(&manifest, &text).expect("written");
+    std::fs::remove_dir_all(at.join("vectors")).expect("removed");
+    let output = gyrogen(&["verify", "c"], folder.path());
+    assert_ne!(output.status.code(), Some(0), "{}", said(&output));
+    assert!(
+        !said(&output).contains("check the path"),
+        "{}",
+        said(&output)
+    );
+    assert!(said(&output).contains("vectors/"), "{}", said(&output));
+}
+
 #[cfg(unix)]
 #[test]
 fn links_pipes_and_endless_files_are_not_opened() {

@@ -133,7 +133,7 @@ pub fn findings(capture: &Capture, known: &Known, plain: &Model, fitted: &Fitted
                 warnings.push(Warning::general(
                     "jitter_is_noise",
                     "aperture_jitter is noise: it changes the variance, not the mean, so the error's \
-                     rms stays; the step is judged by the likelihood of the held-out rows",
+                     rms stays; the cause is judged by the likelihood of the held-out rows",
                 ));
                 jitter_step(known, fitted)
             }

@@ -106,9 +106,9 @@ pub fn evidence(
                 Fate::Rejected
             };
             let remark = match (fate, missing) {
-                (Fate::Taken, Some(m)) => format!("it is a step; {m}"),
-                (Fate::Taken, None) => "it is a step".to_owned(),
-                (Fate::Confounded, _) => "it explains the codes as well as a step".to_owned(),
+                (Fate::Taken, Some(m)) => format!("it is a cause; {m}"),
+                (Fate::Taken, None) => "it is a cause".to_owned(),
+                (Fate::Confounded, _) => "it explains the codes as well as a cause".to_owned(),
                 (_, Some(m)) => m,
                 (Fate::NotExcited, _) => {
                     "the tuning word is a multiple of every truncation: no spur arises".to_owned()

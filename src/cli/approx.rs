@@ -152,12 +152,18 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
 }
 
 fn request(arguments: &Arguments) -> Result<Request> {
-    let Some((low, high)) = arguments.domain.split_once(',') else {
+    let ends: Vec<&str> = arguments.domain.split(',').map(str::trim).collect();
+    let [low, high] = ends[..] else {
+        let help = match ends[..] {
+            [a, b, c, d] => format!("the decimal mark is a point: `--domain={a}.{b},{c}.{d}`"),
+            [_] => "such as `--domain=-0.9,0.2` or `--domain=0,pi/4`".to_owned(),
+            _ => "write decimal marks as points, such as `--domain=-0.9,0.2`".to_owned(),
+        };
         return Err(InputError::new(format!(
             "`{}` is no domain: two numbers with a comma between them are wanted",
             arguments.domain
         ))
-        .help("such as `--domain=-0.9,0.2` or `--domain=0,pi/4`")
+        .help(help)
         .into());
     };
     let mut parameters = BTreeMap::new();
@@ -176,7 +182,7 @@ fn request(arguments: &Arguments) -> Result<Request> {
     Ok(Request {
         function: arguments.function.clone(),
         parameters,
-        domain: [low.trim().to_owned(), high.trim().to_owned()],
+        domain: [low.to_owned(), high.to_owned()],
         degree: arguments.degree,
         monomials: arguments.monomials,
         input: arguments.input,
@@ -206,13 +212,21 @@ fn print(o: &Outcome, out: &std::path::Path) {
         super::terminal::show(&table);
     }
     if let Some(search) = &o.search {
-        let mut table =
-            super::terminal::table(&["coefficients", "ideal evaluation", "whole evaluation"]);
+        let mut table = super::terminal::table(&[
+            "coefficients",
+            "error, ideal evaluation",
+            "error, whole evaluation",
+        ]);
         for c in &search.compared {
             let total = c.total_max_abs.map_or("-".into(), |v| number(v, 6));
             table.add_row([c.name.to_owned(), number(c.ideal_max_abs, 6), total]);
         }
+        super::terminal::numbers(&mut table, 1..);
         super::terminal::show(&table);
+        say!(
+            "Ideal evaluation rounds the coefficients alone; whole evaluation rounds every step and the output too, as the emitted \
+             code does."
+        );
         say!("{}", taken(search));
     }
     say!("{} on {}: {}", o.function, o.domain, o.detail);
@@ -225,35 +239,43 @@ fn print(o: &Outcome, out: &std::path::Path) {
         f.intermediate.as_deref().unwrap_or("none")
     );
     let lsb = f.output.parse::<Format>().map_or(1.0, Format::lsb);
-    let shown = |v: f64| format!("{} ({} LSB)", at_most(v, 6), at_most(v / lsb, 4));
-    say!(
-        "certified error at most {}",
-        shown(o.error.certified_max_abs)
+    let mut table = super::terminal::table(&["largest error", "value", "LSB of the output", "of"]);
+    let mut row = |what: &str, v: f64, of: String| {
+        table.add_row([what.to_owned(), at_most(v, 6), at_most(v / lsb, 4), of]);
+    };
+    row(
+        "certified",
+        o.error.certified_max_abs,
+        "every x of the domain: proved, and never exceeded".to_owned(),
     );
+    let at = o.error.at_input_raw;
     match (o.error.exhaustive_max_abs, o.error.sampled_max_abs) {
-        (Some(v), _) => say!(
-            "observed over all {} input codes {}, at input {}",
-            o.inputs_checked,
-            shown(v),
-            o.error.at_input_raw
+        (Some(v), _) => row(
+            "observed",
+            v,
+            format!("all {} input codes, at input {at}", o.inputs_checked),
         ),
-        (None, Some(v)) => say!(
-            "observed over {} of the input codes {}, at input {} (`--exhaustive` runs all up to 2^32)",
-            o.inputs_checked,
-            shown(v),
-            o.error.at_input_raw
+        (None, Some(v)) => row(
+            "observed",
+            v,
+            format!(
+                "{} of the input codes, at input {at} (`--exhaustive` runs all up to 2^32)",
+                o.inputs_checked
+            ),
         ),
         (None, None) => {}
     }
-    say!(
-        "without any rounding of steps and output {}",
-        shown(o.error.coefficients_only_max_abs)
+    row(
+        "of the coefficients alone",
+        o.error.coefficients_only_max_abs,
+        "every x, without any rounding of steps and output: proved".to_owned(),
     );
+    super::terminal::numbers(&mut table, 1..3);
+    super::terminal::show(&table);
     if let Some(ideal) = o.ideal.as_ref().filter(|i| !i.emitted) {
         say!(
-            "the best coefficients alone would have {}{}; they are `ideal` in approx.json, and not emitted, for their \
-             whole evaluation is not better",
-            shown(ideal.coefficients_only_max_abs),
+            "The coefficients that are best under ideal evaluation{} are `ideal` in approx.json. They are not emitted, for their \
+             whole evaluation is not better.",
             if ideal.proved_best { " (proved)" } else { "" }
         );
     }

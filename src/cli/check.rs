@@ -77,19 +77,27 @@ fn print(check: &Check) {
     }
     super::terminal::numbers(&mut table, 2..);
     super::terminal::show(&table);
-    for node in check
-        .nodes
-        .iter()
-        .filter(|n| n.overflow == Overflows::Possible)
-    {
+    let open = || {
+        let nodes = check.nodes.iter();
+        nodes.filter(|n| n.overflow == Overflows::Possible)
+    };
+    for node in open() {
         say!(
-            "{} can {}: its value ranges over {} (proved), and {} holds {}. From there it reaches {}.",
+            "{} is not proved to fit: its value is within {} (proved), and {} holds {}. Beyond that it would {}. From there it \
+             reaches {}.",
             node.name,
-            node.mode,
             node.in_units(node.proved),
             node.format,
             node.in_units(node.limits),
+            node.mode,
             node.path.get(1..).unwrap_or_default().join(" > ")
+        );
+    }
+    if open().next().is_some() {
+        say!(
+            "None of these overflows happened in the {} samples of the design's own gyro. The check fails only where one did, or where \
+             it is certain.",
+            check.samples
         );
     }
     if let Some(rms) = check.rate_rms_dps {
@@ -208,7 +216,7 @@ fn requirements(check: &Check) {
 fn row(n: &NodeCheck) -> Vec<String> {
     let overflow = match n.overflow {
         Overflows::Impossible => "impossible (proved)".to_owned(),
-        Overflows::Possible => format!("possible ({})", n.mode),
+        Overflows::Possible => format!("not excluded ({})", n.mode),
         Overflows::Certain => format!("CERTAIN ({})", n.mode),
         Overflows::ByDesign => n.mode.to_owned(),
     };

@@ -27,6 +27,10 @@ use crate::verdict::{Closure, Verdict};
 use std::path::{Path, PathBuf};
 
 /// Find what a measured record holds beyond the declared bias: a named cause or an honest refusal, and new firmware.
+///
+/// Use `close` where the polynomial that `run` fits leaves too much drift, or where you want to know what the drift
+/// consists of. It searches for causes, such as a lag, a step or a mode crossing, and says how sure each one is. Its
+/// firmware takes off bias and causes together, so that it stands in place of that of `run`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// A measured thermal record (CSV, PX4 ULog, ArduPilot DataFlash).
@@ -324,9 +328,9 @@ fn write(
 
 fn print(c: &Closure, compared: Option<&Emitted>, controls: Option<&Controls>, out: &Path) {
     if !c.steps.is_empty() {
-        // A step that another effect explains as well is told with its rivals; mostly there are none.
+        // A cause that another effect explains as well is told with its rivals; mostly there are none.
         let rivals = c.steps.iter().any(|s| !s.indistinguishable_from.is_empty());
-        let mut headers = vec!["step", "parameters", "held-out rms", "p"];
+        let mut headers = vec!["cause", "parameters", "held-out rms", "p"];
         headers.extend(rivals.then_some("explained as well by"));
         let mut table = super::terminal::table(&headers);
         for s in &c.steps {
@@ -368,6 +372,7 @@ fn print(c: &Closure, compared: Option<&Emitted>, controls: Option<&Controls>, o
     } else if c.unit == "deg/s" {
         say!("firmware cannot carry this: the warnings say why");
     }
+    say!("{}", held_out(c));
     if let Some(compared) = compared {
         super::terminal::show(&super::comparison_table(&compared.functions));
         say!("emitted C and Rust: {}", compared.sentence());
@@ -376,6 +381,16 @@ fn print(c: &Closure, compared: Option<&Emitted>, controls: Option<&Controls>, o
         super::controls::print(controls);
     }
     say!("wrote {}", out.display());
+}
+
+/// Which rows the held-out figures are of.
+fn held_out(c: &Closure) -> &'static str {
+    match c.unit {
+        "deg/s" => {
+            "held out: a part of the record that no estimate used, the same before and after (`run` takes each of its blocks in turn)"
+        }
+        _ => "held out: a part of the capture that no estimate used, the same before and after",
+    }
 }
 
 /// Below it a chance's digits say nothing: the noise's law is not known so far out.

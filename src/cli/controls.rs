@@ -24,8 +24,13 @@ pub fn run(
 
 /// The tables.
 pub fn print(c: &Controls) {
-    let mut table =
-        super::terminal::table(&["fake column", "spectrum of", "p", "p beside", "control"]);
+    let mut table = super::terminal::table(&[
+        "fake column",
+        "spectrum of",
+        "p, before any cause",
+        "p, beside the causes",
+        "control",
+    ]);
     for fake in &c.negative.fakes {
         table.add_row(words::fake(fake));
     }

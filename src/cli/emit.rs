@@ -21,7 +21,7 @@ pub struct Arguments {
     #[command(flatten)]
     design: super::common::DesignFile,
     /// Language of the sources.
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, ignore_case = true)]
     lang: Language,
     /// Which part of the firmware; if left out, `correction` for a design that has a `[correction]`, else `chain`.
     #[arg(long, value_enum)]

@@ -41,7 +41,7 @@ pub struct Arguments {
     out: PathBuf,
     /// Language of the emitted code that is built and compared; both if left out, or that for which there is a
     /// compiler.
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, ignore_case = true)]
     lang: Option<Language>,
     /// How the result is printed on stdout.
     #[arg(long, value_enum, default_value = "text")]
@@ -107,7 +107,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     results.finish()?;
     match arguments.format {
         OutputFormat::Json => super::terminal::give(&json),
-        OutputFormat::Text => print(&result),
+        OutputFormat::Text => print(&result, &arguments.out),
     }
     if result.holds {
         return Ok(());
@@ -153,14 +153,14 @@ fn read(design: &Design, path: &Path, most: usize) -> Result<(Vec<i32>, Vec<i32>
     Ok((drive, sense))
 }
 
-fn print(e: &Equivalence) {
+fn print(e: &Equivalence, out: &Path) {
     let mut table = super::terminal::table(&[
         "node",
-        "max error",
-        "bound",
-        "rms",
-        "predicted",
-        "LSB",
+        "max error, LSB",
+        "bound, LSB",
+        "rms, LSB",
+        "predicted rms, LSB",
+        "one LSB is",
         "headroom, bits",
         "overflows",
         "flags",
@@ -170,6 +170,10 @@ fn print(e: &Equivalence) {
     }
     super::terminal::numbers(&mut table, 1..1 + 7);
     super::terminal::show(&table);
+    say!(
+        "An error is fixed point less floating point, in LSB of the node. The bound holds at every sample. A node whose LSB is in \
+         deg/s is the bias or the rate, or a step on the way to them."
+    );
     say!("{} ADC samples, {} rows: {}", e.samples, e.rows, e.stimulus);
     for (emitted, language) in [(&e.model_vs_c, "C"), (&e.model_vs_rust, "Rust")] {
         let Some(emitted) = emitted else {
@@ -199,7 +203,7 @@ fn print(e: &Equivalence) {
     }
     print_spurs(e);
     if !e.loops.is_empty() {
-        super::terminal::show(&super::simulate::loops(&e.loops));
+        super::simulate::show_loops(&e.loops);
     }
     if let Some(against) = &e.against {
         match &against.first_difference {
@@ -220,6 +224,7 @@ fn print(e: &Equivalence) {
         say!("note: {note}");
     }
     say!("{}", if e.holds { "holds" } else { "does not hold" });
+    say!("wrote {}", out.display());
 }
 
 fn print_spurs(e: &Equivalence) {

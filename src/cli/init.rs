@@ -8,6 +8,9 @@ use std::path::PathBuf;
 pub struct Arguments {
     /// File to write (TOML); stdout if left out. A file that exists is never overwritten.
     file: Option<PathBuf>,
+    /// The same file, as an option.
+    #[arg(long, value_name = "FILE", conflicts_with = "file")]
+    out: Option<PathBuf>,
 }
 
 /// Runs the command.
@@ -16,7 +19,7 @@ pub struct Arguments {
 /// A file that exists already, a folder that cannot be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let text = crate::design::template::DEFAULT;
-    let Some(path) = &arguments.file else {
+    let Some(path) = arguments.file.as_ref().or(arguments.out.as_ref()) else {
         super::terminal::give(text);
         return Ok(());
     };

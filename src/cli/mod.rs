@@ -106,16 +106,45 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Says where a second file belongs: one file alone, the design, has no option.
+/// A parser's error with what to do about it.
 fn with_advice(mut error: clap::Error) -> clap::Error {
     use clap::error::{ContextKind, ContextValue, ErrorKind};
+    let text = |error: &clap::Error, kind| match error.get(kind) {
+        Some(ContextValue::String(text)) => text.clone(),
+        _ => String::new(),
+    };
+    match error.kind() {
+        ErrorKind::UnknownArgument => of_unknown_argument(error),
+        ErrorKind::InvalidSubcommand if error.get(ContextKind::SuggestedSubcommand).is_none() => {
+            // `help WORD` asks for no similar word by itself.
+            let word = text(&error, ContextKind::InvalidSubcommand);
+            let parser = Cli::command();
+            let names: Vec<&str> = parser.get_subcommands().map(|c| c.get_name()).collect();
+            if let Some(name) = crate::nearest::nearest(&word, &names) {
+                let similar = ContextValue::Strings(vec![name.to_owned()]);
+                error.insert(ContextKind::SuggestedSubcommand, similar);
+            }
+            error
+        }
+        ErrorKind::ValueValidation => {
+            if let Some(digits) = values::plain_integer(&text(&error, ContextKind::InvalidValue)) {
+                let advice = format!("write the number in digits alone: {digits}");
+                let advice = ContextValue::StyledStrs(vec![advice.into()]);
+                error.insert(ContextKind::Suggested, advice);
+            }
+            error
+        }
+        _ => error,
+    }
+}
+
+/// Says where a second file belongs: one file alone, the design, has no option.
+fn of_unknown_argument(mut error: clap::Error) -> clap::Error {
+    use clap::error::{ContextKind, ContextValue};
     let argument = match error.get(ContextKind::InvalidArg) {
         Some(ContextValue::String(argument)) => argument.clone(),
         _ => return error,
     };
-    if error.kind() != ErrorKind::UnknownArgument {
-        return error;
-    }
     let advice = match argument.as_str() {
         "--record" => "records are taken by `run` and `close`",
         "--capture" => "captures are taken by `replay`, `equiv` and `close`",

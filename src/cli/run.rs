@@ -15,6 +15,10 @@ use crate::timing;
 use std::path::PathBuf;
 
 /// Fit the bias to a thermal record, round it to fixed point, emit C and Rust, build and compare them, report.
+///
+/// Use `run` first. It fits one polynomial in the thermometer, writes firmware that subtracts it, and says how much drift
+/// is left. If too much is left, use `close` on the same record: it searches for causes that no polynomial follows, and
+/// writes firmware against them.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     #[command(flatten)]
@@ -31,7 +35,7 @@ pub struct Arguments {
     out: PathBuf,
     /// Language of the emitted code that is built and compared (both are written); both if left out, or that for
     /// which there is a compiler.
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, ignore_case = true)]
     lang: Option<Language>,
     /// Overwrite firmware in the folder that was edited; files that are none of a bundle's stay.
     #[arg(long)]
@@ -159,19 +163,19 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
              loop."
         );
     }
+    say!("fit in {}: {}.", s.fit.thermometer, s.fit.reason);
     say!(
-        "fit in {}: {}. Rows that the fit has not seen are {:.4} deg/s rms from it, where noise alone makes {:.4}.",
-        s.fit.thermometer,
-        s.fit.reason,
+        "held-out rms {:.4} deg/s: each of {} blocks in time was predicted from the others. Noise alone makes {:.4} deg/s rms.",
         s.fit.heldout_rms_dps,
+        outcome.parts.fit.blocks.len(),
         s.fit.noise_floor_rms_dps
     );
     for chosen in &s.chosen {
         say!("chosen: {chosen}");
     }
     say!(
-        "budget of the compensation: its words keep bias and rate within {} deg/s of the fitted polynomial (bound). \
-         Calibration and fit add about {:.4} deg/s (estimate).",
+        "error budget: the words of the compensation keep bias and rate within {} deg/s of the fitted polynomial. That is proved. \
+         What calibration and fit add is about {:.4} deg/s. That is an estimate.",
         at_most(s.budget.bound_dps, 3),
         s.budget.estimate_dps
     );

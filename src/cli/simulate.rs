@@ -213,7 +213,7 @@ fn print(outcome: &Outcome, out: &Path) {
     super::terminal::numbers(&mut table, 1..);
     super::terminal::show(&table);
     if !s.loops.is_empty() {
-        super::terminal::show(&loops(&s.loops));
+        show_loops(&s.loops);
     }
     print_sentences(outcome);
     say!("wrote {}", out.display());
@@ -261,18 +261,17 @@ fn print_sentences(outcome: &Outcome) {
     );
 }
 
-/// What quantisation leaves of the loops.
-pub(super) fn loops(found: &[Hunting]) -> comfy_table::Table {
+/// What quantisation leaves of the loops, as a table and what it means.
+pub(super) fn show_loops(found: &[Hunting]) {
     let mut table = super::terminal::table(&[
-        "loop without noise",
-        "degC",
+        "loop",
+        "chamber, degC",
         "output pp",
-        "predicted",
+        "output pp, predicted",
         "error pp, LSB",
-        "predicted",
-        "ADC and NCO, bound",
+        "error pp, predicted, LSB",
+        "ADC and NCO add at most, LSB",
         "mean error, LSB",
-        "dead band predicted",
     ]);
     for h in found {
         table.add_row([
@@ -284,11 +283,15 @@ pub(super) fn loops(found: &[Hunting]) -> comfy_table::Table {
             format!("{:.0}", h.predicted_error_pp_lsb),
             format!("{:.0}", h.converters_pp_lsb),
             format!("{:.3}", h.error_mean_lsb),
-            format!("{:.0} LSB", h.predicted_dead_band_lsb),
         ]);
     }
     super::terminal::numbers(&mut table, 1..);
-    table
+    super::terminal::show(&table);
+    say!(
+        "The loops run without noise; pp is what still moves, peak to peak. The prediction has neither ADC nor NCO, so that the \
+         error may be larger by what these two add. By theory no error is too small for a loop to correct: there is no dead \
+         band."
+    );
 }
 
 /// Decimals that show a tolerance.

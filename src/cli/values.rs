@@ -8,8 +8,37 @@ use clap::builder::PossibleValue;
 /// # Errors
 /// What is none, such as a number with a unit.
 pub(super) fn number(text: &str) -> Result<f64, String> {
-    let parsed = text.trim().parse();
-    parsed.map_err(|_| "it is no number; give one without its unit, such as 0.5 or 3600".to_owned())
+    let text = text.trim();
+    text.parse().map_err(|_| {
+        let with_point = text.replacen(',', ".", 1);
+        match with_point != text && with_point.parse::<f64>().is_ok() {
+            true => format!("the decimal mark is a point; give {with_point}"),
+            false => "it is no number; give one without its unit, such as 0.5 or 3600".to_owned(),
+        }
+    })
+}
+
+/// The digits of a count that is written in another way: `200k`, `1e6`, `10_000`. `None` for what is no such count.
+pub(super) fn plain_integer(text: &str) -> Option<u64> {
+    let plain: String = text.chars().filter(|c| !"_' ".contains(*c)).collect();
+    if let Ok(digits) = plain.parse::<u64>() {
+        return (plain != text).then_some(digits);
+    }
+    let (number, zeros) = match plain.char_indices().last()? {
+        (at, 'k' | 'K') => (&plain[..at], 3),
+        (at, 'M') => (&plain[..at], 6),
+        (at, 'G') => (&plain[..at], 9),
+        _ => (plain.as_str(), 0),
+    };
+    // `inf` and a sign are no count.
+    if !number.starts_with(|c: char| c.is_ascii_digit()) {
+        return None;
+    }
+    let value = format!("{number}e{zeros}")
+        .parse()
+        .or_else(|_| number.parse::<f64>());
+    let value = value.ok()?;
+    (value.fract() == 0.0 && value < 1e15).then_some(value as u64)
 }
 
 /// A choice of the library's as a value of the command line: variant, spelling, what it means.
@@ -86,3 +115,32 @@ values!(crate::approx::form::table::Kind {
     Linear = "linear", "Between two entries";
     Quadratic = "quadratic", "Through three entries";
 });
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_in_another_spelling_are_given_in_digits() {
+        for (text, digits) in [
+            ("200k", Some(200_000)),
+            ("1.5M", Some(1_500_000)),
+            ("1e6", Some(1_000_000)),
+            ("10_000", Some(10_000)),
+            ("many", None),
+            ("-5", None),
+            ("0.5", None),
+            ("0", None),
+            ("", None),
+        ] {
+            assert_eq!(plain_integer(text), digits, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_decimal_comma_is_shown_with_a_point() {
+        assert_eq!(number(" 0.5 "), Ok(0.5));
+        assert!(number("0,01").is_err_and(|e| e.contains("give 0.01")));
+        assert!(number("5 Hz").is_err_and(|e| e.contains("without its unit")));
+    }
+}

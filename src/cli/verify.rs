@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 /// runs the bundle's code: do not verify a bundle that you would not build.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Folder of the bundle, as `emit` and `run` write them (`out/firmware/c`).
+    /// Folder of the bundle, as `emit`, `run`, `close` and `approx` write them (`out/firmware/c`).
     bundle: PathBuf,
     /// The processor that the code is built for and runs on.
     #[arg(long, value_enum, default_value = "host")]
@@ -180,8 +180,8 @@ fn reasons(v: &Verification) -> Vec<String> {
     reasons.extend(v.problems.iter().cloned());
     if !v.changed_files.is_empty() || !v.problems.is_empty() {
         reasons.push(
-            "move files of your own out of the folder, and emit the bundle again where its files changed (`--force` \
-             replaces edited ones)"
+            "move files of your own out of the folder; where the bundle's files changed, write it again with the command that made \
+             it (`--force` replaces edited ones)"
                 .to_owned(),
         );
     }

@@ -314,6 +314,13 @@ pub fn sentences(design: &Design, bounds: &Bounds) -> Vec<String> {
             number(fitted.std_max_dps, 3),
             number(fitted.heldout_rms_dps, 3)
         ));
+        if let Some(rms) = fitted.loop_rms_dps {
+            lines.push(format!(
+                "Heating and cooling differ by {} deg/s rms at the same reading of the thermometer. No polynomial in it follows both: \
+                 `gyrogen close` looks for the cause.",
+                number(rms, 3)
+            ));
+        }
     }
     if let Some((low, high)) = c.flagged_range() {
         lines.push(format!(

@@ -30,6 +30,7 @@ fn random(seed: u64) -> Design {
         coefficients_dps: fitted,
         std_max_dps: 0.0,
         heldout_rms_dps: 0.0,
+        loop_rms_dps: None,
     });
     design
 }
@@ -168,4 +169,18 @@ fn beyond_the_range_the_slope_is_held_and_the_worst_is_stated() {
             worst[1]
         );
     }
+}
+
+#[test]
+fn a_loop_of_heating_and_cooling_is_told() {
+    let mut design = random(3);
+    let found = bounds(&design).unwrap().unwrap();
+    assert!(!sentences(&design, &found).join(" ").contains("cooling"));
+    let fitted = design.compensation.as_mut().and_then(|c| c.fitted.as_mut());
+    fitted.unwrap().loop_rms_dps = Some(0.125);
+    let said = sentences(&design, &found).join(" ");
+    assert!(
+        said.contains("Heating and cooling differ by 0.125 deg/s rms"),
+        "{said}"
+    );
 }

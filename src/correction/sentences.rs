@@ -40,12 +40,16 @@ pub fn facts(correction: &Correction) -> Vec<String> {
 
 fn called(plan: &Plan) -> String {
     let period = format!("one call a reading, every {} s", in_words(plan.period_s));
+    let own = "It was found in readings that are averaged as the rows of the record are: average yours over the same time";
     // Without a memory the number of calls changes nothing.
     match plan.terms.iter().any(Term::remembers) {
         true => format!(
-            "correction of averaged readings: {period}; after a gap of k periods, k calls with the new words"
+            "correction of averaged readings: {period}; after a gap of k periods, k calls with the new words. {own}, for its memory \
+             counts calls"
         ),
-        false => format!("correction of averaged readings: {period}"),
+        false => format!(
+            "correction of averaged readings: {period}. {own}; it has no memory, so that another number of calls changes nothing"
+        ),
     }
 }
 
@@ -80,7 +84,14 @@ fn sentence(term: &Term, curves: &mut usize) -> String {
         Term::ScaleBy { .. } | Term::Cubic { .. } | Term::Even { .. } => {
             format!("error on the rate r: {}", on_rate(term))
         }
-        _ => format!("subtracted: {}", on_bias(term, curves)),
+        _ => {
+            let said = on_bias(term, curves);
+            // What is subtracted with a minus is added.
+            match said.strip_prefix('-') {
+                Some(said) => format!("added: {said}"),
+                None => format!("subtracted: {said}"),
+            }
+        }
     }
 }
 
@@ -213,20 +224,24 @@ fn curve(input: usize, values: &[f64], curves: &mut usize) -> String {
     )
 }
 
+/// A constant in a sum, with its sign.
+fn added(value: f64) -> String {
+    let sign = if value < 0.0 { '-' } else { '+' };
+    format!(" {sign} {}", in_words(value.abs()))
+}
+
 /// The error that a term has on the rate r, deg/s.
 fn on_rate(term: &Term) -> String {
     match term {
         Term::ScaleBy { input, s0, s1, s2 } => match input.map(name) {
-            Some(x) if *s2 == 0.0 => format!(
-                "r * ({s0} + {s1} * {x})",
-                s0 = in_words(*s0),
-                s1 = in_words(*s1)
-            ),
+            Some(x) if *s2 == 0.0 => {
+                format!("r * ({s0}{s1} * {x})", s0 = in_words(*s0), s1 = added(*s1))
+            }
             Some(x) => format!(
-                "r * ({s0} + {s1} * {x} + {s2} * {x}^2)",
+                "r * ({s0}{s1} * {x}{s2} * {x}^2)",
                 s0 = in_words(*s0),
-                s1 = in_words(*s1),
-                s2 = in_words(*s2)
+                s1 = added(*s1),
+                s2 = added(*s2)
             ),
             None => format!("r * {s0}", s0 = in_words(*s0)),
         },
@@ -295,7 +310,7 @@ mod tests {
         assert_eq!(said(product(1.5, vec![])), "subtracted: 1.5 deg/s");
         assert_eq!(
             said(product(-2.0, vec![(0, 1), (2, 3)])),
-            "subtracted: -2 deg/s * input_1 * input_3^3"
+            "added: 2 deg/s * input_1 * input_3^3"
         );
         let values_dps = vec![0.0, 1.0, 0.5];
         assert_eq!(
@@ -329,7 +344,7 @@ mod tests {
         );
         assert_eq!(
             said(scale(Some(0), -0.25)),
-            "error on the rate r: r * (0.001 + 0.5 * input_1 + -0.25 * input_1^2)"
+            "error on the rate r: r * (0.001 + 0.5 * input_1 - 0.25 * input_1^2)"
         );
     }
 }

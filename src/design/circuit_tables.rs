@@ -306,6 +306,10 @@ fn fitted_table(table: &Table, count: usize) -> Result<Fitted> {
         coefficients_dps,
         std_max_dps: size("std_max_dps")?,
         heldout_rms_dps: size("heldout_rms_dps")?,
+        loop_rms_dps: match table.get("loop_rms_dps") {
+            Some(value) => Some(value.real(Real::NotNegative, "deg/s")?),
+            None => None,
+        },
     })
 }
 

@@ -65,6 +65,9 @@ pub struct Fitted {
     pub std_max_dps: f64,
     /// What the polynomial leaves of data that it has not seen, rms, deg/s.
     pub heldout_rms_dps: f64,
+    /// `loop_rms_dps`: by how much heating and cooling differ at the same reading, rms, deg/s, where that is more than
+    /// noise.
+    pub loop_rms_dps: Option<f64>,
 }
 
 impl CompensationInput {

@@ -386,15 +386,20 @@ pub(super) fn record(t: &Table, base: Option<&RecordMapping>) -> Result<RecordMa
     };
     let mut columns = base.columns;
     let mut units = base.units;
-    let (named, stated) = record_columns(&t.section("columns")?)?;
+    let given = t.section("columns")?;
+    let (named, stated) = record_columns(&given)?;
     for role in named.keys() {
         units.remove(role);
     }
     columns.extend(named);
     units.extend(stated);
+    let mut places = base.places;
+    let entries = given.entries().into_iter();
+    places.extend(entries.map(|(role, value)| (role.to_owned(), value.error(""))));
     Ok(RecordMapping {
         columns,
         units,
+        places,
         row_period_s,
         thermometer,
         axis,

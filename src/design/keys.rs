@@ -129,6 +129,7 @@ pub(super) const KEYS: &[(&str, &[(&str, &str)])] = &[
             ("coefficients_dps", "[109.60, 763.31, 1350.36]"),
             ("std_max_dps", "0.01"),
             ("heldout_rms_dps", "0.02"),
+            ("loop_rms_dps", "0.05"),
         ],
     ),
     (

@@ -170,9 +170,46 @@ fn syntax(doc: &Doc, e: &toml::de::Error) -> Error {
         "write `key = value` in a line of its own, `[table]` before the keys of a table"
     };
     let offset = e.span().map_or(0, |span| span.start);
+    let help = of_value(doc.text, offset).unwrap_or(help.to_owned());
     doc.error(offset, format!("this is not TOML: {said}"))
         .help(help)
         .into()
+}
+
+/// What to write instead of the value in the line of a mistake: a decimal comma, a number with its unit, a text without
+/// quotes.
+fn of_value(text: &str, offset: usize) -> Option<String> {
+    let start = text.get(..offset)?.rfind('\n').map_or(0, |p| p + 1);
+    let (key, value) = text.get(start..)?.lines().next()?.split_once('=')?;
+    if offset < start + key.len() {
+        return None;
+    }
+    let (key, value) = (key.trim(), value.split('#').next()?.trim());
+    let is_digits = |t: &str| !t.is_empty() && t.bytes().all(|b| b.is_ascii_digit());
+    let unsigned = value.trim_start_matches(['-', '+']);
+    if let Some((whole, rest)) = unsigned.split_once(',')
+        && is_digits(whole)
+        && is_digits(rest)
+    {
+        let value = value.replacen(',', ".", 1);
+        return Some(format!(
+            "write the decimal mark as a point: `{key} = {value}`"
+        ));
+    }
+    if let Some((number, unit)) = value.split_once(' ')
+        && number.parse::<f64>().is_ok_and(f64::is_finite)
+        && !unit.contains(['"', '\'', '='])
+    {
+        return Some(format!(
+            "give the number alone, the key's name has the unit: `{key} = {number}`"
+        ));
+    }
+    let is_text = value.starts_with(|c: char| c.is_ascii_alphabetic())
+        && value
+            .chars()
+            .all(|c| c.is_alphanumeric() || "_-. ".contains(c));
+    let is_truth = ["true", "false"].contains(&value.to_lowercase().as_str());
+    (is_text && !is_truth).then(|| format!("put the text in double quotes: `{key} = \"{value}\"`"))
 }
 
 #[cfg(test)]

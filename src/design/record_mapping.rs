@@ -1,6 +1,7 @@
 //! `[record]`: how a measured record is read.
 
 use super::log_axis::LogAxis;
+use crate::error::InputError;
 use std::collections::BTreeMap;
 
 /// `[record]`: how a measured record is read.
@@ -11,6 +12,8 @@ pub struct RecordMapping {
     /// The unit in which the file has a column, as the design writes it, by contract column:
     /// `rate_out_dps = { column = "gyro_z", unit = "rad/s" }`.
     pub units: BTreeMap<String, String>,
+    /// Where the design names a column of the file, by contract column: an error there, its message still to be given.
+    pub places: BTreeMap<String, InputError>,
     /// `row_period_s`: the clock of a record without `time_s`, s per row.
     pub row_period_s: Option<f64>,
     /// `thermometer`: the column of the bias model; default: the first of phase_rad, freq_hz,

@@ -400,8 +400,14 @@ impl<'a> Value<'a> {
     pub fn format(&self) -> Result<Format> {
         match self.value.get_ref() {
             DeValue::String(text) => text.parse().map_err(|rule: String| {
+                let remedy = suggest::format_remedy(text);
+                // The remedy says it with the rule.
+                let rule = match rule.split_once("; did you mean") {
+                    Some((rule, _)) if remedy.starts_with("did you mean") => rule,
+                    _ => &rule,
+                };
                 let e = self.error(format!("is no format: {rule}"));
-                e.help(suggest::format_remedy(text)).into()
+                e.help(remedy).into()
             }),
             DeValue::Table(_) => Err(self.wrong_type(
                 "a format as a string only",

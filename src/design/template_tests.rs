@@ -72,6 +72,7 @@ fn every_setting_that_is_off_can_be_turned_on() {
         "coefficients_dps",
         "std_max_dps",
         "heldout_rms_dps",
+        "loop_rms_dps",
         "row_period_s",
         "thermometer",
         "average_s",

@@ -3,8 +3,9 @@
 use super::bundle::{Bundle, StateType};
 use super::machine::{Type, Width};
 use super::{c, rust};
+use crate::numeric::arithmetic::Port;
 use crate::numeric::trace::ir::{Interval, SlotKind};
-use crate::text::{self, Place};
+use crate::text::{self, Place, constant};
 
 /// A language to print.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -281,7 +282,7 @@ pub fn structs(bundle: &Bundle, language: Language) -> Vec<StructView> {
                 Language::C => format!("{} {name}", c::type_name(&bundle.prefix, v.ty)),
                 Language::Rust => format!("{name}: {}", rust::type_name(v.ty)),
             };
-            (declaration, text::shown(&port.meaning, Place::Source))
+            (declaration, text::shown(&meaning(port), Place::Source))
         });
         structs.push(StructView {
             name: function.name.clone(),
@@ -299,23 +300,49 @@ pub fn functions(bundle: &Bundle, language: Language) -> Vec<FunctionView> {
         .collect()
 }
 
+/// A port's name, its range in words and, where its scale is known, in its quantity, and what it means.
+fn described(port: &Port, range: Interval) -> String {
+    let quantity = port.scale.as_ref().map(|s| {
+        let at = |raw: i128| constant(s.offset + s.factor * raw as f64, 7);
+        // A quantity's name has the unit where the scale has none.
+        let unit = if s.unit.is_empty() {
+            &s.quantity
+        } else {
+            s.unit
+        };
+        format!(" ({} .. {} {unit})", at(range.low), at(range.high))
+    });
+    format!(
+        "{}: {} .. {}{}; {}",
+        port.name,
+        range.low,
+        range.high,
+        quantity.unwrap_or_default(),
+        meaning(port)
+    )
+}
+
+/// What a port's words are, the value of a step apart from the word's own format.
+fn meaning(port: &Port) -> String {
+    let parts = port.meaning.split_once(" = raw * ");
+    let parts = parts.and_then(|(what, rest)| Some((what, rest.split_once(", ")?)));
+    match parts {
+        Some((what, (worth, format))) => format!("{what} = raw * {worth}; word format {format}"),
+        None => port.meaning.clone(),
+    }
+}
+
 fn function(bundle: &Bundle, k: usize, language: Language) -> FunctionView {
     let (function, lowered) = (&bundle.program.functions[k], &bundle.lowered[k]);
     let p = &bundle.prefix;
     let mut notes = Vec::new();
     for (port, range) in &function.inputs {
-        notes.push(format!(
-            "in  {}: {} .. {}; {}",
-            port.name, range.low, range.high, port.meaning
-        ));
+        notes.push(format!("in  {}", described(port, *range)));
     }
     for (port, id) in &function.outputs {
         if !port.name.is_empty() {
             let range = function.nodes[*id].range;
-            notes.push(format!(
-                "out {}: {} .. {}; {}",
-                port.name, range.low, range.high, port.meaning
-            ));
+            notes.push(format!("out {}", described(port, range)));
         }
     }
     notes.extend(guarantee(&function.name).map(str::to_owned));
@@ -427,4 +454,26 @@ pub const BASIS: u64 = 0xcbf2_9ce4_8422_2325;
 /// One step of the checksum.
 pub fn mix(h: u64, word: u64) -> u64 {
     (h ^ word).wrapping_mul(0x100_0000_01b3)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_port_says_its_range_in_words_and_in_its_quantity() {
+        let port = Port::new("rate", "sense I = raw * 2^-11 deg/s, Q2.22");
+        let plain = described(&port, Interval::new(-2048, 4096));
+        assert_eq!(
+            plain,
+            "rate: -2048 .. 4096; sense I = raw * 2^-11 deg/s; word format Q2.22"
+        );
+        let scaled = described(
+            &port.in_unit("sense I", -11, "deg/s"),
+            Interval::new(-2048, 4096),
+        );
+        assert!(scaled.starts_with("rate: -2048 .. 4096 (-1 .. 2 deg/s); sense I = "));
+        let other = Port::new("carrier", "NCO output, Q1.15");
+        assert!(described(&other, Interval::new(0, 1)).ends_with("; NCO output, Q1.15"));
+    }
 }

@@ -10,6 +10,9 @@ const MOST_BYTES: u64 = 1 << 28;
 /// Most files of a folder that are looked at.
 const MOST_FILES: usize = 10_000;
 
+/// What mends a bundle that is not whole.
+pub const AGAIN: &str = "write the bundle again with the command that made it: `gyrogen run`, `close`, `emit` or `approx`";
+
 /// A folder with the files that it may be asked for.
 #[derive(Debug)]
 pub struct Folder {
@@ -29,7 +32,7 @@ impl Folder {
         if !root.is_dir() {
             return Err(InputError::new("this is no folder with a bundle")
                 .in_file(path)
-                .help("name the folder that `gyrogen emit` wrote")
+                .help("name the folder of sources that `run`, `close`, `emit` or `approx` wrote")
                 .into());
         }
         Ok(Folder {
@@ -46,13 +49,7 @@ impl Folder {
         let path = self.confined(name)?;
         let failed =
             |e: std::io::Error| io_error(self.named.join(name), "read the bundle's file", &e);
-        let file = std::fs::File::open(&path).map_err(|e| match e.kind() {
-            std::io::ErrorKind::NotFound => InputError::new("the bundle lacks this file")
-                .in_file(self.named.join(name))
-                .help("emit the bundle again")
-                .into(),
-            _ => failed(e),
-        })?;
+        let file = std::fs::File::open(&path).map_err(|e| self.unread(name, &e))?;
         let mut bytes = Vec::new();
         file.take(MOST_BYTES + 1)
             .read_to_end(&mut bytes)
@@ -86,8 +83,7 @@ impl Folder {
         for part in Path::new(name).components() {
             path.push(part);
             let found = path.symlink_metadata();
-            let found =
-                found.map_err(|e| io_error(self.named.join(name), "read the bundle's file", &e))?;
+            let found = found.map_err(|e| self.unread(name, &e))?;
             if found.file_type().is_symlink() {
                 return Err(self.refused(name, "it is a link"));
             }
@@ -99,10 +95,21 @@ impl Folder {
         Ok(path)
     }
 
+    /// The error for a file that is missing or cannot be read.
+    fn unread(&self, name: &str, e: &std::io::Error) -> crate::error::Error {
+        if e.kind() != std::io::ErrorKind::NotFound {
+            return io_error(self.named.join(name), "read the bundle's file", e);
+        }
+        InputError::new(format!("the bundle's file {name:?} is missing"))
+            .in_file(self.named.join(name))
+            .help(AGAIN)
+            .into()
+    }
+
     fn refused(&self, name: &str, why: &str) -> crate::error::Error {
         InputError::new(format!("the bundle's file {name:?} is not read: {why}"))
             .in_file(&self.named)
-            .help("a bundle is a folder of regular files; emit it again with `gyrogen emit`")
+            .help(format!("a bundle is a folder of regular files; {AGAIN}"))
             .into()
     }
 
@@ -198,5 +205,8 @@ mod tests {
         for name in ["link", "dev/zero", "absent", "../plain"] {
             assert!(folder.read(name).is_err(), "{name}");
         }
+        let said = folder.read("absent").expect_err("missing").to_string();
+        assert!(said.contains("\"absent\" is missing"), "{said}");
+        assert!(said.contains("`gyrogen run`, `close`"), "{said}");
     }
 }

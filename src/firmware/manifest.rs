@@ -6,7 +6,7 @@ use crate::design::{CompensationInput, Design, Outside};
 use crate::digest::sha256;
 use crate::emit::bundle::Bundle;
 use crate::emit::views::Language;
-use crate::numeric::format::Overflow;
+use crate::numeric::format::{Overflow, pow2};
 use crate::text::{self, Place};
 use serde::{Deserialize, Serialize};
 
@@ -234,7 +234,10 @@ pub fn facts(design: &Design, bundle: &Bundle) -> Vec<String> {
                     Outside::HoldSlope => "the slope of the nearer end is held",
                     Outside::Flag => "the input is clamped and in_range is 0",
                 };
-                format!("calibrated for inputs {low} .. {high}; outside, {outside}")
+                format!(
+                    "calibrated for inputs {low} .. {high} ({}); outside, {outside}",
+                    in_quantity(design, &k.input, (low, high))
+                )
             }
             None => "no calibrated range: the polynomial is evaluated at every input".into(),
         });
@@ -262,6 +265,26 @@ fn input(input: &CompensationInput) -> String {
             c.column, c.format, c.offset_raw, c.scale_bits
         ),
     }
+}
+
+/// A range of input words as the quantity that they stand for.
+fn in_quantity(design: &Design, input: &CompensationInput, range: (i128, i128)) -> String {
+    let c = &design.circuit;
+    let (zero, factor, unit) = match input {
+        CompensationInput::Phase => {
+            let turn = pow2(-(c.cordic.angle_bits as i32));
+            (0.0, std::f64::consts::TAU * turn, "rad")
+        }
+        CompensationInput::TuningWord(_) => (
+            c.nco.tuning_word as f64,
+            c.sample_rate_hz * pow2(-(c.nco.phase_bits as i32)),
+            "Hz",
+        ),
+        // The column's name has the unit.
+        CompensationInput::Channel(channel) => (0.0, channel.format.lsb(), channel.column.as_str()),
+    };
+    let at = |raw: i128| text::constant((zero + raw as f64) * factor, 7);
+    format!("{} .. {} {unit}", at(range.0), at(range.1))
 }
 
 /// Where a bundle comes from and what it is.
@@ -399,5 +422,32 @@ impl Manifest {
 
     fn text(&self) -> String {
         text::json(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::design::{ChannelInput, reader};
+    use crate::emit::bundle::Part;
+    use crate::numeric::format::Format;
+
+    #[test]
+    fn the_calibrated_range_is_told_in_its_quantity() {
+        let mut design = reader::read(None).expect("the default");
+        let c = design.compensation.as_mut().expect("a compensation");
+        c.clamp_raw = Some((-4194304, -2097152));
+        let said = facts(&design, &Bundle::new(&design, Part::Compensation)).join("\n");
+        let told = "inputs -4194304 .. -2097152 (-1.570796 .. -0.7853982 rad); outside, the input is clamped";
+        assert!(said.contains(told), "{said}");
+        let channel = CompensationInput::Channel(ChannelInput {
+            column: "die_degc".into(),
+            format: Format::q(8, 8),
+            offset_raw: 0,
+            scale_bits: 15,
+            rate_format: Format::q(4, 28),
+        });
+        let die = in_quantity(&design, &channel, (-2560, 16640));
+        assert_eq!(die, "-10 .. 65 die_degc");
     }
 }

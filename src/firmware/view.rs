@@ -59,6 +59,8 @@ pub struct View {
     pub(super) checks: Vec<&'static str>,
     pub(super) wide: bool,
     pub(super) chain: bool,
+    /// The compensation's polynomial was fitted to a record.
+    pub(super) fitted: bool,
     pub(super) ratio: u32,
     pub(super) initial: Vec<String>,
     pub(super) sample_faults: bool,
@@ -154,6 +156,7 @@ impl View {
             checks: checks(bundle),
             wide: wide(bundle),
             chain: bundle.has_chain,
+            fitted: false,
             ratio: bundle.ratio,
             initial: initial(bundle, language),
             sample_faults: faults("sample"),
@@ -215,6 +218,8 @@ impl View {
         bundle: &Bundle,
         language: Language,
     ) -> Self {
+        let compensation = design.compensation.as_ref();
+        self.fitted = compensation.is_some_and(|c| c.fitted.is_some());
         let code = design.circuit.adc.format;
         let code = Interval::new(code.min_raw(), code.max_raw());
         self.code = match language {

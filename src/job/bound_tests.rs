@@ -37,6 +37,7 @@ fn random(seed: u64) -> Design {
         coefficients_dps: fitted,
         std_max_dps: 0.0,
         heldout_rms_dps: 0.0,
+        loop_rms_dps: None,
     });
     let auto = !seed.is_multiple_of(3);
     let targets = [Target::Host, Target::CortexM0, Target::CortexM4];

@@ -78,6 +78,7 @@ pub fn round(design: &mut Design, fit: &BaselineFit) -> Result<Rounded> {
             coefficients_dps: exact.clone(),
             std_max_dps: fit.std_max_dps(),
             heldout_rms_dps: fit.heldout_rms_dps,
+            loop_rms_dps: fit.sweep_loop.filter(|l| l.significant).map(|l| l.rms_dps),
         }),
         form: None,
         ..c.clone()

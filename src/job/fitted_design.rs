@@ -103,6 +103,9 @@ fn compensation(c: &Compensation, bound: Option<BiasBound>) -> String {
         _ = writeln!(text, "coefficients_dps = {:?}", fitted.coefficients_dps);
         _ = writeln!(text, "std_max_dps = {:?}", fitted.std_max_dps);
         _ = writeln!(text, "heldout_rms_dps = {:?}", fitted.heldout_rms_dps);
+        if let Some(rms) = fitted.loop_rms_dps {
+            _ = writeln!(text, "loop_rms_dps = {rms:?}");
+        }
     }
     text
 }
@@ -143,6 +146,7 @@ mod tests {
                     coefficients_dps: vec![1.5, -0.1, 1e-300, 4e9],
                     std_max_dps: 0.0,
                     heldout_rms_dps: 0.25,
+                    loop_rms_dps: Some(0.125),
                 });
             }
             let back = reader::parse(&text(&design), None).expect("a design");

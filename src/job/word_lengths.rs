@@ -128,18 +128,19 @@ impl WordLengths {
         };
         let whose = match self.covers {
             Covers::CircuitAndCompensation => "word lengths of circuit and compensation",
-            Covers::Compensation => {
-                "word lengths of the compensation (a record passes no other part)"
-            }
+            Covers::Compensation => "word lengths of the compensation",
         };
         let mut text = format!(
-            "{limiting}: fit {} deg/s (held-out rms), {whose} {} deg/s rms, {} at most (fixed point less floating point, over \
-             {} readings)",
+            "{limiting}: fit {} deg/s held-out rms, {whose} {} deg/s rms. Over {} readings fixed point and floating point differ by \
+             {} deg/s at most",
             shown(fit_dps, 3),
             shown(self.rms_dps, 2),
-            shown(self.max_dps, 2),
-            self.readings
+            self.readings,
+            shown(self.max_dps, 2)
         );
+        if self.covers == Covers::Compensation {
+            text += ". A record passes no other part than the compensation";
+        }
         match &self.largest {
             Some(w) => {
                 text += &format!(
@@ -156,7 +157,7 @@ impl WordLengths {
             None => {}
         }
         text += &format!(
-            ". The compensation alone is within {} deg/s of the fitted polynomial (bound).",
+            ". The compensation alone is within {} deg/s of the fitted polynomial, which is proved.",
             shown(bound_dps, 2)
         );
         text

@@ -97,6 +97,22 @@ impl From<Format> for String {
     }
 }
 
+/// What `Q15` (the sign bit left out) and `q1.15` mean.
+fn short(text: &str) -> Option<String> {
+    let upper = text.to_uppercase();
+    let (sign, rest) = match upper.strip_prefix("UQ") {
+        Some(rest) => ("U", rest),
+        None => ("", upper.strip_prefix('Q')?),
+    };
+    let is_number = |s: &str| !s.is_empty() && s.len() < 3 && s.bytes().all(|b| b.is_ascii_digit());
+    match rest.split_once('.') {
+        Some((m, n)) if is_number(m) && is_number(n) => Some(format!("{sign}Q{rest}")),
+        None if is_number(rest) && sign.is_empty() => Some(format!("Q1.{rest}")),
+        None if is_number(rest) => Some(format!("UQ0.{rest}")),
+        _ => None,
+    }
+}
+
 impl FromStr for Format {
     type Err = String;
 
@@ -108,7 +124,10 @@ impl FromStr for Format {
                     .iter()
                     .all(|d| !d.is_empty() && d.bytes().all(|b| b.is_ascii_digit()))
             });
-            let meant = plain.map_or(String::new(), |_| format!("; did you mean `Q{text}`?"));
+            let meant = match short(text) {
+                Some(meant) => format!("; did you mean `{meant}`?"),
+                None => plain.map_or(String::new(), |_| format!("; did you mean `Q{text}`?")),
+            };
             format!("`{text}` is not a format of the form Qm.n or UQm.n{meant}")
         };
         let (signed, rest) = match text.strip_prefix("UQ") {
@@ -290,7 +309,10 @@ mod tests {
             ("Q0.16", "sign"),
             ("Q1.64", "65 bits"),
             ("UQ0.0", "0 bits"),
-            ("q1.15", "form"),
+            ("q1.15", "did you mean `Q1.15`"),
+            ("Q15", "did you mean `Q1.15`"),
+            ("uq16", "did you mean `UQ0.16`"),
+            ("1.15", "did you mean `Q1.15`"),
             ("Q1,15", "form"),
             ("Q1.15 ", "form"),
             ("Q+1.15", "form"),

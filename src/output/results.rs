@@ -7,7 +7,7 @@
 use super::known::{self, Known};
 use super::{OutputFile, same, target, write_failed};
 use crate::digest::sha256;
-use crate::error::{Error, InputError, Result, io_error};
+use crate::error::{Error, InputError, Result, cause, io_error};
 use crate::leftovers::{TemporaryFolder, undisturbed};
 use std::fs;
 use std::io;
@@ -57,7 +57,7 @@ impl Results {
             known.refuse(out, planned)?;
         }
         let staged = TemporaryFolder::new(&existing).map_err(|e| {
-            let error = InputError::new(format!("cannot write into this folder: {e}"));
+            let error = InputError::new(format!("cannot write into this folder: {}", cause(&e)));
             error
                 .in_file(&existing)
                 .help("check its permissions and the disk, or name another folder with --out")

@@ -78,6 +78,10 @@ fn refuse_by_name(path: &Path, start: &[u8]) -> Result<()> {
             "the file is named as a telemetry log (MAVLink)",
             "its IMU messages are few and scaled; give the log that the vehicle itself wrote (ArduPilot: .bin, PX4: .ulg)",
         ),
+        "raw" | "pcm" | "i16" | "s16" | "int16" | "i32" => (
+            "the file is named as raw samples, which are a capture of ADC codes and no thermal record",
+            thermal::CAPTURE.1,
+        ),
         _ if start.starts_with(b"FMT, ") || start.starts_with(b"FMT,1") => (
             "this is an ArduPilot log in its text form",
             "give the .bin file that it was made from",

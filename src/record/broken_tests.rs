@@ -106,11 +106,15 @@ fn broken_records_are_refused_with_their_place() {
             &["no header", "numbers only"],
         ),
         (
-            "semicolons",
-            b"time_s;rate_out_dps\n1;2\n".to_vec(),
+            "semicolons, a bad cell",
+            format!("{HEADER}\n{}\n", good_rows().join("\n"))
+                .replace(',', ";")
+                .replace('.', ",")
+                .replace("0;0,000", "0;0,0x")
+                .into_bytes(),
             plain.clone(),
-            Some((1, 1)),
-            &["semicolons", "commas"],
+            Some((2, 3)),
+            &["0;0,0x;20,0", "rate_out_dps is no number"],
         ),
         (
             "tabs",
@@ -153,7 +157,7 @@ fn broken_records_are_refused_with_their_place() {
             &[
                 "no column time_s",
                 "row_period_s",
-                "time_s = \"NAME_IN_THE_FILE\"",
+                "time_s = { column = \"t_ms\", unit = \"ms\" }",
             ],
         ),
         (

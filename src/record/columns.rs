@@ -7,6 +7,7 @@ use crate::design::RecordMapping;
 pub use crate::design::record_columns::{KNOWN, THERMOMETERS, is_known, unit_of};
 use crate::design::units::{self, Unit};
 use crate::error::{InputError, Result};
+use crate::nearest::nearest;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -89,18 +90,7 @@ pub(super) fn resolve(line: Line<'_>, mapping: &RecordMapping) -> Result<Roles> 
     for (role, wanted) in &mapping.columns {
         match names.iter().position(|n| n == wanted) {
             Some(i) if !wanted.is_empty() => columns[i].1.push(role.clone()),
-            _ => {
-                return Err(line
-                    .error(
-                        1,
-                        format!(
-                            "the record has no column \"{wanted}\", which [record.columns] names \
-                             for {role}"
-                        ),
-                        suggestion(role, &names),
-                    )
-                    .into());
-            }
+            _ => return Err(lacking(line, mapping, role, wanted, &names).into()),
         }
     }
     let mut warnings = Vec::new();
@@ -143,6 +133,32 @@ pub(super) fn resolve(line: Line<'_>, mapping: &RecordMapping) -> Result<Roles> 
         }
     }
     Ok(roles)
+}
+
+/// The error for a column that the design names and the file lacks: in the design, where its place is known.
+fn lacking(
+    line: Line<'_>,
+    mapping: &RecordMapping,
+    role: &str,
+    wanted: &str,
+    names: &[&str],
+) -> InputError {
+    let Some(place) = mapping.places.get(role) else {
+        let message = format!(
+            "the record has no column \"{wanted}\", which [record.columns] names for {role}"
+        );
+        return line.error(1, message, suggestion(role, names));
+    };
+    let meant = nearest(wanted, names).or_else(|| guesses::guess(role, names));
+    let meant = meant.map_or(String::new(), |m| format!("did you mean \"{m}\"? "));
+    InputError {
+        message: format!(
+            "the record {} has no column \"{wanted}\"",
+            line.path.display()
+        ),
+        ..place.clone()
+    }
+    .help(format!("{meant}{}", guesses::listed(names)))
 }
 
 /// Gives the contract's column to a file's column that has it in another unit (`time_ms`), where nothing else does.
@@ -298,13 +314,13 @@ fn header_cells(line: Line<'_>) -> Result<Vec<Cell<'_>>> {
         Err(column) => return Err(open_quote(line, column).into()),
     };
     if let [only] = header.as_slice() {
-        for (mark, name) in [(';', "semicolons"), ('\t', "tabs"), ('|', "bars")] {
+        for (mark, name) in [('\t', "tabs"), ('|', "bars")] {
             if only.text.contains(mark) {
                 return Err(line
                     .error(
                         1,
                         format!("the columns are separated by {name}"),
-                        "separate them with commas, and write decimal points".to_owned(),
+                        "separate them with commas or semicolons".to_owned(),
                     )
                     .into());
             }

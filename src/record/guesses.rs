@@ -40,24 +40,32 @@ pub(super) fn guesses<'a>(role: &str, names: &[&'a str]) -> Vec<&'a str> {
         let stated = units::stated(name, "die_degc").is_some_and(|u| u.of == "degC");
         stated || HEAT.iter().any(|hint| name.contains(hint))
     };
+    let is_time = |name: &str| units::stated(name, "time_s").is_some_and(|u| u.of == "s");
+    // `t_ms` has its unit alone to say that it is a time; a rate in deg/sec has one that says it is none.
+    let of_time = |name: &str| is_time(name) || name == "t";
     let others = |name: &&&str| {
         **name != "time_since_power_on_s"
             && !is_of_codes(name)
+            && (role != "time_s" || is_time(name) || units::stated(name, role).is_none())
             && (unit_of(role) != "deg/s" || !is_heat(&name.to_lowercase()))
     };
     let of = |hint: &&str| -> Vec<&'a str> {
         let fit = names.iter().filter(|n| n.to_lowercase().contains(hint));
         fit.filter(others).copied().collect()
     };
+    let by_unit = || -> Vec<&'a str> {
+        let fit = names.iter().filter(|n| role == "time_s" && of_time(n));
+        fit.filter(others).copied().collect()
+    };
     hints
         .iter()
         .map(of)
         .find(|found| !found.is_empty())
-        .unwrap_or_default()
+        .unwrap_or_else(by_unit)
 }
 
-/// Lists the file's columns and shows the part of a design file that would map `role`, and what else it lacks.
-pub(super) fn suggestion(role: &str, names: &[&str]) -> String {
+/// The file's columns, for a message.
+pub(super) fn listed(names: &[&str]) -> String {
     let named: Vec<&str> = names.iter().copied().filter(|n| !n.is_empty()).collect();
     let listed: Vec<&str> = named.iter().copied().take(40).collect();
     let more = named.len() - listed.len();
@@ -65,14 +73,33 @@ pub(super) fn suggestion(role: &str, names: &[&str]) -> String {
     if more > 0 {
         text.push_str(&format!(" and {more} more"));
     }
+    text
+}
+
+/// The line of a design that maps `role` to a column, with the unit where the column's name states another than the
+/// contract's.
+fn mapped(role: &str, column: &str) -> String {
+    match units::stated(column, role) {
+        Some(unit) if unit.of == unit_of(role) && !unit.is_own() => format!(
+            "{role} = {{ column = \"{column}\", unit = \"{}\" }}",
+            unit.name
+        ),
+        _ => format!("{role} = \"{column}\""),
+    }
+}
+
+/// Lists the file's columns and shows the part of a design file that would map `role`, and what else it lacks.
+pub(super) fn suggestion(role: &str, names: &[&str]) -> String {
+    let named: Vec<&str> = names.iter().copied().filter(|n| !n.is_empty()).collect();
+    let mut text = listed(names);
     let has = |role: &str| {
         named
             .iter()
             .any(|n| *n == role || units::meant(n) == Some(role))
     };
-    let mut lines = vec![format!(
-        "{role} = \"{}\"",
-        guess(role, &named).unwrap_or("NAME_IN_THE_FILE")
+    let mut lines = vec![mapped(
+        role,
+        guess(role, &named).unwrap_or("NAME_IN_THE_FILE"),
     )];
     // What would be asked for next, where a column looks like it.
     let others = ["time_s", "rate_out_dps", "die_degc"];
@@ -81,7 +108,7 @@ pub(super) fn suggestion(role: &str, names: &[&str]) -> String {
         .filter(|other| *other != role && !has(other));
     let others =
         others.filter(|other| *other != "die_degc" || !THERMOMETERS.iter().any(|t| has(t)));
-    lines.extend(others.filter_map(|o| Some(format!("{o} = \"{}\"", guess(o, &named)?))));
+    lines.extend(others.filter_map(|o| Some(mapped(o, guess(o, &named)?))));
     text.push_str(&format!(
         "\n  say in the design which one it is. These lines are a whole design file, say gyro.toml for `gyrogen run gyro.toml --record \
          ...`:\n    [record.columns]\n    {}",

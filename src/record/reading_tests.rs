@@ -35,6 +35,85 @@ fn what_is_tolerated_reads_the_same() {
 }
 
 #[test]
+fn semicolons_and_decimal_commas_read_as_commas_and_points() {
+    let plain = RecordMapping::default();
+    let text = format!("# by hand, once\n{HEADER}\n{}\n", good_rows().join("\n"));
+    let (record, _) = try_parse(text.as_bytes(), &plain).unwrap();
+    let semicolons = text.replace(',', ";");
+    for (variant, commas) in [
+        (semicolons.clone(), false),
+        (semicolons.replace('.', ","), true),
+    ] {
+        let (other, warnings) = try_parse(variant.as_bytes(), &plain).unwrap();
+        assert_eq!(other, record, "{variant}");
+        let codes: Vec<&str> = warnings.iter().map(|w| w.code).collect();
+        assert_eq!(codes, ["semicolons"]);
+        assert_eq!(warnings[0].message.contains("decimal point"), commas);
+    }
+    // A comma among commas stays what it was.
+    let mixed = with_row(4, "4;0,5;20");
+    assert!(try_parse(&mixed, &plain).is_err());
+}
+
+#[test]
+fn a_column_that_the_design_misspells_is_shown_in_the_design() {
+    let design = "name = \"hub\"\n[record.columns]\nrate_out_dps = \"gyro_x\"\n";
+    let design = crate::design::reader::parse(design, Some(std::path::Path::new("hub.toml")));
+    let mapping = design.unwrap().record;
+    let text = format!("time_s,gyro_z,die_degc\n{}\n", good_rows().join("\n"));
+    let error = try_parse(text.as_bytes(), &mapping).unwrap_err();
+    assert_eq!((error.line, error.column), (Some(3), Some(16)));
+    let said = error.to_string();
+    for part in [
+        "hub.toml:3:16: error: the record r.csv has no column \"gyro_x\"",
+        "did you mean \"gyro_z\"? the file has: time_s, gyro_z, die_degc",
+    ] {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+}
+
+#[test]
+fn a_column_that_is_a_time_by_its_unit_is_proposed_with_it() {
+    let said = |header: &str| {
+        let text = format!("{header}\n{}\n", good_rows().join("\n"));
+        let error = try_parse(text.as_bytes(), &RecordMapping::default()).unwrap_err();
+        error.to_string()
+    };
+    for (header, line) in [
+        (
+            "t_ms,rate_out_dps,die_degc",
+            "time_s = { column = \"t_ms\", unit = \"ms\" }",
+        ),
+        (
+            "uptime_us,gyro_deg_sec,die_degc",
+            "time_s = { column = \"uptime_us\", unit = \"us\" }",
+        ),
+        ("t,rate_out_dps,die_degc", "time_s = \"t\""),
+        ("k,rate_out_dps,t_c", "time_s = \"NAME_IN_THE_FILE\""),
+    ] {
+        assert!(said(header).contains(line), "{line}: {}", said(header));
+    }
+}
+
+#[test]
+fn a_capture_in_the_place_of_a_record_is_told_what_takes_it() {
+    for header in [
+        "drive_code,sense_code",
+        "Drive (V),Sense (V)",
+        "drive;sense",
+    ] {
+        let text =
+            format!("{header}\n1,2\n").replace(',', if header.contains(';') { ";" } else { "," });
+        let error = try_parse(text.as_bytes(), &RecordMapping::default()).unwrap_err();
+        let said = error.to_string();
+        assert!(
+            said.contains("a capture of ADC codes") && said.contains("close --capture"),
+            "{said}"
+        );
+    }
+}
+
+#[test]
 fn missing_cells_text_columns_and_repeated_times_are_told() {
     let plain = RecordMapping::default();
     let mut text = String::from("time_s,rate_out_dps,die_degc,session,humidity_pct\n");

@@ -49,6 +49,56 @@ pub fn parse(
         );
     }
     let text = decode(bytes, path)?;
+    let Some((commas, told)) = with_commas(text) else {
+        return parse_text(text, path, mapping);
+    };
+    // Places are the same; the line that is shown is the file's own.
+    let read = parse_text(&commas, path, mapping).map_err(|e| match e {
+        Error::Input(mut e) => {
+            let number = e.line.filter(|_| e.file.as_deref() == Some(path));
+            if let (Some(number), true) = (number, e.source_line.is_some()) {
+                e.source_line = Some(Lines::new(text, path).at(number).text.to_owned());
+            }
+            Error::Input(e)
+        }
+        other => other,
+    });
+    read.map(|(record, mut warnings)| {
+        warnings.insert(0, told);
+        (record, warnings)
+    })
+}
+
+/// A text whose header is separated by semicolons, with commas in their places, and with points for the commas in its
+/// cells; what is said of that. `None` for any other text.
+fn with_commas(text: &str) -> Option<(String, Warning)> {
+    let mut lines = text.split(['\n', '\r']).map(str::trim);
+    let header = lines.find(|line| !line.is_empty() && !line.starts_with('#'))?;
+    if !header.contains(';') || header.contains(',') {
+        return None;
+    }
+    let has_commas = lines.any(|line| line.contains(','));
+    let read = match has_commas {
+        true => {
+            "semicolons separate the cells, and a comma in a number is read as its decimal point"
+        }
+        false => "semicolons separate the cells",
+    };
+    let commas = text.chars().map(|c| match c {
+        ';' => ',',
+        ',' => '.',
+        other => other,
+    });
+    let told = Warning::general("semicolons", format!("the record is read so: {read}"));
+    Some((commas.collect(), told))
+}
+
+/// As [`parse`], from text whose cells commas separate.
+fn parse_text(
+    text: &str,
+    path: &Path,
+    mapping: &RecordMapping,
+) -> Result<(ThermalRecord, Vec<Warning>)> {
     let source = Lines::new(text, path);
     let mut lines = source.iter();
     let header = lines
@@ -63,14 +113,9 @@ pub fn parse(
         .iter()
         .take_while(|l| l.number < header.number)
         .last();
-    if header.text.contains("drive_code") && header.text.contains("sense_code") {
+    if is_of_channels(header.text, mapping) {
         return Err(header
-            .error(
-                1,
-                "this is a capture of ADC codes, and no thermal record".to_owned(),
-                "give it with `close --capture`, `replay --capture` or `equiv --capture`"
-                    .to_owned(),
-            )
+            .error(1, CAPTURE.0.to_owned(), CAPTURE.1.to_owned())
             .into());
     }
     let roles = columns::resolve(header, mapping).map_err(|e| commented(e, header, before))?;
@@ -125,6 +170,29 @@ pub fn parse(
     plausibility::check(&record, &mut warnings);
     frozen::check(&record, &mut warnings);
     Ok((record, warnings))
+}
+
+/// What a capture in a record's place is told: what it is, and what takes it.
+pub(super) const CAPTURE: (&str, &str) = (
+    "this is a capture of ADC codes, and no thermal record",
+    "give it with `close --capture`, `replay --capture` or `equiv --capture`",
+);
+
+/// Names of a capture's two channels, and none that a record has.
+fn is_of_channels(header: &str, mapping: &RecordMapping) -> bool {
+    const OF_RECORDS: [&str; 6] = ["time_s", "rate", "gyro", "dps", "deg", "temp"];
+    let lower = header.to_lowercase();
+    if lower.contains("drive_code") && lower.contains("sense_code") {
+        return true;
+    }
+    let begins = |word: &str| {
+        let mut names = lower.split([',', '\t']);
+        names.any(|n| n.trim_matches([' ', '"']).starts_with(word))
+    };
+    mapping.columns.is_empty()
+        && begins("drive")
+        && begins("sense")
+        && !OF_RECORDS.iter().any(|word| lower.contains(word))
 }
 
 /// A header behind `#`, as `numpy.savetxt` writes it, said to be one.

@@ -202,7 +202,7 @@ fn provenance(o: &Outcome) -> Vec<[String; 2]> {
             [] => "none".to_owned(),
             steps => steps.join(", "),
         };
-        out.push(("its own steps, taken off before", steps));
+        out.push(("its own causes, taken off before", steps));
     }
     let a = &o.false_alarms;
     out.push((

@@ -52,7 +52,7 @@ pub fn fit(shown: &Shown) -> Vec<[String; 2]> {
         lines.push(line(
             "heating against cooling",
             format!(
-                "loop of {} rms where noise alone gives {}: {}",
+                "they differ by {} rms at the same reading; noise alone would make them differ by {} rms: {}",
                 dps(l.rms_dps),
                 dps(l.noise_dps),
                 if l.significant {

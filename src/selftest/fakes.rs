@@ -27,7 +27,7 @@ pub struct Fake {
     pub values: Vec<f64>,
 }
 
-/// [`COUNT`] columns for a closed record: like what the declared model leaves, what the steps leave, the thermometer, and
+/// [`COUNT`] columns for a closed record: like what the declared model leaves, what the causes leave, the thermometer, and
 /// the other columns that move, in turn. Fewer only where nothing moves.
 pub fn of(closed: &Closed) -> Vec<Fake> {
     let sources = sources(closed);
@@ -57,7 +57,7 @@ fn sources(closed: &Closed) -> Vec<(String, Vec<f64>)> {
         residual(&closed.before),
     )];
     if !closed.after.terms.is_empty() {
-        out.push(("what the steps leave".to_owned(), residual(&closed.after)));
+        out.push(("what the causes leave".to_owned(), residual(&closed.after)));
     }
     out.push((c.thermometer.clone(), c.u.clone()));
     let columns = c.columns.iter();

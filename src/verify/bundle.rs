@@ -8,7 +8,7 @@ use super::toolchain::{self, Harness};
 use crate::emit::views::Language;
 use crate::error::{Error, InputError, Result, io_error};
 use crate::firmware::files::EmittedFile;
-use crate::firmware::folder::Folder;
+use crate::firmware::folder::{AGAIN, Folder};
 use crate::firmware::manifest::{self, Manifest};
 use crate::leftovers::TemporaryFolder;
 use crate::numeric::rows::WordRows;
@@ -200,13 +200,13 @@ fn read_manifest(folder: &Folder, path: &Path) -> Result<(Manifest, String)> {
         InputError::new(format!("this is no manifest of a bundle: {e}"))
             .in_file(&named)
             .at(e.line().max(1), e.column().max(1))
-            .help("emit the bundle again with `gyrogen emit`")
+            .help(AGAIN)
     })?;
     if let Some(why) = expected::unusable(&manifest) {
         return Err(
             InputError::new(format!("the manifest cannot be used: {why}"))
                 .in_file(&named)
-                .help("emit the bundle again with `gyrogen emit`")
+                .help(AGAIN)
                 .into(),
         );
     }
@@ -348,7 +348,7 @@ impl Run<'_> {
                     ))
                     .in_file(self.named.join(&name))
                     .at(number + 1, 1)
-                    .help("the vectors were damaged; emit the bundle again")
+                    .help(format!("the vectors were damaged; {AGAIN}"))
                     .into());
                 }
             }
@@ -378,7 +378,7 @@ impl Run<'_> {
                     InputError::new(format!("line {} is no entry of a table", number + 1))
                         .in_file(self.named.join(name))
                         .at(number + 1, 1)
-                        .help("the vectors were damaged; emit the bundle again")
+                        .help(format!("the vectors were damaged; {AGAIN}"))
                         .into(),
                 );
             }

@@ -16,7 +16,7 @@ const FEW: f64 = 3.0;
 pub(super) const NAMES: [&str; 2] = ["drive", "sense"];
 
 const BEFORE: &str = "declared model alone";
-const AFTER: &str = "with the steps";
+const AFTER: &str = "with the causes";
 
 /// In the order of the page.
 pub fn all(view: &View) -> Vec<Figure> {

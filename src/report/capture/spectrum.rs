@@ -121,7 +121,7 @@ pub fn spectrum(view: &View, width: f64) -> Figure {
     svg.figure("Spectrum of the residual",
         "Amplitude of a line relative to a sine at full scale, Hann window; the largest bin of each column of the figure. \
          Marks stand above the frequencies of the tone, of its harmonics (folded at half the sample rate), of power lines \
-         and of the lines that a step took."
+         and of the lines that a cause took."
             .to_owned(),
     )
 }

@@ -67,12 +67,12 @@ fn unit(name: &str) -> &'static str {
 /// Over the table of errors.
 pub fn lead(c: &Closure) -> String {
     let firmware = if c.firmware.compensable {
-        "Firmware can take all steps off by arithmetic on codes and phase."
+        "Firmware can take all causes off by arithmetic on codes and phase."
     } else {
         "Firmware cannot take all of this off by arithmetic on codes and phase."
     };
     format!(
-        "Codes less the declared tones (and less the steps), both channels together, in LSB. Held-out rows are whole \
+        "Codes less the declared tones (and less the causes), both channels together, in LSB. Held-out rows are whole \
          stretches of time that no estimate has seen. The noise floor, from the residual's spectrum, is {} LSB rms. \
          {firmware}",
         value(c.noise_floor_rms)

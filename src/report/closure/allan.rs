@@ -127,7 +127,7 @@ fn drawn(view: &View, curves: &[(&str, Vec<(f64, f64)>)], period_s: f64, width: 
     let mut svg = Svg::new(width);
     let words = |class: &str| match (class, view.has_steps()) {
         ("before", _) => "declared model alone",
-        (_, true) => "with the steps",
+        (_, true) => "with the causes",
         _ => "less the declared model",
     };
     svg.legend(

@@ -53,7 +53,7 @@ pub fn negative(c: &Controls) -> String {
         format!("; least p among them {least}")
     } else {
         format!(
-            "; least p among them {} beside the steps, {least} before any; of the steps {}",
+            "; least p among them {} beside the causes, {least} before any; of the causes {}",
             p(n.least_p_value_beside_steps),
             steps.join(", ")
         )
@@ -63,10 +63,10 @@ pub fn negative(c: &Controls) -> String {
     let changed = if own == with {
         String::new()
     } else if with.is_empty() {
-        ". With them in, no step is taken".to_owned()
+        ". With them in, no cause is found".to_owned()
     } else {
         format!(
-            ". With them in, the steps are {}",
+            ". With them in, the causes are {}",
             n.steps_with_fakes.join(", ")
         )
     };
@@ -204,7 +204,7 @@ mod tests {
             failure.contains("covariate:fake_1 (spectrum of: a<b)"),
             "{failure}"
         );
-        assert!(negative(&bad).contains("With them in, the steps are covariate:fake_1"));
+        assert!(negative(&bad).contains("With them in, the causes are covariate:fake_1"));
         assert!(positive(&bad).contains("that ageing_drift got no name means nothing here"));
         assert_eq!(planted(&bad.positive[0])[4], "0 of 3, listed in 1");
         assert_eq!(planted(&bad.positive[0])[5], "thermal_lag (2)");

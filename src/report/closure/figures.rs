@@ -46,7 +46,7 @@ pub(super) fn series<'a>(view: &'a View) -> Vec<(&'static str, &'static str, &'a
 fn legend(view: &View) -> Vec<(&'static str, Swatch, String)> {
     let words = |name: &str| match name {
         "before" => "declared model alone".to_owned(),
-        "after" => "with the steps".to_owned(),
+        "after" => "with the causes".to_owned(),
         _ => "less the declared model".to_owned(),
     };
     let shown = series(view).into_iter();
@@ -104,7 +104,7 @@ fn over_time(view: &View, width: f64) -> Figure {
         svg.add(&frame);
     }
     let title = if view.has_steps() {
-        "Residual over time, before and after the steps"
+        "Residual over time, before and after the causes are taken off"
     } else {
         "Residual over time"
     };
@@ -182,11 +182,11 @@ fn step(view: &View, k: usize, contribution: &Contribution, width: f64) -> Optio
     let value = &contribution.value_dps;
     let partial: Vec<f64> = view.after.iter().zip(value).map(|(r, v)| r + v).collect();
     let (low, high) = band_within(&partial, contribution);
-    let y = view.residual_axis("this step alone", &[&partial, value, &low, &high]);
+    let y = view.residual_axis("this cause alone", &[&partial, value, &low, &high]);
     let shown = y.interval;
     let left = y.room();
     let mut svg = Svg::new(width);
-    let words = "readings, less the declared model and the other steps".to_owned();
+    let words = "readings, less the declared model and the other causes".to_owned();
     svg.legend([
         ("before dots", DOT, words),
         ("after", Swatch::Line, "fitted shape".to_owned()),
@@ -201,11 +201,11 @@ fn step(view: &View, k: usize, contribution: &Contribution, width: f64) -> Optio
     frame.cloud("before", pairs(&abscissa.values, &partial));
     draw_contribution(&mut frame, &abscissa, contribution, shown);
     svg.add(&frame);
-    let title = format!("Step {}: {} over {}", k + 1, step.effect, abscissa.name);
+    let title = format!("Cause {}: {} over {}", k + 1, step.effect, abscissa.name);
     let equation = term.candidate.equation();
     let caption = format!(
         "{}: {}. The deviation counts coefficients and shape, estimated together with the declared model and all other \
-         steps: it is wide where those could take its place.{}{constant} {CROWDED}",
+         causes: it is wide where those could take its place.{}{constant} {CROWDED}",
         step.effect, equation, abscissa.remark
     );
     Some(svg.figure(title, caption))

@@ -59,7 +59,7 @@ fn the_page_shows_the_step_and_needs_nothing_else() {
         "id=\"steps\"",
         "Residual over time, before and after",
         "Residual against every channel",
-        "Step 1: supply_sensitivity over supply_v",
+        "Cause 1: supply_sensitivity over supply_v",
         "id=\"evidence\"",
         "Allan deviation of the residual</h3>",
         "id=\"warnings\"",
@@ -117,7 +117,7 @@ fn a_record_without_anything_left_is_shown_as_complete() {
     let page = html(&closed, "r.csv").unwrap();
     assert!(page.contains("Complete: the declared model leaves"));
     assert!(page.contains("No effect was added"));
-    assert!(!page.contains("Step 1"));
+    assert!(!page.contains("Cause 1"));
     assert!(!page.contains("NaN"));
 }
 

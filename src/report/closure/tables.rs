@@ -173,7 +173,7 @@ pub fn errors(c: &Closure) -> Vec<[String; 5]> {
     };
     let mut out = vec![row("declared model alone", &c.before)];
     if !c.steps.is_empty() {
-        out.push(row("with the steps", &c.after));
+        out.push(row("with the causes", &c.after));
     }
     if let Some(rms) = c.firmware.heldout_rms {
         out.push([
@@ -190,7 +190,7 @@ pub fn errors(c: &Closure) -> Vec<[String; 5]> {
 /// Whether firmware could do it.
 pub fn firmware(c: &Closure) -> String {
     let compensable = if c.firmware.compensable {
-        "Firmware sees all that the declared model and the steps need."
+        "Firmware sees all that the declared model and the causes need."
     } else {
         "Firmware cannot take all of this off: an effect or a channel is beyond its reach."
     };
@@ -316,7 +316,11 @@ pub fn evidence(c: &Closure) -> Vec<Told> {
                 fate,
                 p_value: e.p_value.map_or("–".to_owned(), probability),
                 gain: e.gain.map_or("–".to_owned(), |g| fixed(g, 1)),
-                remark: e.remark.clone(),
+                // The JSON has steps, a reader causes.
+                remark: match e.remark.strip_prefix("a step") {
+                    Some(rest) if e.fate == Fate::Taken => format!("a cause{rest}"),
+                    _ => e.remark.clone(),
+                },
             }
         })
         .collect()
@@ -346,7 +350,7 @@ pub fn provenance(closed: &Closed) -> Vec<[String; 2]> {
             ),
         ),
         ("thermometer", closed.channels.thermometer.clone()),
-        ("noise after the steps", strengths),
+        ("noise beside the causes", strengths),
     ]
     .map(|(name, value)| [name.to_owned(), value])
     .to_vec()
