@@ -30,22 +30,23 @@ impl NoiseModel {
     /// noise would by chance (a chi-square of 9). Both variances are raised for what the fit took
     /// away: by n / (n - parameters), with the effective number of rows for the part with memory.
     pub fn of_residuals(residuals: &[f64], weights: &[f64], parameters: usize) -> Self {
-        let mask: Vec<f64> = (0..residuals.len())
-            .map(|i| f64::from(u8::from(weights.get(i).is_none_or(|w| *w >= 0.5))))
+        let is_clean = |i: usize| weights.get(i).is_none_or(|w| *w >= 0.5);
+        let rows = residuals.iter().enumerate();
+        let clean: Vec<f64> = rows
+            .map(|(i, r)| if is_clean(i) { *r } else { 0.0 })
             .collect();
-        let clean: Vec<f64> = residuals.iter().zip(&mask).map(|(r, m)| r * m).collect();
-        let all = mask.iter().all(|m| *m == 1.0);
-        let lagged = |v: &[f64], lag: usize| -> f64 {
-            let later = v.get(lag..).unwrap_or(&[]);
-            v.iter().zip(later).map(|(a, b)| a * b).sum()
-        };
+        let all = (0..clean.len()).all(is_clean);
         let autocovariance = |lag: usize| {
-            let count = if all {
-                clean.len().saturating_sub(lag) as f64
-            } else {
-                lagged(&mask, lag)
-            };
-            (lagged(&clean, lag) / count.max(1.0), count)
+            let later = clean.get(lag..).unwrap_or(&[]);
+            let sum: f64 = clean.iter().zip(later).map(|(a, b)| a * b).sum();
+            let count = match all {
+                true => later.len(),
+                false => {
+                    let pairs = 0..later.len();
+                    pairs.filter(|i| is_clean(*i) && is_clean(i + lag)).count()
+                }
+            } as f64;
+            (sum / count.max(1.0), count)
         };
         let (total, n) = autocovariance(0);
         let mut model = NoiseModel {

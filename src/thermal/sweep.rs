@@ -135,12 +135,10 @@ pub fn measure_loop(
     };
     let weights = &sample.spike;
     let c = design.solve(residuals, weights)?;
-    let fitted = design.times(&c);
-    let left: Vec<f64> = residuals
-        .iter()
-        .zip(fitted.iter())
-        .map(|(r, f)| r - f)
-        .collect();
+    let mut left = design.times(&c);
+    for (fitted, r) in left.iter_mut().zip(residuals) {
+        *fitted = r - *fitted;
+    }
     let model = NoiseModel::of_residuals(&left, weights, terms + freedom);
     let covariance = design.covariance(weights, &model);
     let ours = covariance
