@@ -243,7 +243,7 @@ class Bench:
         if status == 2 and not self.stderr.strip():
             wrong.append("status 2 without a word")
         # A file of the user's own in a result's place is not written over, nor one that is none of a bundle in a bundle's.
-        refused = ("no result of an earlier run", "files here were edited")
+        refused = ("no result of an earlier", "files here were edited")
         guarded = (stale_first or hostility == "same folder") and any(text in self.stderr for text in refused)
         if hostility in ("none", "same folder") and status == 2 and not guarded:
             wrong.append("status 2 of a run that nothing disturbs")

@@ -29,12 +29,12 @@ impl NoiseModel {
     /// 200). The part with memory is dropped if it explains no more of them than white
     /// noise would by chance (a chi-square of 9). Both variances are raised for what the fit took
     /// away: by n / (n - parameters), with the effective number of rows for the part with memory.
-    pub fn of_residuals(residuals: &[f64], weights: &[f64], parameters: usize) -> Self {
+    pub fn of_residuals(residuals: Vec<f64>, weights: &[f64], parameters: usize) -> Self {
         let is_clean = |i: usize| weights.get(i).is_none_or(|w| *w >= 0.5);
-        let rows = residuals.iter().enumerate();
-        let clean: Vec<f64> = rows
-            .map(|(i, r)| if is_clean(i) { *r } else { 0.0 })
-            .collect();
+        let mut clean = residuals;
+        let rows = clean.iter_mut().enumerate();
+        rows.filter(|(i, _)| !is_clean(*i))
+            .for_each(|(_, r)| *r = 0.0);
         let all = (0..clean.len()).all(is_clean);
         let autocovariance = |lag: usize| {
             let later = clean.get(lag..).unwrap_or(&[]);
@@ -55,7 +55,7 @@ impl NoiseModel {
             rho: 0.0,
             effective_rows: n,
         };
-        let lags = (residuals.len() / 8).clamp(1, 200);
+        let lags = (clean.len() / 8).clamp(1, 200);
         let c: Vec<f64> = (1..=lags).map(|k| autocovariance(k).0).collect();
         let mut best = (0.0, 0.0, 0.0);
         for step in 1..200 {
@@ -250,10 +250,10 @@ mod tests {
         let (mut named, mut rho, mut share) = (0, 0.0, 0.0);
         for _ in 0..100 {
             let white: Vec<f64> = (0..400).map(|_| random.normal()).collect();
-            let model = NoiseModel::of_residuals(&white, &[], 3);
+            let model = NoiseModel::of_residuals(white, &[], 3);
             named += usize::from(model.correlated > 0.0);
             let coloured = random.coloured(400, 0.8);
-            let model = NoiseModel::of_residuals(&coloured, &[], 3);
+            let model = NoiseModel::of_residuals(coloured, &[], 3);
             rho += model.rho / 100.0;
             share += model.correlated / 100.0;
         }

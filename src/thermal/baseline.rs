@@ -270,7 +270,7 @@ pub fn fit_with(
         ));
     }
     let residuals = sample.residuals(&coefficients_scaled);
-    let noise = NoiseModel::of_residuals(&residuals, &sample.spike, order + 1);
+    let noise = NoiseModel::of_residuals(residuals.clone(), &sample.spike, order + 1);
     let powers = Rows {
         count: sample.x.len(),
         columns: order + 1,

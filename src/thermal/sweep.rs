@@ -139,7 +139,7 @@ pub fn measure_loop(
     for (fitted, r) in left.iter_mut().zip(residuals) {
         *fitted = r - *fitted;
     }
-    let model = NoiseModel::of_residuals(&left, weights, terms + freedom);
+    let model = NoiseModel::of_residuals(left, weights, terms + freedom);
     let covariance = design.covariance(weights, &model);
     let ours = covariance
         .view((terms, terms), (freedom, freedom))
