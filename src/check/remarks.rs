@@ -13,7 +13,7 @@ use serde::Serialize;
 /// A remark.
 #[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Remark {
-    /// `idle_bits`, `biased_rounding`, `dead_band`, `spurs_in_band`, `output_hides_fit`, `wrap_possible`.
+    /// `idle_bits`, `biased_rounding`, `dead_band`, `spurs_in_band`, `output_hides_fit`, `wrap_possible`, `correction_not_checked`.
     pub code: &'static str,
     /// The dotted key, with the channel or the part.
     pub node: String,
@@ -31,20 +31,31 @@ pub fn remarks(design: &Design, nodes: &[NodeCheck], budget: &Budget) -> Vec<Rem
     let mut all = Vec::new();
     spurs(design, &mut all);
     for node in nodes {
-        idle_bits(node, &mut all);
+        idle_bits(node, nodes, &mut all);
         biased_rounding(node, &mut all);
         dead_band(node, budget, &mut all);
         wraps(design, node, &mut all);
     }
     output(design, &mut all);
+    if design.correction.is_some() {
+        all.push(Remark {
+            code: "correction_not_checked",
+            node: "correction".to_owned(),
+            message: "the design has a correction, and only its circuit and compensation are checked here".to_owned(),
+            mend: "run `gyrogen close --verify`, which compares the correction's code with its model".to_owned(),
+        });
+    }
     all
 }
 
-/// Integer bits that no value reaches.
-fn idle_bits(node: &NodeCheck, all: &mut Vec<Remark>) {
-    let Some(headroom) = node.headroom_bits.filter(|h| *h >= 1.0 - 1e-9) else {
+/// Integer bits that no value of any word reaches that the same key gives its format to.
+fn idle_bits(node: &NodeCheck, nodes: &[NodeCheck], all: &mut Vec<Remark>) {
+    let like = |n: &&NodeCheck| key(&n.name) == key(&node.name) && n.format == node.format;
+    let least = nodes.iter().filter(like).filter_map(|n| n.headroom_bits);
+    let headroom = least.fold(f64::INFINITY, f64::min);
+    if node.headroom_bits.is_none() || headroom < 1.0 - 1e-9 {
         return;
-    };
+    }
     // Those of a table are its amplitude's; the magnitude's word is the engine's own.
     let has_format = [
         "circuit.demodulator",
@@ -80,12 +91,12 @@ fn idle_bits(node: &NodeCheck, all: &mut Vec<Remark>) {
         code: "idle_bits",
         node: node.name.clone(),
         message: format!(
-            "its raw words go from {} to {} at most (proved), so that {} of {} {} needed",
+            "its raw words go from {} to {} at most (proved). {} of {} {} needed",
             node.proved[0],
             node.proved[1],
             match idle {
-                1 => "the highest bit".to_owned(),
-                _ => format!("the {idle} highest bits"),
+                1 => "The highest bit".to_owned(),
+                _ => format!("The {idle} highest bits"),
             },
             node.format,
             if idle == 1 { "is not" } else { "are not" }

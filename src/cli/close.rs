@@ -366,7 +366,12 @@ fn print(c: &Closure, compared: Option<&Emitted>, controls: Option<&Controls>, o
     );
     if let Some(rms) = c.firmware.heldout_rms {
         say!(
-            "firmware's model, bit for bit (--verify compiles and compares): held-out rms {rms:.5} {}",
+            "firmware's model, bit for bit{}: held-out rms {rms:.5} {}",
+            if compared.is_some() {
+                ""
+            } else {
+                " (--verify compiles and compares)"
+            },
             c.unit_text()
         );
     } else if c.unit == "deg/s" {

@@ -175,7 +175,7 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
     }
     say!(
         "error budget: the words of the compensation keep bias and rate within {} deg/s of the fitted polynomial. That is proved. \
-         What calibration and fit add is about {:.4} deg/s. That is an estimate.",
+         What calibration and fit add is about {:.4} deg/s rms, the held-out error. That is an estimate.",
         at_most(s.budget.bound_dps, 3),
         s.budget.estimate_dps
     );

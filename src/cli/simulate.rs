@@ -33,7 +33,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     profile: Option<PathBuf>,
     /// Averaged readings along a profile, 10 to 1000000; only with --profile.
-    #[arg(long, value_name = "N", default_value_t = 500, value_parser = clap::value_parser!(u64).range(10..=1_000_000))]
+    #[arg(long, value_name = "N", default_value_t = 500, requires = "profile", value_parser = clap::value_parser!(u64).range(10..=1_000_000))]
     readings: u64,
     /// Folder for the results; made if it does not exist.
     #[arg(long, value_name = "DIR", default_value = "gyrogen-simulate")]

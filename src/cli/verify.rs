@@ -151,6 +151,7 @@ fn print(v: &Verification) {
     let selftest = match v.selftest {
         Some(true) => "pass",
         Some(false) => "FAIL",
+        None if v.is_another => "not run: nothing was built",
         None if !is_whole => {
             "not run: the files are not those of the bundle, and nothing was built"
         }
@@ -178,7 +179,13 @@ fn reasons(v: &Verification) -> Vec<String> {
         reasons.push(format!("files differ from the manifest: {files}"));
     }
     reasons.extend(v.problems.iter().cloned());
-    if !v.changed_files.is_empty() || !v.problems.is_empty() {
+    if v.is_another {
+        reasons.push(
+            "the files are those of the manifest: give the digest or the design of this very bundle, or write it again from that \
+             design"
+                .to_owned(),
+        );
+    } else if !v.changed_files.is_empty() || !v.problems.is_empty() {
         reasons.push(
             "move files of your own out of the folder; where the bundle's files changed, write it again with the command that made \
              it (`--force` replaces edited ones)"

@@ -194,7 +194,10 @@ impl Limits {
                 .filter(|v: &f64| v.is_finite() && *v > 0.0);
             let Some(value) = value else {
                 let what = format!("the limit of `{word}` is {number}");
-                return Err(refused(what, "give a number above 0".to_owned()));
+                return Err(refused(
+                    what,
+                    "give a number above 0, with a point as its decimal mark".to_owned(),
+                ));
             };
             if limits.get(name).is_some() {
                 let help = "give each figure once".to_owned();

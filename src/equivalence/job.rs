@@ -307,6 +307,13 @@ fn notes(design: &Design, seen: &Seen, predictions: &[predicted::Prediction]) ->
         .compensation
         .as_ref()
         .is_some_and(|c| !c.input.is_of_chain());
+    if design.correction.is_some() {
+        notes.push(
+            "the design has a correction, which is not compared here: circuit and compensation alone are. `gyrogen close --verify` \
+             compares its code with its model"
+                .into(),
+        );
+    }
     if by_channel {
         notes.push(
             "the compensation's input is a word of its own, not the chain's phase. It is no node of the chain, and is compared \

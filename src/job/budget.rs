@@ -27,7 +27,7 @@ pub struct Budget {
     pub lines: Vec<Line>,
     /// Sum of the bounds, deg/s: how far the firmware may be from the fitted polynomial.
     pub bound_dps: f64,
-    /// Root of the sum of the squared estimates, deg/s.
+    /// The held-out rms, deg/s, which contains what the noise of the fit adds.
     pub estimate_dps: f64,
 }
 
@@ -77,13 +77,10 @@ pub fn budget(design: &Design, fit: &BaselineFit, certainty: &Certainty) -> Budg
             "bound",
         ),
     ];
-    let of = |kind: &str| {
-        let chosen = lines.iter().filter(|l| l.kind == kind);
-        chosen.map(|l| l.dps).collect::<Vec<_>>()
-    };
+    let bounds = lines.iter().filter(|l| l.kind == "bound");
     Budget {
-        bound_dps: of("bound").iter().sum(),
-        estimate_dps: of("estimate").iter().map(|v| v * v).sum::<f64>().sqrt(),
+        bound_dps: bounds.map(|l| l.dps).sum(),
+        estimate_dps: fit.heldout_rms_dps,
         lines,
     }
 }

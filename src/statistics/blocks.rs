@@ -1,5 +1,5 @@
 //! Held-out blocks and cross-validation folds: whole stretches of time, fixed by the times, the
-//! thermometer and where the output lies outermost.
+//! thermometer and where the other inputs lie outermost. The output has no say.
 //!
 //! The rule:
 //! 1. The record is cut into segments. If the thermometer makes at least [`RAMPS`] runs up or down
@@ -9,9 +9,9 @@
 //!    first nor the last of the record (a transient at power-on and a slow drift could then only be
 //!    extrapolated).
 //! 3. Of the 35 ways to do that, the one is taken whose training rows leave the narrowest gaps in the
-//!    thermometer's range, taken as a whole and on the way up and down, and, where a rate was applied, hold
-//!    out no more than a third of the highest and of the lowest readings, nor of those of any other channel; the first
-//!    among equals: held-out error is about interpolation, and a clip shows in few rows.
+//!    thermometer's range, taken as a whole and on the way up and down, and hold out no more than a third of the
+//!    highest and of the lowest readings of any other input; the first among equals: held-out error is about
+//!    interpolation, and a clip shows in the few rows of the greatest applied rate.
 //!
 //! Held-out rows are not used in any estimate, and predictions for them are those of the
 //! regressors alone: the noise's memory never carries a training row's noise across the border.
@@ -47,8 +47,8 @@ pub struct Split {
     pub segment: Vec<usize>,
 }
 
-/// The split of a record; `cared`: columns whose outermost rows are cared for (the output where a rate was applied, and every
-/// channel that may be a cause).
+/// The split of a record; `cared`: inputs whose outermost rows are cared for (every channel that may be a cause, the applied
+/// rate among them).
 ///
 /// A record of less than three rows a span is cut into spans of three.
 ///

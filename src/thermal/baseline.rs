@@ -193,16 +193,25 @@ pub fn thermometer<'a>(
 
 /// What helps a record without a thermometer; `has` are its columns.
 fn without_thermometer(record: &ThermalRecord, has: &[&str]) -> String {
-    let columns = has.join(", ");
+    let each = has.iter().map(|name| match record.renamed.get(*name) {
+        Some(own) if own != name => format!("{own} (read as {name})"),
+        _ => (*name).to_owned(),
+    });
+    let columns = each.collect::<Vec<_>>().join(", ");
     if record.is_of_log() {
         return format!(
             "the log gives: {columns}. Log the gyro's temperature beside it (PX4: sensor_gyro or vehicle_imu_status; ArduPilot: \
              IMU with its T), or `gyrogen close --record` it, which does without"
         );
     }
+    let said = match record.renamed.is_empty() {
+        true => {
+            "say in the design (these lines are a whole one) which one is the thermometer:\n    [record.columns]\n    "
+        }
+        false => "add to [record.columns] of the design which one is the thermometer: ",
+    };
     format!(
-        "the file has: {columns}\n  say in the design (these lines are a whole one) which one it is:\n    [record.columns]\n    die_degc = \
-         \"{}\"",
+        "the file has: {columns}\n  {said}die_degc = \"{}\"\n  a record without a thermometer: `gyrogen close --record` does without",
         guess("die_degc", has).unwrap_or("NAME_IN_THE_FILE")
     )
 }

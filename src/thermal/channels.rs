@@ -157,16 +157,14 @@ impl Channels {
         self.on_s.windows(2).any(|w| w[1] < w[0])
     }
 
-    /// Which rows are fitted on and which are held out.
+    /// Which rows are fitted on and which are held out: by times and inputs, the applied rate among them. The output has no
+    /// say.
     ///
     /// # Errors
     /// Too few rows.
     pub fn split(&self) -> Result<Split, Unusable> {
-        let output = self.moving("rate_dps").map(|_| self.output_dps());
-        let moving = |name: &&String| *name != "rate_dps" && *name != "time_s";
-        let names = self.columns.keys().filter(moving);
+        let names = self.columns.keys().filter(|name| *name != "time_s");
         let mut cared: Vec<&[f64]> = names.filter_map(|name| self.moving(name)).collect();
-        cared.extend(output.as_deref());
         // What begins anew with the power is seen after each power-on alone.
         cared.extend(self.restarts().then_some(&self.on_s[..]));
         blocks::split(&self.time_s, &self.u, &cared)

@@ -218,3 +218,32 @@ fn a_ramp_read_at_uneven_times_has_no_noise_and_is_not_smoothed() {
     let most = smooth.iter().zip(&course).map(|(s, v)| (s - v).abs());
     assert!(most.fold(0.0, f64::max) < 1e-3);
 }
+
+#[test]
+fn the_output_has_no_say_in_what_is_held_out() {
+    let mut random = Random::new(3);
+    let time_s: Vec<f64> = (0..300).map(f64::from).collect();
+    let split = |output: Vec<f64>| {
+        let columns = BTreeMap::from([
+            ("rate_out_dps".to_owned(), output),
+            (
+                "die_degc".to_owned(),
+                time_s.iter().map(|t| (t / 40.0).sin()).collect(),
+            ),
+            (
+                "rate_dps".to_owned(),
+                time_s
+                    .iter()
+                    .map(|t| 100.0 * (t / 17.0).sin().powi(9))
+                    .collect(),
+            ),
+        ]);
+        let channels = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+        channels.split().unwrap()
+    };
+    let plain = split(vec![0.0; 300]);
+    for _ in 0..20 {
+        let noise = (0..300).map(|_| 1000.0 * random.normal()).collect();
+        assert_eq!(split(noise), plain);
+    }
+}

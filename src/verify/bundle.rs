@@ -38,6 +38,9 @@ pub struct Verification {
     /// What a bundle of this part and language has to hold and does not, what it holds and must not, and what is
     /// not as the digest or the design says.
     pub problems: Vec<String>,
+    /// All files are those of the manifest, and the bundle is not the one whose digest or design was given.
+    #[serde(skip)]
+    pub is_another: bool,
     /// The built-in start-up check passed; null for a bundle of tables alone, which has none.
     pub selftest: Option<bool>,
     /// Over all vectors.
@@ -94,6 +97,7 @@ pub fn verify(
         .into());
     }
     let mut problems = expected::problems(&manifest, &folder)?;
+    let own = problems.len();
     if let Some(due) = &against.digest
         && !due.eq_ignore_ascii_case(&digest)
     {
@@ -103,6 +107,7 @@ pub fn verify(
         problems.extend(other_than(&emit(design, &manifest)?, &folder));
     }
     let changed_files = changed(&manifest, &folder);
+    let is_another = changed_files.is_empty() && own == 0 && !problems.is_empty();
     let mut run = Run {
         language,
         manifest: &manifest,
@@ -185,6 +190,7 @@ pub fn verify(
         target: target.name().into(),
         toolchain: toolchain_name,
         changed_files,
+        is_another,
         problems,
         selftest,
         vectors,
@@ -223,16 +229,27 @@ fn changed(manifest: &Manifest, folder: &Folder) -> Vec<String> {
     files.map(|file| file.path.clone()).collect()
 }
 
-/// How the folder differs from what a design emits.
-fn other_than(due: &[EmittedFile], folder: &Folder) -> Vec<String> {
+/// How the folder differs from what a design emits, in a sentence.
+fn other_than(due: &[EmittedFile], folder: &Folder) -> Option<String> {
     let differs = |file: &&EmittedFile| {
         let bytes = folder.read(&file.path);
         bytes.map_or(true, |bytes| bytes != file.text.as_bytes())
     };
-    let files = due.iter().filter(differs);
-    files
-        .map(|f| format!("{} is not what the design emits", f.path))
-        .collect()
+    let files: Vec<&str> = due
+        .iter()
+        .filter(differs)
+        .map(|f| f.path.as_str())
+        .collect();
+    match files[..] {
+        [] => None,
+        [one] => Some(format!("{one} is not what the design emits")),
+        _ => Some(format!(
+            "{} of {} files are not what the design emits: {}",
+            files.len(),
+            due.len(),
+            files.join(", ")
+        )),
+    }
 }
 
 /// The comparisons of one bundle.
