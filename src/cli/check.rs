@@ -233,8 +233,10 @@ fn row(n: &NodeCheck) -> Vec<String> {
         n.name.clone(),
         n.format.clone(),
         format!("{} .. {}", n.proved[0], n.proved[1]),
-        n.headroom_bits
-            .map_or("-".to_owned(), |b| format!("{b:.2}")),
+        n.headroom_bits.map_or("-".to_owned(), |b| match b < 0.0 {
+            true => "< 0".to_owned(),
+            false => format!("{b:.2}"),
+        }),
         overflow,
         line.map_or("-".to_owned(), |l| {
             let rms = l.predicted_rms_lsb.or(l.measured_rms_lsb);

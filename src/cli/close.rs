@@ -392,9 +392,10 @@ fn print(c: &Closure, compared: Option<&Emitted>, controls: Option<&Controls>, o
 fn held_out(c: &Closure) -> &'static str {
     match c.unit {
         "deg/s" => {
-            "held out: a part of the record that no estimate used, the same before and after (`run` takes each of its blocks in turn)"
+            "held out: about a quarter of the record, in blocks that no fit used. They help to choose among causes. `run` predicts \
+             each of its blocks in turn, so that its figure is another one."
         }
-        _ => "held out: a part of the capture that no estimate used, the same before and after",
+        _ => "held out: a part of the capture that no fit used",
     }
 }
 

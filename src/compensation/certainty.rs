@@ -309,7 +309,7 @@ pub fn sentences(design: &Design, bounds: &Bounds) -> Vec<String> {
     }
     if let Some(fitted) = &c.fitted {
         lines.push(format!(
-            "The fitted polynomial itself is uncertain by {} deg/s (one standard deviation). Rows that the fit has not seen are \
+            "Where the fitted polynomial is least certain, its standard deviation is {} deg/s. Rows that the fit has not seen are \
              {} deg/s rms from it.",
             number(fitted.std_max_dps, 3),
             number(fitted.heldout_rms_dps, 3)

@@ -60,7 +60,7 @@ pub const FLAGS: [(&str, &str); 12] = [
     ),
     (
         "idle_input",
-        "the value moves too little from sample to sample for a uniform rounding error (dead band)",
+        "the value moves too little from sample to sample for a uniform rounding error",
     ),
     (
         "weak_vector",
