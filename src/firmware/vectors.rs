@@ -54,7 +54,7 @@ pub fn function(model: &Model, lowered: Option<&Lowered>, more: Vec<Vec<i128>>) 
     let inside = inputs.into_iter().map(|input| [input.clone(), input]);
     for [given, due] in inside.chain(beside) {
         let mut line = model.input_words(&given);
-        line.extend(model.record(&due));
+        model.record(&due, &mut line);
         text += &csv_line(&line);
     }
     EmittedFile {
@@ -161,9 +161,12 @@ pub fn selftest_of_chain(design: &Design) -> u64 {
 pub fn selftest_of_function(model: &Model, may_fault: bool, draws: u32) -> u64 {
     let mut lcg = stimulus::Lcg(SEED);
     let (mut h, mut first) = (views::BASIS, 0);
+    let (mut inputs, mut record) = (Vec::new(), Vec::new());
     for _ in 0..draws {
-        let inputs: Vec<i128> = model.inputs.iter().map(|range| lcg.word(*range)).collect();
-        let record = model.record(&inputs);
+        inputs.clear();
+        inputs.extend(model.inputs.iter().map(|range| lcg.word(*range)));
+        record.clear();
+        model.record(&inputs, &mut record);
         let (fault, words) = record.split_last().unwrap_or((&0, &[]));
         h = words.iter().fold(h, |h, word| mix(h, *word as u64));
         if first == 0 {
@@ -231,11 +234,11 @@ pub fn with_state(h: u64, state: &[i128], wide: &[bool]) -> u64 {
 }
 
 /// Number of inputs and checksum of the records of every input there is, if they have few enough bits: counted
-/// through with the last input fastest, a checksum for each [`BLOCK`] of them, and one of these. `record` gives
+/// through with the last input fastest, a checksum for each [`BLOCK`] of them, and one of these. `record` appends
 /// an input's record: outputs, then the fault.
 pub fn every(
     ranges: &[Interval],
-    record: &(dyn Fn(&[i128]) -> Vec<i128> + Sync),
+    record: &(dyn Fn(&[i128], &mut Vec<i128>) + Sync),
     threads: usize,
 ) -> Option<Checked> {
     let mut count: i128 = 1;
@@ -254,11 +257,23 @@ pub fn every(
         }
         words
     };
+    let advance = |words: &mut [i128]| {
+        for (word, range) in words.iter_mut().zip(ranges).rev() {
+            if *word < range.high {
+                *word += 1;
+                return;
+            }
+            *word = range.low;
+        }
+    };
     let block = |start: u64| {
         let end = (start + BLOCK).min(count as u64);
-        (start..end).fold(views::BASIS, |h, index| {
-            let record = record(&input(i128::from(index)));
-            record.iter().fold(h, |h, word| mix(h, *word as u64))
+        let (mut words, mut due) = (input(i128::from(start)), Vec::new());
+        (start..end).fold(views::BASIS, |h, _| {
+            due.clear();
+            record(&words, &mut due);
+            advance(&mut words);
+            due.iter().fold(h, |h, word| mix(h, *word as u64))
         })
     };
     let starts: Vec<u64> = (0..count as u64).step_by(BLOCK as usize).collect();
@@ -278,7 +293,7 @@ pub fn every(
 /// [`every`] of a function without a state.
 pub fn every_of(model: &Model) -> Option<Checked> {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let record = |input: &[i128]| model.record(input);
+    let record = |input: &[i128], to: &mut Vec<i128>| model.record(input, to);
     if model.state > 0 {
         return None;
     }

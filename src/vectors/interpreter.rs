@@ -4,7 +4,9 @@
 //! The program is the blocks as [`Trace`](crate::numeric::trace::Trace) recorded them; that it says what
 //! [`Fixed`](crate::numeric::fixed::Fixed) does is what [`super::chain`] and the tests of this file hold.
 
-use crate::numeric::trace::ir::{Function, Id, Interval, Loop, Op, Program, SlotKind};
+use super::damage::Damage;
+use crate::numeric::trace::ir::{Function, Id, Interval, Op, Program, SlotKind};
+use std::ops::Range;
 use std::sync::Arc;
 
 /// A word or residue of a state, at its place in the state's type.
@@ -45,24 +47,6 @@ impl StateWord {
     }
 }
 
-/// Damage to one operation of a function, which vectors have to tell from the function.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Damage {
-    /// The node's result, or for a test its operand, moves by this.
-    Result(Id, i128),
-    /// A sum becomes a difference and the reverse, a product a sum, a selection the other one; of a cast and
-    /// a wrap, one bit more.
-    Operator(Id),
-    /// Of a cast and a wrap, one bit less; of a selection, always the first; of a test, the other outcome.
-    Other(Id),
-    /// The lower limit of a cast or limit moves by this.
-    Low(Id, i128),
-    /// The upper limit.
-    High(Id, i128),
-    /// A store is left out.
-    Store(usize),
-}
-
 /// A program ready for calls.
 #[derive(Debug)]
 pub struct Interpreter {
@@ -71,12 +55,48 @@ pub struct Interpreter {
     places: Vec<Places>,
 }
 
-/// Where a function's slots and its callees' states are in its own state.
+/// Where a function's slots and its callees' states are in its own state, and its callees' outputs among its nodes.
 #[derive(Debug)]
 struct Places {
     words: Vec<StateWord>,
     slots: Vec<usize>,
     calls: Vec<usize>,
+    /// Of each call: a node that is one of its outputs, and which.
+    call_outs: Vec<Vec<(Id, usize)>>,
+}
+
+/// One call as it was evaluated.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(super) struct Evaluated {
+    /// By node; in a loop, those of its last round.
+    pub(super) values: Vec<i128>,
+    /// The state as callees leave it, before the function's own stores.
+    pub(super) state: Vec<i128>,
+    /// Overflows where the design says `error`, in order: the operation (of a loop its first) and the number.
+    pub(super) faults: Vec<(Id, u32)>,
+}
+
+impl Evaluated {
+    /// Before the first of so many nodes.
+    pub(super) fn start(&mut self, state: &[i128], nodes: usize) {
+        self.values.clear();
+        self.values.resize(nodes, 0);
+        self.state.clear();
+        self.state.extend_from_slice(state);
+        self.faults.clear();
+    }
+}
+
+/// Memory that calls leave to the next ones.
+#[derive(Debug, Default)]
+pub(super) struct Spare(Vec<Vec<i128>>);
+
+impl Spare {
+    fn take(&mut self) -> Vec<i128> {
+        let mut words = self.0.pop().unwrap_or_default();
+        words.clear();
+        words
+    }
 }
 
 /// Two's-complement low bits as an unsigned number.
@@ -117,6 +137,17 @@ fn words(program: &Program, state: &str, before: &[&'static str]) -> Vec<StateWo
     all
 }
 
+/// Of each call: a node that is one of its outputs, and which.
+fn call_outs(function: &Function) -> Vec<Vec<(Id, usize)>> {
+    let mut all = vec![Vec::new(); function.calls.len()];
+    for (id, node) in function.nodes.iter().enumerate() {
+        if let Op::CallOut(call, k) = node.op {
+            all[call].push((id, k));
+        }
+    }
+    all
+}
+
 impl Interpreter {
     /// Of a program.
     pub fn new(program: &Program) -> Arc<Self> {
@@ -137,6 +168,7 @@ impl Interpreter {
                     .iter()
                     .map(|c| starts(c.instance).unwrap_or(0))
                     .collect(),
+                call_outs: call_outs(function),
                 words,
             }
         });
@@ -166,6 +198,19 @@ impl Interpreter {
         self.places[function].calls[call]
     }
 
+    /// The words of a call's state in the caller's.
+    pub(super) fn words_of_call(&self, function: usize, call: usize) -> Range<usize> {
+        let start = self.start_of_call(function, call);
+        let callee = self.program.functions[function].calls[call].function;
+        start..start + self.state(callee).len()
+    }
+
+    /// The place that a store writes to.
+    pub(super) fn place_of_store(&self, function: usize, store: usize) -> usize {
+        let (slot, element, _) = self.program.functions[function].stores[store];
+        self.start_of_slot(function, slot) + element
+    }
+
     /// Calls a function: its outputs (those of stages that the design lacks among them) are appended; gives
     /// the number of the first overflow where the design says `error`, 0 = none.
     pub fn call(
@@ -187,167 +232,143 @@ impl Interpreter {
         state: &mut [i128],
         outputs: &mut Vec<i128>,
     ) -> u32 {
-        let run = self.evaluate(function, damage, inputs, state);
         let f = &self.program.functions[function];
-        outputs.extend(f.outputs.iter().map(|(_, id)| run.values[*id]));
-        for (k, (slot, element, id)) in f.stores.iter().enumerate() {
+        let (mut call, mut spare) = (Evaluated::default(), Spare::default());
+        call.start(state, f.nodes.len());
+        let mut run = self.run(function, damage, inputs, &mut call, &mut spare);
+        run.up_to(f.nodes.len());
+        self.store(function, damage, &mut call);
+        state.copy_from_slice(&call.state);
+        outputs.extend(f.outputs.iter().map(|(_, id)| call.values[*id]));
+        call.faults.first().map_or(0, |(_, number)| *number)
+    }
+
+    /// The function's own stores.
+    pub(super) fn store(&self, function: usize, damage: Option<Damage>, call: &mut Evaluated) {
+        for (k, (_, _, id)) in self.program.functions[function].stores.iter().enumerate() {
             if damage != Some(Damage::Store(k)) {
-                run.state[self.places[function].slots[*slot] + element] = run.values[*id];
+                call.state[self.place_of_store(function, k)] = call.values[*id];
             }
         }
-        run.fault
     }
 
-    /// The values of all nodes of one call (in a loop, those of its last round); the state stays.
-    pub fn values(
-        &self,
-        function: usize,
-        damage: Option<Damage>,
-        inputs: &[i128],
-        state: &[i128],
-    ) -> Vec<i128> {
-        let mut state = state.to_vec();
-        self.evaluate(function, damage, inputs, &mut state).values
-    }
-
-    fn evaluate<'a>(
+    /// A call in which nothing has been evaluated.
+    pub(super) fn run<'a>(
         &'a self,
         function: usize,
         damage: Option<Damage>,
         inputs: &'a [i128],
-        state: &'a mut [i128],
+        call: &'a mut Evaluated,
+        spare: &'a mut Spare,
     ) -> Run<'a> {
-        let f = &self.program.functions[function];
-        let mut run = Run {
+        Run {
             interpreter: self,
-            function: f,
+            number: function,
+            function: &self.program.functions[function],
             places: &self.places[function],
             damage,
             inputs,
-            state,
-            values: vec![0; f.nodes.len()],
+            call,
+            spare,
             index: 0,
-            fault: 0,
-            results: Vec::new(),
-        };
-        run.body();
-        run
-    }
-
-    /// Every damage that vectors are searched for.
-    pub fn damages(&self, function: usize) -> Vec<Damage> {
-        let f = &self.program.functions[function];
-        let mut all = Vec::new();
-        for (id, node) in f.nodes.iter().enumerate() {
-            let moved = [Damage::Result(id, -1), Damage::Result(id, 1)];
-            match node.op {
-                Op::Input(_) | Op::Call(_) | Op::Phi(..) | Op::LoopOut(..) => {}
-                Op::Add(..)
-                | Op::Sub(..)
-                | Op::Mul(..)
-                | Op::ResidueAdd(..)
-                | Op::ResidueSub(..) => {
-                    all.extend(moved);
-                    all.push(Damage::Operator(id));
-                }
-                Op::Cast(_, number) => {
-                    // One more before it: its rounding constant.
-                    all.extend(moved);
-                    all.extend([Damage::Operator(id), Damage::Other(id)]);
-                    if !self.program.is_proved_in_range(number) {
-                        all.extend([-1, 1].map(|step| Damage::Low(id, step)));
-                        all.extend([-1, 1].map(|step| Damage::High(id, step)));
-                    }
-                }
-                Op::Limit(..) => {
-                    all.extend([-1, 1].map(|step| Damage::Low(id, step)));
-                    all.extend([-1, 1].map(|step| Damage::High(id, step)));
-                }
-                Op::Wrap(..) | Op::Select(..) | Op::IsNegative(_) => {
-                    all.extend(moved);
-                    all.extend([Damage::Operator(id), Damage::Other(id)]);
-                }
-                _ => all.extend(moved),
-            }
+            at: 0,
         }
-        all.extend((0..f.stores.len()).map(Damage::Store));
-        all
     }
 }
 
-/// One call.
-struct Run<'a> {
+/// One call on its way.
+pub(super) struct Run<'a> {
     interpreter: &'a Interpreter,
+    number: usize,
     function: &'a Function,
     places: &'a Places,
     damage: Option<Damage>,
     inputs: &'a [i128],
-    state: &'a mut [i128],
-    values: Vec<i128>,
+    call: &'a mut Evaluated,
+    spare: &'a mut Spare,
+    /// Of the loop's round.
     index: u32,
-    fault: u32,
-    /// Of each call so far.
-    results: Vec<Vec<i128>>,
+    /// The operation, or the first of the loop.
+    at: Id,
 }
 
 impl Run<'_> {
-    fn body(&mut self) {
+    /// Evaluates the nodes before `end`, and the whole of a loop that holds it.
+    pub(super) fn up_to(&mut self, end: Id) {
         let mut id = 0;
         let mut next_loop = 0;
-        while id < self.function.nodes.len() {
+        while id < end {
             match self.function.loops.get(next_loop) {
                 Some(l) if l.start == id => {
-                    self.counted_loop(l, next_loop);
+                    self.counted_loop(next_loop);
                     id = l.end;
                     next_loop += 1;
                 }
                 _ => {
-                    self.node(id);
+                    self.step(id);
                     id += 1;
                 }
             }
         }
     }
 
-    fn counted_loop(&mut self, l: &Loop, number: usize) {
-        let mut carried: Vec<i128> = l.inits.iter().map(|id| self.values[*id]).collect();
+    /// Evaluates a node outside of loops.
+    pub(super) fn step(&mut self, id: Id) {
+        self.at = id;
+        self.node(id);
+    }
+
+    /// Evaluates a loop.
+    pub(super) fn counted_loop(&mut self, number: usize) {
+        let l = &self.function.loops[number];
+        self.at = l.start;
+        let mut carried = self.spare.take();
+        carried.extend(l.inits.iter().map(|id| self.call.values[*id]));
         for index in 0..l.count {
             self.index = index;
-            for (k, value) in carried.iter().enumerate() {
-                self.values[l.start + k] = *value;
-            }
+            self.call.values[l.start..][..carried.len()].copy_from_slice(&carried);
             for id in l.start + carried.len()..l.end {
                 self.node(id);
             }
             for (value, id) in carried.iter_mut().zip(&l.outs) {
-                *value = self.values[*id];
+                *value = self.call.values[*id];
             }
         }
         for id in l.end..self.function.nodes.len() {
             if let Op::LoopOut(n, k) = self.function.nodes[id].op
                 && n == number
             {
-                self.values[id] = carried[k];
+                self.call.values[id] = carried[k];
             }
         }
+        self.spare.0.push(carried);
     }
 
     fn node(&mut self, id: Id) {
+        match self.damage {
+            Some(damage) if damage.node() == Some(id) => self.compute::<true>(id),
+            _ => self.compute::<false>(id),
+        }
+    }
+
+    fn compute<const DAMAGED: bool>(&mut self, id: Id) {
         let function = self.function;
         let op = &function.nodes[id].op;
         if matches!(op, Op::Phi(..) | Op::LoopOut(..)) {
             return;
         }
-        let v = |id: &Id| self.values[*id];
+        let v = |id: &Id| self.call.values[*id];
         // What damage does to this node: its result moves, one bit more or less, limits move.
         let (mut moved, mut operator, mut other, mut limits) = (0, false, false, (0, 0));
-        match self.damage {
-            Some(Damage::Result(at, step)) if at == id => moved = step,
-            Some(Damage::Operator(at)) if at == id => operator = true,
-            Some(Damage::Other(at)) if at == id => other = true,
-            Some(Damage::Low(at, step)) if at == id => limits.0 = step,
-            Some(Damage::High(at, step)) if at == id => limits.1 = step,
-            _ => {}
+        if DAMAGED {
+            match self.damage {
+                Some(Damage::Result(_, step)) => moved = step,
+                Some(Damage::Operator(_)) => operator = true,
+                Some(Damage::Other(_)) => other = true,
+                Some(Damage::Low(_, step)) => limits.0 = step,
+                Some(Damage::High(_, step)) => limits.1 = step,
+                Some(Damage::Store(_)) | None => {}
+            }
         }
         let bit = i32::from(operator) - i32::from(other);
         let before = if matches!(op, Op::Cast(..) | Op::IsNegative(_)) {
@@ -358,9 +379,9 @@ impl Run<'_> {
         let program = &self.interpreter.program;
         let result = match op {
             Op::Input(k) => self.inputs[*k],
-            Op::LoadWord(slot, element) => self.state[self.places.slots[*slot] + element],
+            Op::LoadWord(slot, element) => self.call.state[self.places.slots[*slot] + element],
             Op::LoadResidue(slot, element) => {
-                let word = self.state[self.places.slots[*slot] + element];
+                let word = self.call.state[self.places.slots[*slot] + element];
                 match function.slots[*slot].kind {
                     SlotKind::Residue(bits) => low_bits(word.wrapping_add(moved), bits),
                     SlotKind::Word(_) => word.wrapping_add(moved),
@@ -382,8 +403,8 @@ impl Run<'_> {
                 let cast = changed.as_ref().unwrap_or(cast);
                 let mut outside = false;
                 let result = cast.kernel::<i128>().apply(value, |_| outside = true);
-                if outside && self.fault == 0 {
-                    self.fault = cast.id as u32 + 1;
+                if outside {
+                    self.fault(cast.id as u32 + 1);
                 }
                 result
             }
@@ -435,26 +456,46 @@ impl Run<'_> {
                 self.call(*number);
                 0
             }
-            Op::CallOut(call, k) => self.results[*call][*k].wrapping_add(moved),
+            // The call has put it there.
+            Op::CallOut(..) => self.call.values[id].wrapping_add(moved),
             Op::Phi(..) | Op::LoopOut(..) => 0,
         };
-        self.values[id] = result;
+        self.call.values[id] = result;
     }
 
+    /// The first of an operation, or of a loop, is kept.
+    fn fault(&mut self, number: u32) {
+        if self.call.faults.last().is_none_or(|(at, _)| *at != self.at) {
+            self.call.faults.push((self.at, number));
+        }
+    }
+
+    /// Calls a function on its part of the state; its outputs are put where they are looked for.
     fn call(&mut self, number: usize) {
         let site = &self.function.calls[number];
-        let inputs: Vec<i128> = site.arguments.iter().map(|id| self.values[*id]).collect();
-        let start = self.places.calls[number];
-        let count = self.interpreter.state(site.function).len();
-        let mut outputs = Vec::new();
-        let state = &mut self.state[start..start + count];
-        let fault = self
+        let range = self.interpreter.words_of_call(self.number, number);
+        let mut inputs = self.spare.take();
+        inputs.extend(site.arguments.iter().map(|id| self.call.values[*id]));
+        let mut callee = Evaluated {
+            values: self.spare.take(),
+            state: self.spare.take(),
+            faults: Vec::new(),
+        };
+        let f = &self.interpreter.program.functions[site.function];
+        callee.start(&self.call.state[range.clone()], f.nodes.len());
+        let mut run = self
             .interpreter
-            .call(site.function, &inputs, state, &mut outputs);
-        if self.fault == 0 {
-            self.fault = fault;
+            .run(site.function, None, &inputs, &mut callee, self.spare);
+        run.up_to(f.nodes.len());
+        self.interpreter.store(site.function, None, &mut callee);
+        self.call.state[range].copy_from_slice(&callee.state);
+        for (id, k) in &self.places.call_outs[number] {
+            self.call.values[*id] = callee.values[f.outputs[*k].1];
         }
-        self.results.push(outputs);
+        if let Some((_, number)) = callee.faults.first() {
+            self.fault(*number);
+        }
+        self.spare.0.extend([inputs, callee.values, callee.state]);
     }
 }
 

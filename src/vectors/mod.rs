@@ -3,7 +3,9 @@
 //! [`search`]).
 
 pub mod chain;
+pub mod damage;
 pub mod form;
+mod incremental;
 pub mod interpreter;
 pub mod model;
 mod repair;

@@ -250,15 +250,18 @@ impl Model {
         (columns, inputs)
     }
 
-    /// Outputs, state and fault at an input, as 64-bit words.
-    pub fn record(&self, input: &[i128]) -> Vec<i128> {
-        let mut outputs = vec![0; self.outputs + 1];
-        outputs[self.outputs] = i128::from(self.call(input, &mut outputs[..self.outputs]));
+    /// Appends outputs, state and fault at an input, as 64-bit words.
+    pub fn record(&self, input: &[i128], to: &mut Vec<i128>) {
+        let from = to.len();
+        to.resize(from + self.outputs, 0);
+        let fault = self.call(input, &mut to[from..]);
+        to.push(i128::from(fault));
         let wide = self.wide_outputs();
-        if !wide.contains(&true) {
-            return outputs;
+        if wide.contains(&true) {
+            let words = halves(&to[from..], wide);
+            to.truncate(from);
+            to.extend(words);
         }
-        halves(&outputs, wide)
     }
 
     /// The model with damaged copies of its block, each of which vectors have to tell from it.

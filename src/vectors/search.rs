@@ -1,6 +1,7 @@
 //! Which inputs and states a function is compared at: ends, random words, both sides of each branch and
 //! limit, ties of each rounding, and what tells damaged operations from the function.
 
+use super::incremental::Caller;
 use super::interpreter::{Interpreter, low_bits};
 use super::model::Model;
 use super::stimulus;
@@ -41,6 +42,7 @@ pub fn vectors(model: &Model, seed: u64) -> Vec<Vec<i128>> {
         program,
         number: *number,
         function: &program.program().functions[*number],
+        caller: Caller::new(program, *number),
     };
     search.directed(&mut chosen);
     search.swept(&mut chosen, seed);
@@ -56,17 +58,18 @@ pub(super) struct Search<'a> {
     pub(super) program: &'a Interpreter,
     pub(super) number: usize,
     pub(super) function: &'a Function,
+    pub(super) caller: Caller<'a>,
 }
 
 impl Search<'_> {
-    pub(super) fn split<'a>(&self, words: &'a [i128]) -> (&'a [i128], &'a [i128]) {
-        words.split_at(self.function.inputs.len())
-    }
-
     /// The values of all nodes.
     fn values(&self, words: &[i128]) -> Vec<i128> {
-        let (inputs, state) = self.split(words);
-        self.program.values(self.number, None, inputs, state)
+        self.caller.evaluated(words).values
+    }
+
+    /// The value of one.
+    fn value(&self, words: &[i128], node: Id) -> i128 {
+        self.caller.value(words, node)
     }
 
     fn is_allowed(&self, words: &[i128]) -> bool {
@@ -94,17 +97,17 @@ impl Search<'_> {
             match node.op {
                 Op::IsNegative(a) => {
                     for edge in [0, 1] {
-                        self.edge(&starts, of(a), &|words| self.values(words)[a], edge, chosen);
+                        self.edge(&starts, of(a), &|words| self.value(words, a), edge, chosen);
                     }
                 }
                 Op::Limit(a, low, high) => {
                     for edge in [low, low + 1, high, high + 1] {
-                        self.edge(&starts, of(a), &|words| self.values(words)[a], edge, chosen);
+                        self.edge(&starts, of(a), &|words| self.value(words, a), edge, chosen);
                     }
                 }
                 Op::Wrap(a, bits) if bits < 127 => {
                     for edge in [-1i128 << (bits - 1), 1i128 << (bits - 1)] {
-                        self.edge(&starts, of(a), &|words| self.values(words)[a], edge, chosen);
+                        self.edge(&starts, of(a), &|words| self.value(words, a), edge, chosen);
                     }
                 }
                 Op::Cast(a, number) => {
@@ -115,7 +118,7 @@ impl Search<'_> {
                         let (low, high) = cast.limits();
                         for edge in [low, low + 1, high, high + 1] {
                             let rounded = of(a).map(round);
-                            let at = |words: &[i128]| round(self.values(words)[a]);
+                            let at = |words: &[i128]| round(self.value(words, a));
                             self.edge(&starts, rounded, &at, edge, chosen);
                         }
                     }
@@ -220,7 +223,8 @@ impl Search<'_> {
                 let range = self.model.inputs[k];
                 let unit = if words[k] < range.high { 1 } else { -1 };
                 words[k] += unit;
-                let slope = self.values(&words)[node]
+                let slope = self
+                    .value(&words, node)
                     .wrapping_sub(value)
                     .wrapping_mul(unit);
                 words[k] = start[k];
@@ -290,7 +294,7 @@ impl Search<'_> {
             .rem_euclid(period);
         let step = (starts.len() / STARTS).max(1);
         for start in starts.iter().step_by(step) {
-            let is = self.values(start)[word];
+            let is = self.value(start, word);
             let nearest = is + (due - is).rem_euclid(period);
             for goal in [nearest, nearest - period] {
                 if let Some(words) = self.reached(start, word, goal) {
@@ -312,7 +316,7 @@ impl Search<'_> {
         };
         let mut steepest = 0;
         for _ in 0..ROUNDS {
-            let off = goal - self.values(&words)[node];
+            let off = goal - self.value(&words, node);
             if off.abs() <= NEAR {
                 break;
             }
@@ -324,7 +328,7 @@ impl Search<'_> {
                 } else {
                     step
                 };
-                let change = self.values(&moved(&words, k, step))[node] - self.values(&words)[node];
+                let change = self.value(&moved(&words, k, step), node) - self.value(&words, node);
                 change as f64 / step as f64
             };
             let slopes = (0..words.len()).map(|k| (k, slope(k)));
@@ -339,7 +343,7 @@ impl Search<'_> {
         for d in -NEAR..=NEAR {
             for e in -NEAR..=NEAR {
                 let near = moved(&moved(&words, steepest, d), other, e);
-                if self.values(&near)[node] == goal && self.is_allowed(&near) {
+                if self.value(&near, node) == goal && self.is_allowed(&near) {
                     return Some(near);
                 }
             }
@@ -364,14 +368,14 @@ impl Search<'_> {
         let mut lcg = stimulus::Lcg(seed + 6);
         for address in 0..1i128 << table.address_bits {
             let mut words: Vec<i128> = self.model.inputs.iter().map(|r| lcg.word(*r)).collect();
-            let is = self.values(&words)[phase];
+            let is = self.value(&words, phase);
             let inside = i128::from(lcg.draw() >> 1) & ((1 << dropped) - 1);
             let due = low_bits((address << dropped) + inside - half, table.phase_bits);
             // The first word that moves the phase by as much.
             for k in 0..words.len() {
                 let before = words[k];
                 words[k] = (before + due - is).rem_euclid(1i128 << table.phase_bits);
-                if self.is_allowed(&words) && self.values(&words)[phase] == due {
+                if self.is_allowed(&words) && self.value(&words, phase) == due {
                     break;
                 }
                 words[k] = before;

@@ -1,6 +1,8 @@
 //! Which vectors tell damaged operations from the function, of those that ends, branches and ties do not tell.
 
-use super::interpreter::Damage;
+use super::damage::Damage;
+use super::incremental::Dependents;
+use super::interpreter::Evaluated;
 use super::search::Search;
 use super::stimulus;
 
@@ -16,15 +18,6 @@ const NEAR_BY: usize = 16;
 const SHAKEN: usize = 1024;
 
 impl Search<'_> {
-    /// Outputs, state and fault.
-    fn outcome(&self, damage: Option<Damage>, words: &[i128]) -> (Vec<i128>, Vec<i128>, u32) {
-        let (inputs, state) = self.split(words);
-        let (mut state, mut outputs) = (state.to_vec(), Vec::new());
-        let program = self.program;
-        let fault = program.damaged(self.number, damage, inputs, &mut state, &mut outputs);
-        (outputs, state, fault)
-    }
-
     /// Vectors that tell damage, of which the others do not tell enough.
     pub(super) fn telling(&self, chosen: &mut Vec<Vec<i128>>, seed: u64) {
         let work: usize = self.function.nodes.len()
@@ -41,30 +34,26 @@ impl Search<'_> {
         candidates
             .iter_mut()
             .for_each(|words| self.model.repair(words));
-        let known: Vec<_> = chosen
-            .iter()
-            .map(|words| self.outcome(None, words))
-            .collect();
-        let others: Vec<_> = candidates
-            .iter()
-            .map(|words| self.outcome(None, words))
-            .collect();
+        let evaluated = |words: &Vec<i128>| self.caller.evaluated(words);
+        let mut known: Vec<_> = chosen.iter().map(evaluated).collect();
+        let mut others: Vec<_> = candidates.iter().map(evaluated).collect();
         let mut more: Vec<Vec<i128>> = Vec::new();
         for damage in self.program.damages(self.number) {
-            let tells =
-                |(words, due): &(&Vec<i128>, &_)| self.outcome(Some(damage), words) != **due;
-            let told = chosen.iter().zip(&known).filter(tells).take(EACH).count();
-            let lacking = EACH - told;
-            if lacking == 0 {
-                continue;
+            let dependents = self.caller.dependents(damage);
+            let tells = |(words, call): (&'_ Vec<i128>, &mut Evaluated)| {
+                let differs = self.caller.differs(damage, &dependents, words, call);
+                differs.then(|| words.clone())
+            };
+            let of_known = chosen.iter().zip(&mut known);
+            let told = of_known.filter_map(&tells).take(EACH).count();
+            let of_others = candidates.iter().zip(&mut others);
+            let found: Vec<_> = of_others.filter_map(&tells).take(EACH - told).collect();
+            if told + found.len() == 0 {
+                let of_known = chosen.iter().zip(&mut known);
+                let pool = of_known.chain(candidates.iter().zip(&mut others));
+                more.extend(self.carried(damage, &dependents, pool, seed + 9));
             }
-            let found = candidates.iter().zip(&others).filter(tells).take(lacking);
-            let before = more.len();
-            more.extend(found.map(|(words, _)| words.clone()));
-            if told + more.len() - before == 0 {
-                let pool = chosen.iter().chain(&candidates);
-                more.extend(self.carried(damage, pool, seed + 9));
-            }
+            more.extend(found);
         }
         chosen.extend(more);
     }
@@ -93,28 +82,20 @@ impl Search<'_> {
     fn carried<'a>(
         &self,
         damage: Damage,
-        pool: impl Iterator<Item = &'a Vec<i128>>,
+        dependents: &Dependents,
+        pool: impl Iterator<Item = (&'a Vec<i128>, &'a mut Evaluated)>,
         seed: u64,
     ) -> Option<Vec<i128>> {
-        let (Damage::Result(node, _)
-        | Damage::Operator(node)
-        | Damage::Other(node)
-        | Damage::Low(node, _)
-        | Damage::High(node, _)) = damage
-        else {
-            return None;
+        let moves = |(words, call): (&'a Vec<i128>, &'a mut Evaluated)| {
+            let moves = self.caller.moves(damage, dependents, words, call);
+            moves.then(|| words.clone())
         };
-        let is_other = |words: &&Vec<i128>| {
-            let (inputs, state) = self.split(words);
-            let [is, was] = [Some(damage), None]
-                .map(|damage| self.program.values(self.number, damage, inputs, state)[node]);
-            is != was
-        };
-        let near: Vec<Vec<i128>> = pool.filter(is_other).take(NEAR_BY).cloned().collect();
+        let near: Vec<Vec<i128>> = pool.filter_map(moves).take(NEAR_BY).collect();
         let mut shaken = self.shaken(&near, SHAKEN, seed);
         shaken.iter_mut().for_each(|words| self.model.repair(words));
-        let tells =
-            |words: &Vec<i128>| self.outcome(Some(damage), words) != self.outcome(None, words);
-        shaken.into_iter().find(tells)
+        shaken.into_iter().find(|words| {
+            let mut call = self.caller.evaluated(words);
+            self.caller.differs(damage, dependents, words, &mut call)
+        })
     }
 }

@@ -200,9 +200,12 @@ impl Due {
         let (columns, given) = model.columns();
         let mut inputs = WordRows::new(given);
         let mut expected = WordRows::new(columns.len() - given);
+        let mut record = Vec::new();
         let mut take = |input: &[i128]| {
             inputs.push(model.input_words(input));
-            expected.push(model.record(input));
+            record.clear();
+            model.record(input, &mut record);
+            expected.push(record.iter().copied());
         };
         for mut input in stimulus::inputs(&model.inputs, count, SEED + 3) {
             model.repair(&mut input);
