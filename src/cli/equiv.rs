@@ -10,7 +10,7 @@ use crate::equivalence::job::{self, Request, Stimulus};
 use crate::equivalence::outcome::{Equivalence, NodeReport};
 use crate::equivalence::shrink;
 use crate::error::{Error, Result};
-use crate::output::{Results, name_of};
+use crate::output::name_of;
 use crate::record::capture::CaptureReader;
 use crate::text::{away_from_zero_decimals, number};
 use crate::timing;

@@ -9,7 +9,6 @@ use crate::error::{Error, Result};
 use crate::job;
 use crate::job::bound::Line;
 use crate::job::outcome::{Drift, Outcome};
-use crate::output::Results;
 use crate::text::{at_most, constant};
 use crate::timing;
 use std::path::PathBuf;
