@@ -50,6 +50,19 @@ impl Error {
     }
 }
 
+/// Where something stands in an input, kept for what is found wrong with it later.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Position {
+    /// The file as the user named it.
+    pub file: Option<PathBuf>,
+    /// 1-based line.
+    pub line: Option<usize>,
+    /// 1-based column, in characters.
+    pub column: Option<usize>,
+    /// The text of the line, for the caret.
+    pub source_line: Option<String>,
+}
+
 /// One thing wrong with an input: what, where, and what to do.
 ///
 /// Printed as `FILE:LINE:COLUMN: error: MESSAGE`, then the line itself with a caret, then
@@ -90,6 +103,24 @@ impl InputError {
         self.line = Some(line);
         self.column = Some(column);
         self
+    }
+
+    /// Names the place that was kept.
+    pub fn at_position(mut self, position: &Position) -> Self {
+        self.file.clone_from(&position.file);
+        (self.line, self.column) = (position.line, position.column);
+        self.source_line.clone_from(&position.source_line);
+        self
+    }
+
+    /// The place alone, to be kept.
+    pub fn position(self) -> Position {
+        Position {
+            file: self.file,
+            line: self.line,
+            column: self.column,
+            source_line: self.source_line,
+        }
     }
 
     /// Finds line, column and the line's text from a byte offset into `text`.
@@ -164,6 +195,9 @@ pub fn io_error(path: impl AsRef<Path>, doing: &str, e: &std::io::Error) -> Erro
             std::io::ErrorKind::UnexpectedEof | std::io::ErrorKind::InvalidData => {
                 "take another copy of the file"
             }
+            std::io::ErrorKind::NotADirectory => {
+                "a part of this path is a file, where a folder is needed: give another path"
+            }
             _ => "check the path and the disk",
         })
         .into()
@@ -203,6 +237,11 @@ mod tests {
         assert_eq!(
             e.to_string(),
             "x.toml:2:4: error: bad\n  | µb = 2\n  |    ^\n  help: do this"
+        );
+        let again = InputError::new("worse").at_position(&e.position());
+        assert_eq!(
+            again.to_string(),
+            "x.toml:2:4: error: worse\n  | µb = 2\n  |    ^"
         );
     }
 }

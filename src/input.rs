@@ -1,9 +1,9 @@
 //! Files that are read whole: nothing without an end is, and nothing beyond a stated size.
 
-use crate::error::{InputError, Result, io_error};
+use crate::error::{Error, InputError, Result, io_error};
 use std::fs::File;
 use std::io::{self, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Most bytes of a design.
 pub const MOST_OF_A_DESIGN: u64 = 1 << 24;
@@ -20,7 +20,12 @@ const CHUNK_BYTES: u64 = 1 << 20;
 /// A path that cannot be opened; a folder; a device, which has no end.
 pub fn open(path: &Path, what: &str) -> Result<File> {
     let failed = |e: &io::Error| io_error(path, &format!("read the {what}"), e);
-    let file = File::open(path).map_err(|e| failed(&e))?;
+    let file = File::open(path).map_err(|e| match (in_other_letters(path), failed(&e)) {
+        (Some(other), Error::Input(e)) if !path.exists() => {
+            e.help(format!("did you mean {}?", other.display())).into()
+        }
+        (_, error) => error,
+    })?;
     let found = file.metadata().map_err(|e| failed(&e))?;
     let refused = |kind: &str| {
         InputError::new(format!("this is a {kind}, not a {what}"))
@@ -39,6 +44,18 @@ pub fn open(path: &Path, what: &str) -> Result<File> {
         }
     }
     Ok(file)
+}
+
+/// The file in the same folder whose name differs in capitals alone.
+fn in_other_letters(path: &Path) -> Option<PathBuf> {
+    let folder = match path.parent()? {
+        here if here == Path::new("") => Path::new("."),
+        folder => folder,
+    };
+    let mut entries = std::fs::read_dir(folder).ok()?.flatten();
+    let name = path.file_name()?;
+    let other = entries.find(|e| e.file_name().eq_ignore_ascii_case(name))?;
+    Some(path.with_file_name(other.file_name()))
 }
 
 /// All bytes of a text, or as many as it takes to see that it is none (a byte 0, or what is not UTF-8).

@@ -52,9 +52,19 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
         ),
         (
             with(base("log(x)", "--domain=-0.5,0.5"), &cubic),
-            &["undefined"],
+            &["--function:1:1", "undefined"],
         ),
-        (with(base("sin(x", "--domain=0,1"), &cubic), &["error"]),
+        (
+            with(base("sin(x", "--domain=0,1"), &cubic),
+            &["close it with `)`"],
+        ),
+        (
+            with(
+                base("a*x", "--domain=0,1"),
+                &["--parameter", "a=1,5", "--degree=1", "--output=Q2.14"],
+            ),
+            &["--parameter a=1,5", "the decimal mark is a point; give 1.5"],
+        ),
         // Each level multiplies how often it turns: told at once, and not after minutes.
         (
             with(

@@ -171,7 +171,11 @@ fn a_search_that_accepts_anything_is_caught() {
 fn a_search_that_names_nothing_is_told_that_its_silence_means_nothing() {
     let before = closed(&csv(0.0), "");
     let deaf = |_: &ThermalRecord| Ok(Vec::new());
-    let planted = controls::positive(&before, &design(""), 1, &|_, _| {}, &deaf).expect("closed");
+    let shown = controls::Shown {
+        stage: &|_| {},
+        progress: &|_, _| {},
+    };
+    let planted = controls::positive(&before, &design(""), 1, &shown, &deaf).expect("closed");
     assert_eq!(planted.len(), 4);
     for p in &planted {
         assert!(

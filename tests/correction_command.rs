@@ -134,7 +134,10 @@ fn an_unfitted_compensation_is_said() {
 
     let ran = gyrogen(&["run", "--out", "out"], at);
     assert_eq!(ran.status.code(), Some(0));
+    // The embedded default's firmware is not replaced by that of a file without being asked.
     let (status, said) = emitted(&["out/design.toml"], &[], at);
+    assert!(status == Some(2) && said.contains("--force"), "{said}");
+    let (status, said) = emitted(&["out/design.toml"], &["--force"], at);
     assert_eq!(status, Some(0));
     assert!(
         !said.contains("not fitted") && !said.contains("warning"),

@@ -285,6 +285,11 @@ fn arguments_that_are_nearly_right_are_shown_right() {
     let top = tempfile::tempdir().expect("a folder");
     let approx = ["approx", "--function", "x", "--degree", "1"];
     let formats = ["--output", "Q1.15", "--coefficients", "Q1.15"];
+    fs::write(top.path().join("r.csv"), "time_s,a\n0,1\n1,2\n").expect("written");
+    let rows = (0..12).map(|k| format!("{k},{:.3},{}\n", 0.1 * f64::from(k % 7), 20 + k));
+    let short = format!("time_s,rate_out_dps,die_degc\n{}", rows.collect::<String>());
+    fs::write(top.path().join("short.csv"), short).expect("written");
+    fs::write(top.path().join("result.json"), "{\"schema\": \"s\"}\n").expect("written");
     let of = |more: &[&'static str]| [&approx[..], &formats[..], more].concat();
     for (arguments, part) in [
         (vec!["help", "clsoe"], "'close'"),
@@ -293,6 +298,35 @@ fn arguments_that_are_nearly_right_are_shown_right() {
             vec!["check", "--samples", "200k"],
             "write the number in digits alone: 200000",
         ),
+        (
+            vec!["check", "--samples", "10"],
+            "give a whole number from 1000 to 100000000",
+        ),
+        (
+            vec!["close", "--record", "r.csv", "--clean", "3"],
+            "add `--self-test`, or leave that option out",
+        ),
+        (
+            vec!["close", "--record", "r.csv", "--capture", "c.csv"],
+            "one command for each",
+        ),
+        (vec!["check", "-q", "-v"], "leave one of the two out"),
+        (vec!["emit"], "add it; `--help`"),
+        (
+            vec!["verify", "fw", "--digest", "123"],
+            "64 hexadecimal digits, and 3 characters were given",
+        ),
+        (vec!["close", "--record", "r.CSV"], "did you mean r.csv?"),
+        (
+            vec!["close", "--record", "short.csv"],
+            "12 usable rows are too few: at least 15 are needed",
+        ),
+        // What is wrong with the record comes before what is wrong with the folder.
+        (
+            vec!["close", "--record", "r.csv", "--out", "r.csv/sub"],
+            "no column rate_out_dps",
+        ),
+        (vec!["check", "result.json"], "it looks like JSON"),
         (
             of(&["--domain=0,1", "--input", "Q15"]),
             "did you mean `Q1.15`",
@@ -309,10 +343,12 @@ fn arguments_that_are_nearly_right_are_shown_right() {
         let (status, said, complaints) = gyrogen(top.path(), &arguments);
         assert_eq!(status, Some(2), "{arguments:?}: {said}{complaints}");
         assert!(complaints.contains(part), "{part}: {complaints}");
+        // JSON is no record, so that no command fits it.
+        assert!(!complaints.contains("--record result.json"), "{complaints}");
     }
     for arguments in [
         &["init", "--out", "my.toml"][..],
-        &["emit", "--lang", "C", "--part", "tables", "--out", "fw"],
+        &["emit", "--lang", "C", "--part", "Tables", "--out", "fw"],
     ] {
         let (status, said, complaints) = gyrogen(top.path(), arguments);
         assert_eq!(status, Some(0), "{arguments:?}: {said}{complaints}");

@@ -446,19 +446,30 @@ fn an_edited_bundle_is_not_overwritten_and_an_unedited_one_leaves_nothing() {
         )
     };
     assert!(emit("design.toml", &[]).status.success());
-    assert!(emit("other.toml", &[]).status.success());
+    // Firmware of another design is not replaced without being asked, that of an edited one is.
+    let refused = emit("other.toml", &[]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(
+        said(&refused).contains("`gyrogen emit design.toml --lang c`")
+            && said(&refused).contains("name another folder with --out"),
+        "{}",
+        said(&refused)
+    );
+    assert!(here.join("c/tested_correction.c").exists());
+    std::fs::rename(here.join("other.toml"), here.join("design.toml")).expect("edited");
+    assert!(emit("design.toml", &[]).status.success());
     assert!(
         here.join("c/other_correction.c").exists() && !here.join("c/tested_correction.c").exists()
     );
     std::fs::write(here.join("c/other_correction.c"), "mine").expect("written");
-    let refused = emit("other.toml", &[]);
+    let refused = emit("design.toml", &[]);
     assert_eq!(refused.status.code(), Some(2));
     assert!(
         said(&refused).contains("other_correction.c (edited)"),
         "{}",
         said(&refused)
     );
-    let forced = emit("other.toml", &["--force"]);
+    let forced = emit("design.toml", &["--force"]);
     assert!(
         forced.status.success() && said(&forced).contains("other_correction.c (edited)"),
         "{}",

@@ -80,7 +80,7 @@ pub struct Arguments {
     #[arg(long, default_value = "approx")]
     name: String,
     /// Threads, 1 to 256; as many as the machine has if left out. The result does not depend on it.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    #[arg(long, value_name = "N", value_parser = super::values::whole::<u16>(1..=256))]
     threads: Option<u16>,
     /// Folder for the results; made if it does not exist.
     #[arg(long, value_name = "DIR", default_value = "gyrogen-approx")]
@@ -168,16 +168,18 @@ fn request(arguments: &Arguments) -> Result<Request> {
     };
     let mut parameters = BTreeMap::new();
     for text in &arguments.parameters {
-        let parsed = text.split_once('=').and_then(|(name, value)| {
-            let value: f64 = value.trim().parse().ok()?;
-            value.is_finite().then_some((name.trim().to_owned(), value))
-        });
-        let Some((name, value)) = parsed else {
-            return Err(InputError::new(format!("`{text}` is no parameter"))
+        let refuse = |why: String| {
+            InputError::new(format!("`--parameter {text}` gives no value: {why}"))
                 .help("such as `--parameter gain=1.25`")
-                .into());
         };
-        parameters.insert(name, value);
+        let (name, value) = text
+            .split_once('=')
+            .ok_or_else(|| refuse("a name, `=` and a number are wanted".to_owned()))?;
+        let number = super::values::number(value).map_err(refuse)?;
+        if !number.is_finite() {
+            return Err(refuse("the number has to be finite".to_owned()).into());
+        }
+        parameters.insert(name.trim().to_owned(), number);
     }
     Ok(Request {
         function: arguments.function.clone(),

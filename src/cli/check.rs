@@ -18,7 +18,7 @@ pub struct Arguments {
     #[command(flatten)]
     design: super::common::DesignFile,
     /// ADC samples of the design's own gyro that are run, 1000 to 100000000; 1000000 if left out.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1_000..=100_000_000))]
+    #[arg(long, value_name = "N", value_parser = super::values::whole::<u64>(1_000..=100_000_000))]
     samples: Option<u64>,
     /// Folder for check.json; made if it does not exist. Nothing is written if left out.
     #[arg(long, value_name = "DIR")]

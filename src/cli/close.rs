@@ -12,6 +12,7 @@ use crate::firmware::correction;
 use crate::firmware::correction::Origin;
 use crate::firmware::files::EmittedFile;
 use crate::output::{Results, name_of};
+use crate::record::capture::CaptureReader;
 use crate::record::{ThermalRecord, Warning};
 use crate::report::closure::Beside;
 use crate::report::design_diff::DesignDiff;
@@ -121,7 +122,12 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         return super::self_test::run(arguments, &design, recorded, &watch);
     }
     let out = arguments.out.as_deref().unwrap_or(Path::new(FOLDER));
-    let mut results = Results::claim(out, &PLANNED, &recorded.inputs)?;
+    let look = || match (&arguments.record, &arguments.capture) {
+        (Some(record), _) => crate::record::read_any(record, &design.record).map(drop),
+        (None, Some(path)) => CaptureReader::open(path, design.circuit.adc.format).map(drop),
+        (None, None) => Ok(()),
+    };
+    let mut results = super::common::claim(out, &PLANNED, recorded, look)?;
     let (closure, compared, controls) = if let Some(path) = &arguments.capture {
         watch.stage("closing");
         let closed = capture::close(path, &design, &recorded.command)?;
@@ -159,7 +165,6 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         } else {
             None
         };
-        watch.stage("controls");
         let controls = if arguments.controls {
             Some(super::controls::run(&closed, &record, &design, &watch)?)
         } else {

@@ -45,6 +45,20 @@ pub(super) fn design(path: Option<&Path>) -> Result<crate::design::Design> {
     Ok(design)
 }
 
+/// Claims a command's folder. What `look` finds wrong with the measured data is said before what is wrong with the folder,
+/// but for data that would be written over.
+pub(super) fn claim(
+    out: &Path,
+    planned: &[&str],
+    recorded: &super::Recorded,
+    look: impl FnOnce() -> Result<()>,
+) -> Result<Results> {
+    for name in planned {
+        crate::output::refuse_inputs(&out.join(name), &recorded.inputs)?;
+    }
+    Results::claim(out, planned, &recorded.inputs).or_else(|e| look().and(Err(e)))
+}
+
 /// A record in a design's place is named as what it is.
 fn refuse_record(path: &std::path::Path) -> Result<()> {
     use std::io::Read;
@@ -55,16 +69,28 @@ fn refuse_record(path: &std::path::Path) -> Result<()> {
     let mut start = Vec::new();
     let read = std::fs::File::open(path).and_then(|f| f.take(1 << 16).read_to_end(&mut start));
     match (read, crate::record::is_a_record(&start)) {
-        (Ok(_), Some(what)) => Err(crate::error::InputError::new(format!(
-            "this is no design: it looks like {what}"
-        ))
-        .in_file(path)
-        .help(format!(
-            "`gyrogen run --record {0}` fits it, `gyrogen close --record {0}` looks for causes; a design is a TOML file, as \
-             `gyrogen init` writes one",
-            path.display()
-        ))
-        .into()),
+        (Ok(_), Some((what, is_record))) => {
+            let beside = path.with_file_name("design.toml");
+            let help = match is_record {
+                true => format!(
+                    "`gyrogen run --record {0}` fits it, `gyrogen close --record {0}` looks for causes; a design is a TOML file, as \
+                     `gyrogen init` writes one",
+                    path.display()
+                ),
+                // Of results, which have their design beside them.
+                false if beside.is_file() => format!(
+                    "did you mean {}, which lies beside it? A design is a TOML file",
+                    beside.display()
+                ),
+                false => "a design is a TOML file, as `gyrogen init` writes one".to_owned(),
+            };
+            Err(
+                crate::error::InputError::new(format!("this is no design: it looks like {what}"))
+                    .in_file(path)
+                    .help(help)
+                    .into(),
+            )
+        }
         // What cannot be read is the reader's to say.
         _ => Ok(()),
     }

@@ -5,7 +5,7 @@ use crate::design::Design;
 use crate::error::Result;
 use crate::record::ThermalRecord;
 use crate::report::closure::controls as words;
-use crate::selftest::controls::{self, Controls};
+use crate::selftest::controls::{self, Controls, Shown};
 use crate::thermal::close::Closed;
 
 /// Controls of a closed record, with progress on a terminal.
@@ -18,8 +18,11 @@ pub fn run(
     design: &Design,
     stages: &Stages,
 ) -> Result<Controls> {
-    let progress = |done: usize, of: usize| stages.at(done as u64, Some(of as u64));
-    controls::run(closed, record, design, super::threads(None), &progress)
+    let shown = Shown {
+        stage: &|what: &str| stages.stage(what),
+        progress: &|done: usize, of: usize| stages.at(done as u64, Some(of as u64)),
+    };
+    controls::run(closed, record, design, super::threads(None), &shown)
 }
 
 /// The tables.

@@ -21,7 +21,7 @@ pub struct Arguments {
     #[command(flatten)]
     design: super::common::DesignFile,
     /// Language of the sources.
-    #[arg(long, value_enum, ignore_case = true)]
+    #[arg(long, value_enum)]
     lang: Language,
     /// Which part of the firmware; if left out, `correction` for a design that has a `[correction]`, else `chain`.
     #[arg(long, value_enum)]
@@ -50,6 +50,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let mut results = Results::claim(&arguments.out, &[manifest::NAME], &recorded.inputs)?;
     if !arguments.force {
         replace::refuse(&[], &arguments.out)?;
+        replace::refuse_another(&arguments.out, &recorded.command)?;
     }
     let bundle = emitted(&design, part, arguments.lang, &recorded.command)?;
     super::common::bundle(&bundle, "", &mut results, arguments.force)?;

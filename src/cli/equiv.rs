@@ -10,7 +10,7 @@ use crate::equivalence::job::{self, Request, Stimulus};
 use crate::equivalence::outcome::{Equivalence, NodeReport};
 use crate::equivalence::shrink;
 use crate::error::{Error, Result};
-use crate::output::{Results, name_of};
+use crate::output::name_of;
 use crate::record::capture::CaptureReader;
 use crate::text::{away_from_zero_decimals, number};
 use crate::timing;
@@ -25,7 +25,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     capture: Option<PathBuf>,
     /// ADC samples, 1 to 1000000000; if left out, 10000000, or the whole capture.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
+    #[arg(long, value_name = "N", value_parser = super::values::whole::<u64>(1..=1_000_000_000))]
     samples: Option<u64>,
     /// Which codes are made where no capture is given.
     #[arg(long, value_enum, default_value = "operating")]
@@ -34,7 +34,7 @@ pub struct Arguments {
     #[arg(long, value_name = "DESIGN")]
     against: Option<PathBuf>,
     /// Threads, 1 to 1024; as many as the machine has if left out. The result does not depend on it.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", value_parser = super::values::whole::<u16>(1..=1024))]
     threads: Option<u16>,
     /// Folder for the results; made if it does not exist.
     #[arg(long, value_name = "DIR", default_value = "gyrogen-out")]
@@ -73,7 +73,11 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         job::COUNTEREXAMPLE,
         timing::NAME,
     ];
-    let mut results = Results::claim(&arguments.out, &planned, &recorded.inputs)?;
+    let look = || match &arguments.capture {
+        Some(path) => CaptureReader::open(path, design.circuit.adc.format).map(drop),
+        None => Ok(()),
+    };
+    let mut results = super::common::claim(&arguments.out, &planned, recorded, look)?;
     let languages = super::common::languages(arguments.lang)?;
     let (drive, sense, origin) = codes(&design, arguments)?;
     let stimulus = Stimulus {

@@ -69,7 +69,7 @@ enum Command {
 /// Runs the command that the process was started with.
 pub fn main() -> ExitCode {
     crate::leftovers::on_signals();
-    let parser = Cli::command();
+    let parser = parser();
     let result = match parser.clone().try_get_matches() {
         Ok(matches) => {
             let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
@@ -106,6 +106,16 @@ pub fn main() -> ExitCode {
     }
 }
 
+/// The parser; words that are chosen from a list are taken in capitals too.
+fn parser() -> clap::Command {
+    Cli::command().mut_subcommands(|command| {
+        command.mut_args(|arg| match arg.get_possible_values().is_empty() {
+            true => arg,
+            false => arg.ignore_case(true),
+        })
+    })
+}
+
 /// A parser's error with what to do about it.
 fn with_advice(mut error: clap::Error) -> clap::Error {
     use clap::error::{ContextKind, ContextValue, ErrorKind};
@@ -127,15 +137,73 @@ fn with_advice(mut error: clap::Error) -> clap::Error {
             error
         }
         ErrorKind::ValueValidation => {
-            if let Some(digits) = values::plain_integer(&text(&error, ContextKind::InvalidValue)) {
-                let advice = format!("write the number in digits alone: {digits}");
-                let advice = ContextValue::StyledStrs(vec![advice.into()]);
-                error.insert(ContextKind::Suggested, advice);
+            match values::plain_integer(&text(&error, ContextKind::InvalidValue)) {
+                Some(digits) => {
+                    let tip = format!("write the number in digits alone: {digits}");
+                    with_tip(error, &tip)
+                }
+                None => error,
             }
-            error
+        }
+        ErrorKind::ArgumentConflict => {
+            let (one, other) = (
+                text(&error, ContextKind::InvalidArg),
+                text(&error, ContextKind::PriorArg),
+            );
+            with_tip(error, of_conflict(&one, &other))
+        }
+        ErrorKind::MissingRequiredArgument => {
+            let missing = match error.get(ContextKind::InvalidArg) {
+                Some(ContextValue::Strings(missing)) => missing.join(" "),
+                _ => String::new(),
+            };
+            with_tip(error, of_missing(&missing))
         }
         _ => error,
     }
+}
+
+/// A parser's error with a line of advice.
+fn with_tip(mut error: clap::Error, tip: &str) -> clap::Error {
+    use clap::error::{ContextKind, ContextValue};
+    let tip = ContextValue::StyledStrs(vec![tip.to_owned().into()]);
+    error.insert(ContextKind::Suggested, tip);
+    error
+}
+
+/// What to do about two options that exclude each other.
+fn of_conflict(one: &str, other: &str) -> &'static str {
+    let has = |name: &str| one.contains(name) || other.contains(name);
+    if one == other {
+        return "give it once";
+    }
+    if has("[DESIGN]") && has("--design") {
+        return "the design is given twice: as a file alone, or with --design, not both";
+    }
+    if has("--record") && has("--capture") {
+        return "a thermal record and a capture of ADC codes are closed by themselves: one command for each";
+    }
+    if has("--self-test") {
+        return "a self-test measures the search itself, on simulated records: run it by itself, or leave `--self-test` out";
+    }
+    if has("--capture") {
+        return "the other option is for thermal records (`--record`): leave it out, or give a record";
+    }
+    "leave one of the two out"
+}
+
+/// What to do about options that are missing.
+fn of_missing(missing: &str) -> &'static str {
+    if missing.contains("--self-test") {
+        return "an option was given that is one of the self-test's: add `--self-test`, or leave that option out";
+    }
+    if missing.contains("--profile") {
+        return "`--readings` is how many readings are taken of a profile: add `--profile`, or leave `--readings` out";
+    }
+    if missing.contains("--record") {
+        return "give the measured record with `--record FILE`; `close` takes a capture of ADC codes with `--capture FILE` in its place";
+    }
+    "add it; `--help` behind the command says what it is"
 }
 
 /// Says where a second file belongs: one file alone, the design, has no option.
@@ -156,11 +224,10 @@ fn of_unknown_argument(mut error: clap::Error) -> clap::Error {
         }
     };
     error.remove(ContextKind::Suggested);
-    if !advice.is_empty() {
-        let advice = vec![advice.into()];
-        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(advice));
+    match advice.is_empty() {
+        true => error,
+        false => with_tip(error, advice),
     }
-    error
 }
 
 /// Runs a subcommand; `recorded` is what its files say of how they were made.

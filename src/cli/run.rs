@@ -9,7 +9,6 @@ use crate::error::{Error, Result};
 use crate::job;
 use crate::job::bound::Line;
 use crate::job::outcome::{Drift, Outcome};
-use crate::output::Results;
 use crate::text::{at_most, constant};
 use crate::timing;
 use std::path::PathBuf;
@@ -65,7 +64,11 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     }
     let mut design = arguments.design.read()?;
     design.record.undo_correction = arguments.undo_correction;
-    let mut results = Results::claim(&arguments.out, &PLANNED, &recorded.inputs)?;
+    let look = || match &arguments.record {
+        Some(record) => crate::record::read_any(record, &design.record).map(drop),
+        None => Ok(()),
+    };
+    let mut results = super::common::claim(&arguments.out, &PLANNED, recorded, look)?;
     if !arguments.force {
         crate::verify::firmware::refuse_edited(&arguments.out)?;
     }

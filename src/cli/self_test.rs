@@ -19,11 +19,11 @@ use std::path::PathBuf;
 pub struct Options {
     /// Simulated records for each effect and size, 1 to 1000.
     #[arg(long, value_name = "N", default_value_t = 4, requires = "self_test",
-          value_parser = clap::value_parser!(u16).range(1..=1000))]
+          value_parser = super::values::whole::<u16>(1..=1000))]
     records: u16,
     /// Simulated records without an effect, for each of four kinds of noise, 0 to 10000.
     #[arg(long, value_name = "N", default_value_t = 25, requires = "self_test",
-          value_parser = clap::value_parser!(u16).range(0..=10000))]
+          value_parser = super::values::whole::<u16>(0..=10000))]
     clean: u16,
     /// Plant this effect only, by its name in the manual's catalogue; may be given more than once.
     #[arg(long, value_name = "ID", requires = "self_test")]
@@ -32,7 +32,7 @@ pub struct Options {
     #[arg(long, value_name = "N", default_value_t = 1, requires = "self_test")]
     seed: u64,
     /// Threads, 1 to 1024; as many as the machine has if left out. The result does not depend on it.
-    #[arg(long, value_name = "N", requires = "self_test", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", requires = "self_test", value_parser = super::values::whole::<u16>(1..=1024))]
     threads: Option<u16>,
 }
 

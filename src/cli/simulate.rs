@@ -33,7 +33,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     profile: Option<PathBuf>,
     /// Averaged readings along a profile, 10 to 1000000; only with --profile.
-    #[arg(long, value_name = "N", default_value_t = 500, requires = "profile", value_parser = clap::value_parser!(u64).range(10..=1_000_000))]
+    #[arg(long, value_name = "N", default_value_t = 500, requires = "profile", value_parser = super::values::whole::<u64>(10..=1_000_000))]
     readings: u64,
     /// Folder for the results; made if it does not exist.
     #[arg(long, value_name = "DIR", default_value = "gyrogen-simulate")]
@@ -43,7 +43,7 @@ pub struct Arguments {
     #[arg(long, value_name = "NODE", value_delimiter = ',')]
     trace: Vec<String>,
     /// Length of the trace, in decimated samples, 1 to 1000000.
-    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = super::values::whole::<u64>(1..=1_000_000))]
     trace_rows: u64,
     /// Format of the trace's file, `trace.FORMAT`.
     #[arg(long, value_enum, default_value = "vcd")]
@@ -52,7 +52,7 @@ pub struct Arguments {
     #[arg(long, value_enum, default_value = "fixed")]
     trace_arith: Arith,
     /// Threads, 1 to 1024; as many as the machine has if left out. The result does not depend on it.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", value_parser = super::values::whole::<u16>(1..=1024))]
     threads: Option<u16>,
     /// How the result is printed on stdout.
     #[arg(long, value_enum, default_value = "text")]

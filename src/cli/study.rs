@@ -32,7 +32,7 @@ pub struct Arguments {
     #[arg(long, value_name = "DIR", num_args = 1..)]
     merge: Vec<PathBuf>,
     /// Threads, 1 to 1024; as many as the machine has if left out. The result does not depend on it.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", value_parser = super::values::whole::<u16>(1..=1024))]
     threads: Option<u16>,
     /// Folder for the results; made if it does not exist.
     #[arg(long, value_name = "DIR")]

@@ -2,6 +2,7 @@
 
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
+use std::ops::RangeInclusive;
 
 /// A number of an option, which is in the option's own unit.
 ///
@@ -16,6 +17,22 @@ pub(super) fn number(text: &str) -> Result<f64, String> {
             false => "it is no number; give one without its unit, such as 0.5 or 3600".to_owned(),
         }
     })
+}
+
+/// A whole number of a range, for an option.
+pub(super) fn whole<T: TryFrom<u64>>(
+    range: RangeInclusive<u64>,
+) -> impl Fn(&str) -> Result<T, String> + Clone {
+    move |text| {
+        let number = text.parse::<u64>().ok().filter(|n| range.contains(n));
+        number.and_then(|n| T::try_from(n).ok()).ok_or_else(|| {
+            format!(
+                "give a whole number from {} to {}",
+                range.start(),
+                range.end()
+            )
+        })
+    }
 }
 
 /// The digits of a count that is written in another way: `200k`, `1e6`, `10_000`. `None` for what is no such count.
@@ -134,6 +151,16 @@ mod tests {
             ("", None),
         ] {
             assert_eq!(plain_integer(text), digits, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_number_outside_its_range_is_told_the_range_in_words() {
+        let of = whole::<u16>(10..=1000);
+        assert_eq!(of("10"), Ok(10));
+        for text in ["9", "1001", "-20", "many", "70000"] {
+            let said = of(text).expect_err(text);
+            assert_eq!(said, "give a whole number from 10 to 1000", "{text}");
         }
     }
 

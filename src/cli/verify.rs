@@ -46,10 +46,16 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     if let Some(digest) = &arguments.digest {
         let is_digest = digest.len() == 64 && digest.chars().all(|c| c.is_ascii_hexdigit());
         if !is_digest {
-            return Err(InputError::new(
-                "`--digest` takes the 64 hexadecimal digits that `gyrogen emit` printed",
-            )
-            .into());
+            let length = digest.chars().count();
+            let what = match length {
+                64 => "`--digest` takes hexadecimal digits alone, 0 to 9 and a to f".to_owned(),
+                _ => format!(
+                    "`--digest` takes 64 hexadecimal digits, and {length} characters were given"
+                ),
+            };
+            return Err(InputError::new(what)
+                .help("`gyrogen emit` prints the digest as its last line; it is the SHA-256 of the bundle's manifest.json")
+                .into());
         }
     }
     refuse_no_bundle(&arguments.bundle)?;

@@ -395,11 +395,14 @@ pub(super) fn record(t: &Table, base: Option<&RecordMapping>) -> Result<RecordMa
     units.extend(stated);
     let mut places = base.places;
     let entries = given.entries().into_iter();
-    places.extend(entries.map(|(role, value)| (role.to_owned(), value.error(""))));
+    places.extend(entries.map(|(role, value)| (role.to_owned(), value.error("").position())));
+    let at = |key: &str| t.get(key).map(|value| value.error("").position());
     Ok(RecordMapping {
         columns,
         units,
         places,
+        row_period_at: at("row_period_s").or(base.row_period_at),
+        thermometer_at: at("thermometer").or(base.thermometer_at),
         row_period_s,
         thermometer,
         axis,

@@ -101,6 +101,52 @@ pub fn refuse(files: &[EmittedFile], folder: &Path) -> Result<()> {
         .into())
 }
 
+/// Refuses a folder with the firmware of another design than that of `command`, which goes there.
+///
+/// # Errors
+/// Such a folder. A design is known by its file's name, which an edit leaves.
+pub fn refuse_another(folder: &Path, command: &str) -> Result<()> {
+    if folder.symlink_metadata().is_err() {
+        return Ok(());
+    }
+    let text = Folder::open(folder)?
+        .read_text(manifest::NAME)
+        .unwrap_or_default();
+    let value: serde_json::Value = serde_json::from_str(&text).unwrap_or_default();
+    let Some(before) = value["command"].as_str() else {
+        return Ok(());
+    };
+    let old = design_of(before);
+    if old.is_some() && old == design_of(command) {
+        return Ok(());
+    }
+    Err(InputError::new(format!(
+        "this folder holds the firmware that another command made: `{before}`. Nothing was written"
+    ))
+    .in_file(folder)
+    .help("name another folder with --out, or remove this one; `--force` replaces it. Firmware of the same design file is replaced without being asked")
+    .into())
+}
+
+/// The name of the design file that a recorded command emits firmware of, empty for the embedded default; `None` for a
+/// command without a design.
+fn design_of(command: &str) -> Option<&str> {
+    let mut words = command.splitn(3, ' ').skip(1);
+    let (verb, rest) = (words.next().unwrap_or(""), words.next().unwrap_or(""));
+    let given = match (rest.split_once("--design"), rest.split_once("-- ")) {
+        _ if !rest.starts_with("--") => rest,
+        (Some((_, name)), _) | (None, Some((_, name))) => name.trim_start_matches([' ', '=']),
+        (None, None) => "",
+    };
+    match verb {
+        // A name with blanks is quoted, and may be cut here: in both commands alike.
+        "emit" => given.split(" --").next(),
+        // They write the design that their firmware is of.
+        "run" | "close" => Some("design.toml"),
+        _ => None,
+    }
+}
+
 /// What a bundle took the place of.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Replaced {
@@ -243,6 +289,39 @@ mod tests {
             std::fs::read_to_string(folder.join("a.c")).expect("read"),
             "mine"
         );
+    }
+
+    #[test]
+    fn the_firmware_of_another_design_stays() {
+        let made = tempfile::tempdir().expect("a folder");
+        let says = |old: &str, new: &str| {
+            let text = format!("{{\"command\": \"gyrogen {old}\"}}");
+            std::fs::write(made.path().join(manifest::NAME), text).expect("written");
+            refuse_another(made.path(), &format!("gyrogen {new}"))
+        };
+        for (old, new) in [
+            ("emit a.toml --lang c", "emit a.toml --lang rust"),
+            ("emit a.toml --lang c", "emit --lang c --design a.toml"),
+            ("emit --lang c --design a.toml", "emit a.toml --lang c"),
+            ("emit --lang c -- -a.toml", "emit --lang rust -- -a.toml"),
+            ("emit --lang c", "emit --lang c --part tables"),
+            ("run a.toml --record r.csv", "emit design.toml --lang c"),
+            ("close --record r.csv", "emit design.toml --lang c"),
+        ] {
+            says(old, new).unwrap_or_else(|e| panic!("{old}, {new}: {e}"));
+        }
+        for (old, new) in [
+            ("emit a.toml --lang c", "emit b.toml --lang c"),
+            ("emit --lang c", "emit b.toml --lang c"),
+            ("emit a.toml --lang c", "emit --lang c"),
+            // Its firmware has the fit, which is in its design.toml alone.
+            ("run a.toml --record r.csv", "emit a.toml --lang c"),
+            ("approx --function x^2 --degree 2", "emit --lang c"),
+        ] {
+            let refused = says(old, new).expect_err(old).to_string();
+            assert!(refused.contains(old), "{refused}");
+        }
+        refuse_another(&made.path().join("none"), "gyrogen emit").expect("nothing is there");
     }
 
     #[test]

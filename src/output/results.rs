@@ -57,10 +57,19 @@ impl Results {
             known.refuse(out, planned)?;
         }
         let staged = TemporaryFolder::new(&existing).map_err(|e| {
-            let error = InputError::new(format!("cannot write into this folder: {}", cause(&e)));
-            error
-                .in_file(&existing)
-                .help("check its permissions and the disk, or name another folder with --out")
+            let (why, help) = match e.kind() {
+                // The folder is there: the system keeps its own files in it, as in /proc.
+                io::ErrorKind::NotFound => (
+                    "the system takes no new files there".to_owned(),
+                    "name another folder with --out",
+                ),
+                _ => (
+                    cause(&e),
+                    "check its permissions and the disk, or name another folder with --out",
+                ),
+            };
+            let error = InputError::new(format!("cannot write into this folder: {why}"));
+            error.in_file(&existing).help(help)
         })?;
         let collected = staged.path().join(&missing);
         fs::create_dir_all(&collected).map_err(|e| failed(&e))?;
@@ -225,7 +234,9 @@ fn existing(out: &Path) -> io::Result<(PathBuf, PathBuf)> {
         match here.metadata() {
             Ok(_) => return Ok((here.to_path_buf(), missing)),
             Err(e) if e.kind() == io::ErrorKind::NotFound && here.symlink_metadata().is_err() => {}
-            // A link to nothing, a file in the middle, a folder that may not be entered.
+            // A file in the middle, which is found above.
+            Err(e) if e.kind() == io::ErrorKind::NotADirectory => {}
+            // A link to nothing, a folder that may not be entered.
             Err(e) => return Err(e),
         }
         let (Some(parent), Some(name)) = (folder.parent(), folder.file_name()) else {

@@ -52,6 +52,28 @@ fn a_result_of_an_earlier_run_is_taken_away_at_the_end() {
     assert_eq!(listed(top.path()), ["a.json", "deep"]);
 }
 
+#[test]
+fn a_file_on_the_way_is_named_as_what_it_is() {
+    let top = tempfile::tempdir().unwrap();
+    let file = top.path().join("file");
+    fs::write(&file, "mine").unwrap();
+    for out in [file.clone(), file.join("sub"), file.join("sub/deep")] {
+        let error = Results::claim(&out, &[], &[]).unwrap_err().to_string();
+        assert!(
+            error.contains("file: error: this is a file, and a folder is wanted"),
+            "{error}"
+        );
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_folder_of_the_system_is_not_said_to_be_missing() {
+    let error = Results::claim(Path::new("/proc/results"), &[], &[]).unwrap_err();
+    let error = error.to_string();
+    assert!(error.contains("takes no new files"), "{error}");
+}
+
 #[cfg(unix)]
 #[test]
 fn an_input_is_never_written_over_by_any_name() {

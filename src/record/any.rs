@@ -91,19 +91,20 @@ fn refuse_by_name(path: &Path, start: &[u8]) -> Result<()> {
     Err(InputError::new(what).in_file(path).help(help).into())
 }
 
-/// What kind of a record these first bytes of a file are; `None` if they are none.
-pub fn is_a_record(bytes: &[u8]) -> Option<&'static str> {
+/// What kind of a file these first bytes are of, and whether it can be a record; `None` if they are of neither a record
+/// nor of a kind that is known and holds none.
+pub fn is_a_record(bytes: &[u8]) -> Option<(&'static str, bool)> {
     if bytes.starts_with(&ulog::MAGIC) {
-        return Some("a PX4 log");
+        return Some(("a PX4 log", true));
     }
     if bytes.starts_with(&dataflash::MAGIC) {
-        return Some("an ArduPilot log");
+        return Some(("an ArduPilot log", true));
     }
     if unpack::is_packed(bytes) {
-        return Some("a packed file");
+        return Some(("a packed file", true));
     }
     if let Some((what, _)) = unpack::foreign(bytes.get(..unpack::HEAD.min(bytes.len()))?) {
-        return what.strip_prefix("this is ");
+        return Some((what.strip_prefix("this is ")?, false));
     }
     // A header of several names, and a row of as many numbers.
     let start = bytes.get(..bytes.len().min(1 << 16))?;
@@ -119,5 +120,5 @@ pub fn is_a_record(bytes: &[u8]) -> Option<&'static str> {
         count >= 2 && numbers >= 2 && cells().count() == count
     };
     ([',', ';', '\t'].into_iter().any(is_table) && !header.contains('='))
-        .then_some("a record (CSV)")
+        .then_some(("a record (CSV)", true))
 }

@@ -49,6 +49,19 @@ pub(super) fn table(
     let Some((before, width)) = found else {
         return Ok(None);
     };
+    if let Some((k, mark)) = overloaded_row(&lines[..before], separator, width) {
+        let mut error = InputError::new(format!(
+            "this row holds \"{mark}\", which is no code: the instrument was overloaded there, or had no reading"
+        ))
+        .in_file(path)
+        .at(number + k, 1)
+        .help(
+            "take the rows with such marks away at the capture's beginning; where they stand further on, capture again with a larger \
+             range. The names of the columns stand on the line before the first row",
+        );
+        error.source_line = lines.get(k).map(|l| l.trim_end().to_owned());
+        return Err(error.into());
+    }
     if let Some(k) = damaged_row(&lines[..before], lines[before], separator) {
         let mut error = InputError::new(
             "this line stands among the rows, right before the first whole one, and is none: some of its cells hold numbers, and \
@@ -278,6 +291,42 @@ fn damaged_row(before: &[&str], row: &str, separator: u8) -> Option<usize> {
         }
     }
     found
+}
+
+/// What instruments and programs write in place of a number that they do not have: names of no column.
+const MARKS: [&str; 12] = [
+    "ovl",
+    "ovr",
+    "ovld",
+    "ovf",
+    "ovrld",
+    "overload",
+    "overflow",
+    "overrange",
+    "over",
+    "inf",
+    "infinity",
+    "nan",
+];
+
+/// The first of the rows right before the first whole one whose cells are marks of an overload and numbers alone; its
+/// first mark.
+fn overloaded_row(before: &[&str], separator: u8, width: usize) -> Option<(usize, String)> {
+    let is_mark = |c: &String| {
+        let bare = c.trim_start_matches(['+', '-', '<', '>']).to_lowercase();
+        MARKS.contains(&bare.as_str())
+    };
+    let mark = |line: &&str| {
+        let cells = cells(line, separator);
+        let is_row = cells.len() == width
+            && cells
+                .iter()
+                .all(|c| is_mark(c) || number(c, separator).is_some());
+        cells.into_iter().find(is_mark).filter(|_| is_row)
+    };
+    let rows = before.iter().enumerate().rev();
+    let marked = rows.map_while(|(k, line)| Some((k, mark(line)?)));
+    marked.last()
 }
 
 /// A line before the first row that is a row itself, or that lacks names where both columns have them: a damaged one

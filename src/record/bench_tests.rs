@@ -277,6 +277,22 @@ fn a_damaged_first_row_is_no_preamble_and_no_header() {
     }
 }
 
+#[test]
+fn marks_of_an_overload_are_no_names() {
+    let rows: String = (2..40).map(|k| format!("{},{}\n", 10 * k, 7 * k)).collect();
+    for (head, line) in [
+        ("OVL,OVL", 1),
+        ("OVL,OVL\n-inf,12", 1),
+        ("drive,sense\nOVR,OVR", 2),
+        ("\"Overload\",3", 1),
+    ] {
+        let (_, error) = csv(format!("{head}\n{rows}")).rows(Q15, 9);
+        let error = error.unwrap_or_else(|| panic!("{head} is passed over"));
+        assert_eq!(error.line, Some(line), "{head}: {error}");
+        assert!(error.to_string().contains("overloaded"), "{head}: {error}");
+    }
+}
+
 fn interleaved(item: fn(i32) -> Vec<u8>, channels: usize) -> Vec<u8> {
     let row = |(d, s): &(i32, i32)| {
         let other = (2..channels).map(|k| item(k as i32 * 11));

@@ -172,7 +172,7 @@ fn broken_records_are_refused_with_their_place() {
             with_header("time_s,rate_out_dps,rate_out_dps"),
             plain.clone(),
             Some((1, 21)),
-            &["\"rate_out_dps\" is there twice", "column 8"],
+            &["two columns are called \"rate_out_dps\": the 2nd and the 3rd"],
         ),
         (
             "no name",
@@ -402,6 +402,43 @@ fn broken_records_are_refused_with_their_place() {
             plain.clone(),
             Some((7, 7)),
             &["\"low\" in column flow"],
+        ),
+        (
+            "kelvin under a name that says degC",
+            (0..20).fold(format!("{HEADER}\n").into_bytes(), |mut text, k| {
+                text.extend(format!("{k},{:.3},{}\n", 0.1 * f64::from(k % 7), 290 + k).bytes());
+                text
+            }),
+            plain.clone(),
+            Some((1, 21)),
+            &["looks like kelvin", "unit = \"K\""],
+        ),
+        (
+            "a period that is not that of the times",
+            with_header(HEADER),
+            period(3.0),
+            None,
+            &["row_period_s is 3 s", "1 s apart", "delete row_period_s"],
+        ),
+        (
+            "a correction that no CSV holds",
+            with_header(HEADER),
+            RecordMapping {
+                undo_correction: true,
+                ..RecordMapping::default()
+            },
+            None,
+            &["--undo-correction", "the autopilot's own log"],
+        ),
+        (
+            "rate and temperature the wrong way round, by their names",
+            with_header("time_s,gyro,temp"),
+            map(&[("rate_out_dps", "temp"), ("die_degc", "gyro")]),
+            Some((1, 1)),
+            &[
+                "look swapped",
+                "rate_out_dps = \"gyro\" and die_degc = \"temp\"",
+            ],
         ),
         (
             "no period",

@@ -58,7 +58,7 @@ pub(super) fn read_comment(
     }
     let value = right.split('#').next().unwrap_or("");
     let offset = left.len() + 1 + (value.len() - value.trim_start().len());
-    places.keep(key, refuse(offset, String::new()));
+    places.keep(key, refuse(offset, String::new()).position());
     let value = value.trim();
     meta.set(key, Value::of_text(value))
         .and_then(|()| keys.set(key, &KeyValue::of_text(value)))
@@ -132,7 +132,7 @@ pub(super) fn read_header(line: Line<'_>, places: &mut Places) -> Result<Layout>
             let cells = line.bytes.split(|&b| b == b',').take(cell);
             cells.map(|cell| cell.len() + 1).sum()
         };
-        places.keep(column, line.refuse(before(first), ""));
+        places.keep(column, line.refuse(before(first), "").position());
         if let Some(again) = names.iter().rposition(is_it).filter(|&last| last > first) {
             return Err(line
                 .refuse(before(again), &format!("the header has `{column}` twice"))

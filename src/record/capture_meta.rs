@@ -167,7 +167,10 @@ impl CaptureMeta {
             refuse(offset, format!("no valid TOML: {}", e.message()))
         })?;
         for (key, value) in table.get_ref() {
-            places.keep(key.get_ref(), refuse(value.span().start, String::new()));
+            places.keep(
+                key.get_ref(),
+                refuse(value.span().start, String::new()).position(),
+            );
             meta.set(key.get_ref(), Value::of_toml(value.get_ref()))
                 .and_then(|()| keys.set(key.get_ref(), &KeyValue::of_toml(value.get_ref())))
                 .map_err(|problem| refuse(value.span().start, problem))?;

@@ -6,8 +6,11 @@ use super::lines::Lines;
 use super::thermal::ThermalRecord;
 use super::warning::Warning;
 use crate::design::RecordMapping;
-use crate::error::Result;
+use crate::error::{InputError, Result};
 use crate::statistics::stats;
+
+/// A stated period and that of the times contradict each other beyond this part of it (convention).
+const PERIODS_DIFFER: f64 = 0.01;
 
 /// Takes the clock out of the columns, or makes it, and checks that it never runs backwards.
 pub(super) fn take(
@@ -89,6 +92,30 @@ pub(super) fn take(
             format!("{dropped} rows without a time are left out (the first is line {first})"),
         ));
         retain(record, &keep);
+    }
+    if let Some(period) = mapping.row_period_s {
+        let steps = record.time_s.windows(2).map(|w| w[1] - w[0]);
+        let usual = stats::median(&steps.filter(|s| *s > 0.0).collect::<Vec<f64>>());
+        let path = lines.at(last_line).path;
+        if (period / usual - 1.0).abs() > PERIODS_DIFFER {
+            let message = format!(
+                "row_period_s is {period} s, and the times of the record {} are {usual} s apart (median)",
+                path.display()
+            );
+            let error = InputError::new(message);
+            let error = match &mapping.row_period_at {
+                Some(place) => error.at_position(place),
+                None => error.in_file(path),
+            };
+            return Err(error
+                .help("delete row_period_s, which is for records without times; if it is right, take the column of times out of the record, or correct its unit in [record.columns]")
+                .into());
+        }
+        warnings.push(Warning::on(
+            "record_keys_unused",
+            "time_s",
+            format!("row_period_s is not used: the record has times, {usual} s apart (median)"),
+        ));
     }
     let advances = record.time_s.first() < record.time_s.last();
     if !advances && record.len() > 1 {

@@ -75,8 +75,10 @@ pub(super) fn resolve(line: Line<'_>, mapping: &RecordMapping) -> Result<Roles> 
                 .error(
                     cell.column,
                     format!(
-                        "column \"{}\" is there twice (first at column {})",
-                        cell.text, header[first].column
+                        "two columns are called \"{}\": the {} and the {}",
+                        cell.text,
+                        ordinal(first + 1),
+                        ordinal(i + 1)
                     ),
                     "rename or remove one of them".to_owned(),
                 )
@@ -93,6 +95,7 @@ pub(super) fn resolve(line: Line<'_>, mapping: &RecordMapping) -> Result<Roles> 
             _ => return Err(lacking(line, mapping, role, wanted, &names).into()),
         }
     }
+    refuse_swapped(line, mapping, &names)?;
     let mut warnings = Vec::new();
     for (name, roles) in &mut columns {
         if !roles.is_empty() || name.is_empty() {
@@ -151,14 +154,72 @@ fn lacking(
     };
     let meant = nearest(wanted, names).or_else(|| guesses::guess(role, names));
     let meant = meant.map_or(String::new(), |m| format!("did you mean \"{m}\"? "));
-    InputError {
-        message: format!(
-            "the record {} has no column \"{wanted}\"",
-            line.path.display()
-        ),
-        ..place.clone()
-    }
+    InputError::new(format!(
+        "the record {} has no column \"{wanted}\"",
+        line.path.display()
+    ))
+    .at_position(place)
     .help(format!("{meant}{}", guesses::listed(names)))
+}
+
+/// A place in a row in words: `2nd`.
+fn ordinal(n: usize) -> String {
+    let end = match (n % 10, n % 100) {
+        (1, k) if k != 11 => "st",
+        (2, k) if k != 12 => "nd",
+        (3, k) if k != 13 => "rd",
+        _ => "th",
+    };
+    format!("{n}{end}")
+}
+
+/// Refuses two quantities of the design that each name the column which looks like the other's.
+///
+/// # Errors
+/// That, in the design.
+fn refuse_swapped(line: Line<'_>, mapping: &RecordMapping, names: &[&str]) -> Result<()> {
+    let rate = "rate_out_dps";
+    // By the unit in its name, or else as names of columns go.
+    let is_of = |column: &str, role: &str| match units::stated(column, role) {
+        Some(unit) => unit.of == unit_of(role),
+        None => guesses::guess(role, names) == Some(column),
+    };
+    for other in THERMOMETERS {
+        let (Some(a), Some(b)) = (mapping.columns.get(rate), mapping.columns.get(other)) else {
+            continue;
+        };
+        // A unit that the design states says that the column is meant.
+        let is_stated = mapping.units.contains_key(rate) || mapping.units.contains_key(other);
+        if is_stated || !(is_of(a, other) && is_of(b, rate)) {
+            continue;
+        }
+        let message = format!(
+            "{rate} is read from \"{a}\" and {other} from \"{b}\", and each name is that of the other quantity: the two look \
+             swapped"
+        );
+        let help = format!(
+            "write {rate} = \"{b}\" and {other} = \"{a}\"; if the design is right, say the unit: {rate} = {{ column = \"{a}\", \
+             unit = \"deg/s\" }}"
+        );
+        return Err(in_design(line, mapping, rate, message, help).into());
+    }
+    Ok(())
+}
+
+/// An error about what the design says of a role: there, where its place is known.
+pub(super) fn in_design(
+    line: Line<'_>,
+    mapping: &RecordMapping,
+    role: &str,
+    message: String,
+    help: String,
+) -> InputError {
+    match mapping.places.get(role) {
+        Some(place) => InputError::new(format!("record {}: {message}", line.path.display()))
+            .at_position(place)
+            .help(help),
+        None => line.error(1, message, help),
+    }
 }
 
 /// Gives the contract's column to a file's column that has it in another unit (`time_ms`), where nothing else does.
@@ -214,8 +275,10 @@ fn converted(
         for role in roles.iter().filter(|r| is_known(r)) {
             let asked = mapping.units.get(role).map(|text| {
                 units::parse(text).ok_or_else(|| -> crate::error::Error {
-                    line.error(
-                        1,
+                    in_design(
+                        line,
+                        mapping,
+                        role,
                         format!("\"{text}\" is no unit that is known for {role}"),
                         format!("{role} can be in {}", units::accepted(role)),
                     )
@@ -227,21 +290,23 @@ fn converted(
             if let (Some(a), Some(b)) = (asked, stated)
                 && a != b
             {
-                return Err(line
-                    .error(
-                        1,
-                        format!(
-                            "the design says that column \"{name}\" is in {}, and its name says {}",
-                            a.name, b.name
-                        ),
-                        "rename the column, or correct the unit in [record.columns]".to_owned(),
-                    )
-                    .into());
+                return Err(in_design(
+                    line,
+                    mapping,
+                    role,
+                    format!(
+                        "the design says that column \"{name}\" is in {}, and its name says {}",
+                        a.name, b.name
+                    ),
+                    "rename the column, or correct the unit in [record.columns]".to_owned(),
+                )
+                .into());
             }
             if asked.is_none() && stated.is_none() && guesses::is_of_codes(name) {
-                return Err(line
-                    .error(
-                        1,
+                return Err(in_design(
+                    line,
+                    mapping,
+                    role,
                         format!("column \"{name}\" holds raw codes by its name, and {role} is in {}", unit_of(role)),
                         format!(
                             "multiply it by the sensor's scale first; if it is no code, say its unit: {role} = {{ column = \"{name}\", \
@@ -255,20 +320,21 @@ fn converted(
                 continue;
             };
             if unit.of != unit_of(role) {
-                return Err(line
-                    .error(
-                        1,
-                        format!(
-                            "column \"{name}\" is in {}, which is no unit of {role} ({})",
-                            unit.name,
-                            unit_of(role)
-                        ),
-                        format!(
-                            "map another column to {role}; it can be in {}",
-                            units::accepted(role)
-                        ),
-                    )
-                    .into());
+                return Err(in_design(
+                    line,
+                    mapping,
+                    role,
+                    format!(
+                        "column \"{name}\" is in {}, which is no unit of {role} ({})",
+                        unit.name,
+                        unit_of(role)
+                    ),
+                    format!(
+                        "map another column to {role}; it can be in {}",
+                        units::accepted(role)
+                    ),
+                )
+                .into());
             }
             let own = name.strip_suffix(']').or(name.strip_suffix(')'));
             let own = own

@@ -110,8 +110,8 @@ pub(super) fn suggestion(role: &str, names: &[&str]) -> String {
         others.filter(|other| *other != "die_degc" || !THERMOMETERS.iter().any(|t| has(t)));
     lines.extend(others.filter_map(|o| Some(mapped(o, guess(o, &named)?))));
     text.push_str(&format!(
-        "\n  say in the design which one it is. These lines are a whole design file, say gyro.toml for `gyrogen run gyro.toml --record \
-         ...`:\n    [record.columns]\n    {}",
+        "\n  say in the design which one it is. These lines are a whole design file, say gyro.toml: `gyrogen run gyro.toml --record \
+         ...` and `gyrogen close gyro.toml --record ...` take it:\n    [record.columns]\n    {}",
         lines.join("\n    ")
     ));
     let axes = guesses("rate_out_dps", &named);

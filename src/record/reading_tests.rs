@@ -73,6 +73,42 @@ fn a_column_that_the_design_misspells_is_shown_in_the_design() {
 }
 
 #[test]
+fn what_the_design_says_wrongly_is_shown_in_the_design() {
+    let text = format!("time_s,gyro_dps,die_degc\n{}\n", good_rows().join("\n"));
+    for (design, line, part) in [
+        (
+            "[record.columns]\nrate_out_dps = \"die_degc\"\ndie_degc = \"gyro_dps\"\n",
+            2,
+            "look swapped",
+        ),
+        (
+            "[record.columns]\nrate_out_dps = \"gyro_dps\"\nphase_rad = \"die_degc\"\n",
+            3,
+            "which is no unit of phase_rad",
+        ),
+        (
+            "[record]\nrow_period_s = 7\n[record.columns]\nrate_out_dps = \"gyro_dps\"\n",
+            2,
+            "the times of the record r.csv are 1 s apart",
+        ),
+    ] {
+        let read = crate::design::reader::parse(design, Some(std::path::Path::new("hub.toml")));
+        let error = try_parse(text.as_bytes(), &read.unwrap().record).unwrap_err();
+        let said = error.to_string();
+        assert!(
+            said.starts_with("hub.toml") && error.line == Some(line),
+            "{said}"
+        );
+        assert!(said.contains(part) && said.contains("r.csv"), "{said}");
+    }
+    // A period that is that of the times is told to be of no use.
+    let mut mapping = mapping(&[("rate_out_dps", "gyro_dps")]);
+    mapping.row_period_s = Some(1.005);
+    let (_, warnings) = try_parse(text.as_bytes(), &mapping).unwrap();
+    assert_eq!(warnings[0].code, "record_keys_unused");
+}
+
+#[test]
 fn a_column_that_is_a_time_by_its_unit_is_proposed_with_it() {
     let said = |header: &str| {
         let text = format!("{header}\n{}\n", good_rows().join("\n"));

@@ -1,10 +1,59 @@
 //! Temperatures that are unlikely to be in degC: other units, raw codes.
 
+use super::cells;
+use super::columns::{self, Line, Roles};
 use super::plausibility::Column;
+use super::thermal_record::ThermalRecord;
 use super::warning::Warning;
+use crate::design::RecordMapping;
+use crate::error::Result;
+use crate::statistics::stats;
 
 /// Hotter than a gyro is, as a rule, degC: industrial parts end at 85, and heat themselves by some kelvin.
 const HOTTEST_DEGC: f64 = 105.0;
+
+/// Hotter than any die: silicon thermometers read up to 250 degC. No reading in kelvin is below the second.
+const NO_DIE_DEGC: f64 = 250.0;
+const COLDEST_K: f64 = 150.0;
+
+/// Refuses a thermometer in degC that half of the record's rows put where no die can be: firmware would take its
+/// readings for degC. Columns beside it are only warned of ([`temperature`]).
+///
+/// # Errors
+/// Such a column, where its unit is declared: in the design, or in the header.
+pub(super) fn refuse(
+    record: &ThermalRecord,
+    header: Line<'_>,
+    roles: &Roles,
+    mapping: &RecordMapping,
+) -> Result<()> {
+    for name in ["die_degc", "chamber_degc"] {
+        let sorted = stats::sorted(record.column(name).unwrap_or(&[]));
+        let quantile = |p: f64| stats::quantile_sorted(&sorted, p);
+        let is_kelvin = !sorted.is_empty()
+            && (NO_DIE_DEGC..=450.0).contains(&quantile(0.5))
+            && quantile(0.05) > COLDEST_K;
+        if !is_kelvin {
+            continue;
+        }
+        let message = format!(
+            "{name} runs from {:.2} to {:.2} degC, and no die is at {NO_DIE_DEGC} degC and more in half of the rows: it looks like \
+             kelvin (K)",
+            quantile(0.0),
+            quantile(1.0)
+        );
+        let help = format!("say the unit: {}", record.unit_in_design(name, "K"));
+        if mapping.places.contains_key(name) {
+            return Err(columns::in_design(header, mapping, name, message, help).into());
+        }
+        let cells = cells::split(header.text).unwrap_or_default();
+        let cell = roles.index_of(name).and_then(|k| cells.get(k));
+        return Err(header
+            .error(cell.map_or(1, |c| c.column), message, help)
+            .into());
+    }
+    Ok(())
+}
 
 /// Temperatures in Celsius: a median of 200 to 450 is a Kelvin reading of -73 to 177 degC; no
 /// silicon thermometer reads outside -100 to 250 degC.

@@ -5,7 +5,9 @@ use super::columns::{self, Line, Roles};
 use super::lines::Lines;
 pub use super::thermal_record::ThermalRecord;
 use super::warning::Warning;
-use super::{applied, clock, dead, error_values, frozen, plausibility, shorten, stopped};
+use super::{
+    applied, clock, dead, error_values, frozen, plausibility, shorten, stopped, temperature,
+};
 use crate::design::RecordMapping;
 use crate::error::{Error, InputError, Result};
 use crate::input;
@@ -47,6 +49,14 @@ pub fn parse(
                 .help("give the seconds from one row to the next, such as row_period_s = 15")
                 .into(),
         );
+    }
+    if mapping.undo_correction {
+        return Err(InputError::new(
+            "`--undo-correction` has nothing to go by here: a CSV record does not hold the coefficients of a correction",
+        )
+        .in_file(path)
+        .help("give the autopilot's own log (PX4 .ulg, ArduPilot .bin), or leave `--undo-correction` out")
+        .into());
     }
     let text = decode(bytes, path)?;
     let Some((commas, told)) = with_commas(text) else {
@@ -167,6 +177,7 @@ fn parse_text(
     shorten::rows(&mut record, mapping.average_s, &mut warnings);
     enough(&record, last, &mut warnings)?;
     dead::refuse(&record, path, record.lines.first().copied())?;
+    temperature::refuse(&record, header, &roles, mapping)?;
     plausibility::check(&record, &mut warnings);
     frozen::check(&record, &mut warnings);
     Ok((record, warnings))

@@ -50,6 +50,14 @@ pub struct Seen {
 /// What looks at a record with fakes.
 pub type Look<'a> = &'a dyn Fn(&ThermalRecord) -> Result<Seen>;
 
+/// How far the controls are, for whoever waits.
+pub struct Shown<'a> {
+    /// What begins now.
+    pub stage: &'a dyn Fn(&str),
+    /// How much of it is done.
+    pub progress: Progress<'a>,
+}
+
 /// A column without meaning.
 #[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct FakeSeen {
@@ -155,11 +163,12 @@ pub fn run(
     record: &ThermalRecord,
     design: &Design,
     threads: usize,
-    progress: Progress<'_>,
+    shown: &Shown<'_>,
 ) -> Result<Controls> {
+    (shown.stage)("closing with columns that mean nothing");
     let negative = negative(closed, record, &|r| look(r, design, Effort::default()))?;
     let answer = |r: &ThermalRecord| close::names(r, design, Effort::default());
-    let positive = positive(closed, design, threads, progress, &answer)?;
+    let positive = positive(closed, design, threads, shown, &answer)?;
     Ok(Controls {
         holds: negative.named == 0,
         negative,
@@ -244,7 +253,7 @@ pub fn positive(
     closed: &Closed,
     design: &Design,
     threads: usize,
-    progress: Progress<'_>,
+    shown: &Shown<'_>,
     answer: Answer<'_>,
 ) -> Result<Vec<Planted>> {
     let scenes = [from_record::scene(closed)];
@@ -256,14 +265,16 @@ pub fn positive(
         threads,
         ..Request::default()
     };
+    (shown.stage)("finding how large an effect must be to be named");
     let marks = marked(
         &trials(&scenes, &cases, &[], &request),
         &request,
-        progress,
+        shown.progress,
         answer,
     )?;
     let sizes = scores(&scenes, &cases, &marks, &request);
     let residual = closed.after.residual(&closed.channels);
+    (shown.stage)("closing with planted effects");
     let mut out = Vec::new();
     for ((case, p_value), score) in cases.iter().zip(p_values).zip(sizes) {
         let mut planted = Planted {
@@ -292,6 +303,7 @@ pub fn positive(
             None => {}
         }
         out.push(planted);
+        (shown.progress)(out.len(), cases.len());
     }
     Ok(out)
 }

@@ -62,7 +62,7 @@ pub fn split(times_s: &[f64], thermometer: &[f64], cared: &[&[f64]]) -> Result<S
     if n < LEAST {
         return Err(Unusable::TooFewRows {
             rows: n,
-            columns: LEAST / 3,
+            least: LEAST,
         });
     }
     let ramps = runs(thermometer);

@@ -48,13 +48,13 @@ mod whiten_tests;
 /// Why a record cannot be fitted here.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Unusable {
-    /// Fewer used rows than four more than there are regressors.
-    #[error("{rows} usable rows cannot determine {columns} coefficients and the noise")]
+    /// Fewer used rows than the model and its noise need.
+    #[error("{rows} usable rows are too few: at least {least} are needed")]
     TooFewRows {
         /// Rows that are used.
         rows: usize,
-        /// Regressors.
-        columns: usize,
+        /// Rows that would do.
+        least: usize,
     },
     /// A column, the times or the signal is of another length, or not finite in a used row.
     #[error("{0} is not finite in every used row, or of another length than the times")]

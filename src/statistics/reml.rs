@@ -173,11 +173,9 @@ fn check(times_s: &[f64], y: &[f64], columns: &[Vec<f64>], used: &[bool]) -> Res
         return Err(Unusable::NotFinite("a regressor"));
     }
     let rows = used.iter().filter(|u| **u).count();
-    if rows < columns.len() + 4 {
-        return Err(Unusable::TooFewRows {
-            rows,
-            columns: columns.len(),
-        });
+    let least = columns.len() + 4;
+    if rows < least {
+        return Err(Unusable::TooFewRows { rows, least });
     }
     let chosen = |c: &[f64]| -> Vec<f64> {
         let pairs = c.iter().zip(used);

@@ -165,10 +165,7 @@ fn what_cannot_be_fitted_is_refused() {
     let few: Vec<bool> = (0..100).map(|i| i < 6).collect();
     assert_eq!(
         with(&columns, &few),
-        Some(Unusable::TooFewRows {
-            rows: 6,
-            columns: 3
-        })
+        Some(Unusable::TooFewRows { rows: 6, least: 7 })
     );
     assert_eq!(with(&columns[1..], &used), Some(Unusable::NoConstant));
     columns[2][50] = f64::INFINITY;

@@ -133,17 +133,19 @@ fn check_name(name: &str) -> Result<()> {
 /// # Errors
 /// What the expression or the domain lacks.
 pub(super) fn function(request: &Request) -> Result<Function> {
-    let parse = |text: &str, option: &str| {
-        Expression::parse_with(text, &request.parameters).map_err(|e| match e {
+    let of = |option: &'static str| {
+        move |e: Error| match e {
             Error::Input(e) => Error::Input(Box::new(e.in_file(option))),
             other => other,
-        })
+        }
     };
+    let parse =
+        |text: &str, option| Expression::parse_with(text, &request.parameters).map_err(of(option));
     let expression = parse(&request.function, "--function")?;
     let end = |text: &String| parse(text, "--domain");
     let domain = Domain::new(&end(&request.domain[0])?, &end(&request.domain[1])?)?;
     let tolerance = request.output.lsb() * pow2(-34);
-    Function::new(&request.function, expression, domain, tolerance)
+    Function::new(&request.function, expression, domain, tolerance).map_err(of("--function"))
 }
 
 /// The codes of the input in the domain.

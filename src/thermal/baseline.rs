@@ -169,10 +169,7 @@ pub fn thermometer<'a>(
             })?,
     };
     let Some(column) = record.column(name) else {
-        return Err(refuse(
-            format!("the record has no column {name}, which the design names as thermometer"),
-            format!("the record has: {}", has.join(", ")),
-        ));
+        return Err(mapping.lacks_thermometer(name, &record.source, &has).into());
     };
     let usable = record.column("rate_out_dps").unwrap_or(&[]);
     let both = column

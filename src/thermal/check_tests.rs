@@ -159,6 +159,15 @@ fn a_record_without_a_thermometer_is_refused() {
     named.thermometer = Some("phase_rad".into());
     let refused = text(fit(&r, &named, &options(TWO)).unwrap_err());
     assert!(refused.contains("names as thermometer"), "{refused}");
+    // Where the design is a file, the key is shown in it, with what the record has.
+    let design = "[record]\nthermometer = \"phase_rad\"\n";
+    let design = crate::design::reader::parse(design, Some(std::path::Path::new("d.toml")));
+    let dies = record("die_degc", &[1.0; 20], &e);
+    let refused = text(fit(&dies, &design.unwrap().record, &options(TWO)).unwrap_err());
+    assert!(
+        refused.starts_with("d.toml:2:15: error: the record") && refused.contains("`die_degc`"),
+        "{refused}"
+    );
     named.thermometer = Some("humidity_pct".into());
     let f = fit(&r, &named, &options(TWO)).unwrap();
     assert_eq!((f.unit, f.order), ("%", 0));

@@ -24,20 +24,10 @@ use std::collections::BTreeMap;
 /// The design names one that is not there.
 fn thermometer(record: &ThermalRecord, mapping: &RecordMapping) -> Result<Option<String>> {
     match &mapping.thermometer {
-        Some(name) if record.column(name).is_none() => Err(InputError::new(format!(
-            "the record has no column {name}, which the design names as thermometer"
-        ))
-        .in_file(&record.source)
-        .help(format!(
-            "the record has: {}",
-            record
-                .columns
-                .keys()
-                .cloned()
-                .collect::<Vec<_>>()
-                .join(", ")
-        ))
-        .into()),
+        Some(name) if record.column(name).is_none() => {
+            let has: Vec<&str> = record.columns.keys().map(String::as_str).collect();
+            Err(mapping.lacks_thermometer(name, &record.source, &has).into())
+        }
         Some(name) => Ok(Some(name.clone())),
         None => {
             let most = THERMOMETERS.map(|t| record.measured(t)).into_iter().max();
@@ -82,11 +72,18 @@ fn nominal(gyro: &Gyro, thermometer: &str, readings: &[f64]) -> (f64, bool) {
     (middle, false)
 }
 
+/// Rows of which a stretch can be held out as a rule; with fewer it depends on how the temperature ran.
+const ENOUGH_ROWS: usize = 20;
+
 /// A record that cannot be fitted.
 pub fn refused(record: &ThermalRecord, why: String) -> crate::error::Error {
+    let help = match record.len() < ENOUGH_ROWS {
+        true => format!("record longer, or average less; {ENOUGH_ROWS} rows are enough as a rule"),
+        false => "record longer, or average less".to_owned(),
+    };
     InputError::new(why)
         .in_file(&record.source)
-        .help("record longer, or average less")
+        .help(help)
         .into()
 }
 

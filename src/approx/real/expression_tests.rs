@@ -104,10 +104,21 @@ fn without_x_the_only_other_letter_is_the_variable() {
 fn mistakes_have_a_column_what_was_met_and_help() {
     for (text, column, message, help) in [
         ("", 1, "met the end", ""),
-        ("1 +", 4, "met the end", ""),
+        ("1 +", 4, "met the end", "cut short"),
         ("sin x", 5, "expected `(` after `sin`, met `x`", "`sin(x)`"),
         ("2x", 2, "expected an operator or the end, met `x`", "`2*x`"),
-        ("(x + 1", 7, "the `(` in column 1 is open", ""),
+        (
+            "(x + 1",
+            7,
+            "the `(` in column 1 is open",
+            "close it with `)`",
+        ),
+        (
+            "sin(x, 2)",
+            6,
+            "the `(` in column 4 is open",
+            "one argument",
+        ),
         ("x + 1)", 6, "no `(` before", ""),
         ("x**2", 3, "met `*`", "`^`"),
         ("arctan(x)", 1, "unknown name `arctan`", "`atan`"),

@@ -127,7 +127,10 @@ fn read<'a>(
     parser.sum(0)?;
     match parser.token {
         Token::End => Ok(parser),
-        Token::Sign(')') => Err(parser.wrong("there is no `(` before this `)`", None)),
+        Token::Sign(')') => Err(parser.wrong(
+            "there is no `(` before this `)`",
+            Some("take it away, or write the `(` that it closes".to_owned()),
+        )),
         Token::Sign('*') => {
             let help = "a power is written with `^`".to_owned();
             let message = format!("expected {} after `*`, met `*`", parser.operands());
@@ -295,7 +298,10 @@ impl<'a> Parser<'a> {
             }
             _ => Err(self.wrong(
                 &format!("expected {}, met {}", self.operands(), self.met()),
-                None,
+                Some(match self.token {
+                    Token::End => "the expression is cut short: complete it".to_owned(),
+                    _ => format!("write {} there", self.operands()),
+                }),
             )),
         }
     }
@@ -309,12 +315,15 @@ impl<'a> Parser<'a> {
                 self.met(),
                 self.column(opened)
             );
-            let help = matches!(
-                self.token,
-                Token::Number(_) | Token::Name(_) | Token::Sign('(')
-            )
-            .then(|| "a product is written with `*`: `2*x`".to_owned());
-            return Err(self.wrong(&message, help));
+            let help = match self.token {
+                Token::Number(_) | Token::Name(_) | Token::Sign('(') => {
+                    "a product is written with `*`: `2*x`"
+                }
+                Token::Sign(',') => "a function has one argument; the decimal mark is a point",
+                Token::End => "close it with `)`",
+                Token::Sign(_) => "operators are `+ - * / ^`; close it with `)`",
+            };
+            return Err(self.wrong(&message, Some(help.to_owned())));
         }
         self.advance()?;
         Ok(inner)
@@ -398,7 +407,10 @@ impl<'a> Parser<'a> {
     }
 
     fn number(&self, text: &str) -> Result<Kind> {
-        let refused = |why: &str| self.wrong(&format!("the number `{text}` {why}"), None);
+        let refused = |why: &str| {
+            let help = "write it with a decimal point, such as `0.25` or `2.5e-3`".to_owned();
+            self.wrong(&format!("the number `{text}` {why}"), Some(help))
+        };
         let (digits, exponent) = text.split_once(['e', 'E']).unwrap_or((text, "0"));
         let (whole, part) = digits.split_once('.').unwrap_or((digits, ""));
         if whole.is_empty() && part.is_empty() {
