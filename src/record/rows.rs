@@ -144,6 +144,27 @@ impl RowWriter {
             }
             return self.end_row();
         }
+        self.put_floats(values)?;
+        self.end_csv_row()
+    }
+
+    /// The same with a word in the last column. NPY has NaN there.
+    ///
+    /// # Errors
+    /// As [`write_floats`](Self::write_floats).
+    pub fn write_floats_and(&mut self, values: &[f64], word: &str) -> Result<()> {
+        if self.npy {
+            return self.write_floats(&[values, &[f64::NAN]].concat());
+        }
+        self.check(Kind::Float, values.len() + 1)?;
+        self.put_floats(values)?;
+        self.buffer.extend_from_slice(word.as_bytes());
+        self.buffer.push(b',');
+        self.end_csv_row()
+    }
+
+    /// Values with a comma behind each.
+    fn put_floats(&mut self, values: &[f64]) -> Result<()> {
         let mut digits = itoa::Buffer::new();
         for &value in values {
             let whole = value as i64;
@@ -159,7 +180,7 @@ impl RowWriter {
             }
             self.buffer.push(b',');
         }
-        self.end_csv_row()
+        Ok(())
     }
 
     /// Writes what is left and puts the file under its name.

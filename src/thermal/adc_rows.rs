@@ -37,17 +37,28 @@ pub type Columns = BTreeMap<String, Vec<f64>>;
 pub struct Undithered {
     /// Its rms as predicted from word lengths and noise, deg/s.
     pub predicted_dps: f64,
-    /// The columns without it, and the rms of what was taken off the rate beyond its smooth part, deg/s.
-    pub removed: Option<(Columns, f64)>,
+    /// What the record is without it.
+    pub removed: Option<Removed>,
     noise_lsb: f64,
     phases: f64,
+}
+
+/// A record without its ADCs' error.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Removed {
+    /// Its columns.
+    pub columns: Columns,
+    /// The output of every row, of those as well that are not among the columns, deg/s.
+    pub output_dps: Vec<f64>,
+    /// rms of what was taken off the rate beyond its smooth part, deg/s.
+    pub rms_dps: f64,
 }
 
 impl Undithered {
     /// The error that is still in the rows, deg/s.
     pub fn left_dps(&self) -> f64 {
-        match self.removed {
-            Some((_, rms_dps)) => REMAINS * rms_dps,
+        match &self.removed {
+            Some(removed) => REMAINS * removed.rms_dps,
             None => self.predicted_dps,
         }
     }
@@ -55,10 +66,11 @@ impl Undithered {
     /// What is said of it.
     pub fn warning(&self, design: &Design) -> Warning {
         let done = match &self.removed {
-            Some((_, rms_dps)) => format!(
+            Some(removed) => format!(
                 "The circuit's own blocks tell it row by row: {rms_dps} deg/s rms are taken off before and after; the \
-                 firmware's error contains it"
-            , rms_dps = number(*rms_dps, 3)),
+                 firmware's error contains it",
+                rms_dps = number(removed.rms_dps, 3)
+            ),
             None => "The record does not tell it row by row: no step is named whose whole contribution is below twice \
                      of it"
                 .to_owned(),
@@ -112,9 +124,13 @@ impl Levels {
     }
 }
 
-/// The error of a record, if it matters there. `seen` makes channels of columns.
+/// The error of a record, if it matters there. `whole` is the output of every row, which the columns may lack; `seen` makes
+/// channels of columns.
+///
+/// # Errors
+/// Those of `seen`.
 pub fn found<E>(
-    columns: &Columns,
+    (columns, whole): (&Columns, &[f64]),
     c: &Channels,
     design: &Design,
     seen: impl Fn(&Columns) -> Result<Channels, E>,
@@ -155,7 +171,14 @@ pub fn found<E>(
         return Ok(None);
     }
     let removed = match quadrature {
-        Some(quadrature) => likeliest(c, design, &levels, columns, (output, quadrature), seen)?,
+        Some(quadrature) => likeliest(
+            c,
+            design,
+            &levels,
+            columns,
+            [output, whole, quadrature],
+            seen,
+        )?,
         None => None,
     };
     Ok(Some(Undithered {
@@ -180,35 +203,38 @@ fn likeliest<E>(
     design: &Design,
     levels: &Levels,
     columns: &Columns,
-    (output, quadrature): (&[f64], &[f64]),
+    [output, whole, quadrature]: [&[f64]; 3],
     seen: impl Fn(&Columns) -> Result<Channels, E>,
-) -> Result<Option<(Columns, f64)>, E> {
+) -> Result<Option<Removed>, E> {
     let Some(sense) = Rounding::new(design, ["sense_i", "sense_q"], levels.sense_noise) else {
         return Ok(None);
     };
-    let (Some(rate), Some(quadrature)) = (
-        channels::filled(&c.time_s, output),
-        channels::filled(&c.time_s, quadrature),
-    ) else {
+    let Some(quadrature) = channels::filled(&c.time_s, quadrature) else {
         return Ok(None);
     };
     let lsb = levels.sense_lsb_dps;
-    let tones: Vec<[f64; 2]> = rate
-        .iter()
-        .zip(&quadrature)
-        .map(|(i, q)| sense.behind([i / lsb, q / lsb]).map(|v| v * lsb))
-        .collect();
-    let alone: Columns = BTreeMap::from([
-        (
-            "rate_out_dps".to_owned(),
-            tones.iter().map(|t| t[0]).collect(),
-        ),
-        ("quad_dps".to_owned(), tones.iter().map(|t| t[1]).collect()),
-    ]);
-    let both = columns.get("phase_rad").filter(|_| levels.held);
-    let both = both.and_then(|p| with_drive(c, design, levels, &alone, p));
+    // Row by row: what is not among the columns decides nothing about them.
+    let ways = |output: &[f64]| -> Option<Vec<Columns>> {
+        let rate = channels::filled(&c.time_s, output)?;
+        let tones: Vec<[f64; 2]> = rate
+            .iter()
+            .zip(&quadrature)
+            .map(|(i, q)| sense.behind([i / lsb, q / lsb]).map(|v| v * lsb))
+            .collect();
+        let column = |of: usize| tones.iter().map(|t| t[of]).collect();
+        let alone: Columns = BTreeMap::from([
+            ("rate_out_dps".to_owned(), column(0)),
+            ("quad_dps".to_owned(), column(1)),
+        ]);
+        let both = columns.get("phase_rad").filter(|_| levels.held);
+        let both = both.and_then(|p| with_drive(c, design, levels, &alone, p));
+        Some(std::iter::once(alone).chain(both).collect())
+    };
+    let (Some(changes), Some(of_all)) = (ways(output), ways(whole)) else {
+        return Ok(None);
+    };
     let mut best = (value(c, &c.error_dps, None).map(|v| v.0 + WORTH), None);
-    for changed in std::iter::once(alone).chain(both) {
+    for (changed, of_all) in changes.into_iter().zip(of_all) {
         let mut next = columns.clone();
         next.extend(changed);
         keep_holes(output, &mut next);
@@ -216,26 +242,33 @@ fn likeliest<E>(
         let off: Vec<f64> = (c.error_dps.iter().zip(&clean.error_dps))
             .map(|(with, without)| with - without)
             .collect();
-        let whole = value(&clean, &clean.error_dps, None).map(|v| v.0);
+        let plain = value(&clean, &clean.error_dps, None).map(|v| v.0);
         let free = value(&clean, &c.error_dps, Some(&off));
         // A coefficient costs what Schwarz's criterion says.
         let price = 0.5 * (c.len() as f64).ln();
-        let scaled = free.filter(|(v, b)| LIKE.contains(b) && whole.is_none_or(|w| v - price > w));
+        let scaled = free.filter(|(v, b)| LIKE.contains(b) && plain.is_none_or(|p| v - price > p));
         let (reached, coefficient) = match scaled {
             Some((v, b)) => (Some(v - price), b),
-            None => (whole, 1.0),
+            None => (plain, 1.0),
         };
         if reached <= best.0 {
             continue;
         }
-        if let Some(rate) = next.get_mut("rate_out_dps") {
-            for ((rate, raw), off) in rate.iter_mut().zip(output).zip(&off) {
-                *rate = raw - coefficient * off;
-            }
-        }
+        let without = |raw: &[f64], clean: &[f64]| -> Vec<f64> {
+            let rows = raw.iter().zip(clean);
+            rows.map(|(raw, clean)| raw - coefficient * (raw - clean))
+                .collect()
+        };
+        let own = without(output, &next["rate_out_dps"]);
+        next.insert("rate_out_dps".to_owned(), own);
         // Beyond what the declared model would take up.
         let rms_dps = coefficient * stats::rms(&declared_by(&clean.u, &off).1);
-        best = (reached, Some((next, rms_dps)));
+        let removed = Removed {
+            columns: next,
+            output_dps: without(whole, &of_all["rate_out_dps"]),
+            rms_dps,
+        };
+        best = (reached, Some(removed));
     }
     Ok(best.1)
 }

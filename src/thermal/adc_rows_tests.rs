@@ -3,7 +3,7 @@
 use super::*;
 use crate::design::reader;
 use crate::record::ThermalRecord;
-use crate::thermal::intake::channels_of;
+use crate::thermal::intake::Intake;
 use crate::thermal::synthetic::{Random, record, triangle};
 
 const ROWS: usize = 240;
@@ -58,9 +58,9 @@ fn taken(design: &Design, thermometer: &str, rate_noise_dps: f64) -> (ThermalRec
 }
 
 fn seen(record: &ThermalRecord, design: &Design) -> (Channels, Vec<&'static str>) {
-    let mut warnings = Vec::new();
-    let channels = channels_of(record, design, &mut warnings).unwrap();
-    (channels, warnings.iter().map(|w| w.code).collect())
+    let intake = Intake::of(record, design, Vec::new()).unwrap();
+    let codes = intake.warnings.iter().map(|w| w.code).collect();
+    (intake.whole(), codes)
 }
 
 fn left(c: &Channels) -> f64 {

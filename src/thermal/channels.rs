@@ -157,8 +157,7 @@ impl Channels {
         self.on_s.windows(2).any(|w| w[1] < w[0])
     }
 
-    /// Which rows are fitted on and which are held out: by times and inputs, the applied rate among them. The output has no
-    /// say.
+    /// Which rows are fitted, which choose and which judge, by times and inputs alone.
     ///
     /// # Errors
     /// Too few rows.

@@ -2,6 +2,7 @@
 
 use super::channels::{Channels, filled};
 use super::synthetic::Random;
+use crate::statistics::blocks::Role;
 use crate::statistics::smooth::{averaged, reading_noise, smoothed};
 use crate::statistics::stats;
 use std::collections::BTreeMap;
@@ -184,12 +185,8 @@ fn the_rows_after_a_power_on_are_fitted() {
     for again in (50..400).step_by(7) {
         let on_s = |k: usize| time_s[k] - if k < again { 0.0 } else { time_s[again] - 3.0 };
         let on_s = Some((0..rows).map(on_s).collect());
-        let seen = |on_s| {
-            channels(&time_s, degc.clone(), on_s)
-                .split()
-                .unwrap()
-                .heldout[again]
-        };
+        let seen =
+            |on_s| channels(&time_s, degc.clone(), on_s).split().unwrap().roles[again] != Role::Fit;
         held_out += usize::from(seen(on_s));
         without += usize::from(seen(None));
     }

@@ -14,7 +14,7 @@ use crate::correction::Correction;
 use crate::design::Design;
 use crate::error::Result;
 use crate::record::{ThermalRecord, Warning};
-use crate::statistics::blocks::Split;
+use crate::statistics::blocks::{Role, Split};
 use crate::statistics::stats;
 use crate::verdict::{Closure, Errors, FirmwareErrors, SCHEMA, Step, Structure, Verdict};
 use std::sync::Arc;
@@ -23,9 +23,9 @@ use std::sync::Arc;
 pub struct Closed {
     /// `closure.json`.
     pub closure: Closure,
-    /// The record as candidates see it.
+    /// The record as candidates see it, with the output of every row.
     pub channels: Channels,
-    /// Which rows were fitted and which judged.
+    /// What each row was for.
     pub split: Split,
     /// Rows that stand out of both models, few and each by itself: no part of any figure.
     pub accidents: Vec<bool>,
@@ -81,7 +81,6 @@ pub fn names(record: &ThermalRecord, design: &Design, effort: Effort) -> Result<
 /// A record on its way to a search, the one way of every answer: taken in, its rows split, with the candidates of its design's user.
 pub(crate) struct Taken<'a> {
     pub(crate) intake: Intake<'a>,
-    split: Split,
     own: Vec<Arc<dyn Candidate>>,
 }
 
@@ -96,15 +95,16 @@ impl<'a> Taken<'a> {
         warnings: Vec<Warning>,
     ) -> Result<Self> {
         let mut intake = Intake::of(record, design, warnings)?;
-        let split = intake.channels.split();
-        let split = split.map_err(|e| refused(&intake.record, e.to_string()))?;
         let own = own_candidates(design, &intake.channels, &mut intake.warnings);
-        Ok(Taken { intake, split, own })
+        Ok(Taken { intake, own })
     }
 
     /// The search of its causes.
     pub(crate) fn search(&self, effort: Effort) -> Search<'_> {
-        Search::new(&self.intake.channels, &self.split, effort, self.own.clone())
+        let Intake {
+            channels, split, ..
+        } = &self.intake;
+        Search::new(channels, split, effort, self.own.clone())
     }
 }
 
@@ -124,6 +124,8 @@ pub fn close(
     let refuse = |why: String| refused(record, why);
     let mut warnings = taken.intake.warnings.clone();
     warnings.extend(one_direction(record, design));
+    warnings.extend(no_judges(&taken.intake.split));
+    let whole = taken.intake.whole();
     let (closure, before, after, accidents, firmware) = {
         let search = taken.search(effort);
         if !search.heldout.contains(&true) {
@@ -140,20 +142,21 @@ pub fn close(
         let found = found.map_err(unusable)?;
         let before = search.model(&[]).map_err(unusable)?;
         let after = search.model(&found.terms).map_err(unusable)?;
-        let accidents = search.accidents([&before, &after]);
+        let accidents = accidents(&search, &whole, [&before, &after]);
         let told = Told {
             search: &search,
+            whole: &whole,
             found: &found,
             before: &before,
             after: &after,
-            judged: JudgedRows::of(&search, &accidents),
+            rows: Rows::of(&search, &whole, &taken.intake.split, &accidents),
         };
         let mut closure = told.closure().map_err(unusable)?;
         told.warn(&mut warnings);
         let firmware = told.firmware(record, design, &mut warnings);
         closure.firmware = firmware
             .as_ref()
-            .map_or_else(FirmwareErrors::default, |f| f.errors);
+            .map_or_else(FirmwareErrors::default, |f| f.errors(&told.rows.judging));
         closure.warnings = warnings;
         closure.command = command.to_owned();
         closure.design_sha256 = crate::digest::sha256(design.source.text.as_bytes());
@@ -162,8 +165,8 @@ pub fn close(
     let (correction, firmware_dps) = firmware.map(|f| (f.correction, f.residual_dps)).unzip();
     Ok(Closed {
         closure,
-        channels: taken.intake.channels,
-        split: taken.split,
+        channels: whole,
+        split: taken.intake.split,
         accidents,
         before,
         after,
@@ -179,23 +182,42 @@ fn one_direction(record: &ThermalRecord, design: &Design) -> Option<Warning> {
     warnings.find(|w| w.code == "one_direction")
 }
 
-/// The rows that errors are of, and those that stand out, alone or a few in a row.
-struct JudgedRows {
-    train: Vec<bool>,
-    heldout: Vec<bool>,
+/// What is said of a record without rows that do nothing but judge.
+fn no_judges(split: &Split) -> Option<Warning> {
+    let said = "too few rows to keep some for the error alone: the errors are of the rows that models were chosen by, and may be a \
+                little too small; record longer, or average less";
+    (!split.roles.contains(&Role::Judge)).then(|| Warning::general("no_rows_to_judge", said))
+}
+
+/// Rows that stand out of the models, alone or a few in a row. Rows that the search does not see have no say in whether others do.
+fn accidents<const N: usize>(search: &Search, whole: &Channels, models: [&Model; N]) -> Vec<bool> {
+    let measured: Vec<bool> = whole.error_dps.iter().map(|e| e.is_finite()).collect();
+    let all = search.accidents_among(whole, &measured, models);
+    let rows = search.accidents(models).into_iter().zip(all);
+    let rows = rows.zip(&search.channels.error_dps);
+    rows.map(|((seen, all), error)| seen || error.is_nan() && all)
+        .collect()
+}
+
+/// The rows that errors are of, without those that stand out.
+struct Rows {
+    fitted: Vec<bool>,
+    choosing: Vec<bool>,
+    judging: Vec<bool>,
     accidents: Vec<bool>,
 }
 
-impl JudgedRows {
-    /// Those of a search that are no accidents.
-    fn of(search: &Search, accidents: &[bool]) -> Self {
+impl Rows {
+    fn of(search: &Search, whole: &Channels, split: &Split, accidents: &[bool]) -> Self {
         let usual = |rows: &[bool]| -> Vec<bool> {
-            let pairs = rows.iter().zip(accidents);
-            pairs.map(|(row, accident)| *row && !accident).collect()
+            let rows = rows.iter().zip(accidents).zip(&whole.error_dps);
+            rows.map(|((row, accident), error)| *row && !accident && error.is_finite())
+                .collect()
         };
-        JudgedRows {
-            train: usual(&search.train),
-            heldout: usual(&search.heldout),
+        Rows {
+            fitted: usual(&search.train),
+            choosing: usual(&search.heldout),
+            judging: usual(&split.judging()),
             accidents: accidents.to_vec(),
         }
     }
@@ -204,31 +226,41 @@ impl JudgedRows {
 /// A search put into words.
 struct Told<'a> {
     search: &'a Search<'a>,
+    /// The record with the output of every row.
+    whole: &'a Channels,
     found: &'a Found,
     before: &'a Model,
     after: &'a Model,
-    judged: JudgedRows,
+    rows: Rows,
+}
+
+/// rms of the rows that are meant.
+fn rms_of(residual: &[f64], rows: &[bool]) -> f64 {
+    let rows = residual.iter().zip(rows).filter(|(_, row)| **row);
+    stats::rms(&rows.map(|(r, _)| *r).collect::<Vec<f64>>())
 }
 
 impl Told<'_> {
     fn errors(&self, model: &Model) -> Errors {
-        let residual = model.residual(self.search.channels);
-        let over = |rows: &[bool]| -> Vec<f64> {
-            let pairs = residual.iter().zip(rows).filter(|(_, m)| **m);
-            pairs.map(|(r, _)| *r).collect()
-        };
-        let held = over(&self.judged.heldout);
+        let residual = model.residual(self.whole);
+        let judging = residual.iter().zip(&self.rows.judging);
+        let judging = judging.filter(|(_, row)| **row);
         Errors {
-            train_rms: stats::rms(&over(&self.judged.train)),
-            heldout_rms: stats::rms(&held),
-            heldout_max_abs: held.iter().fold(0.0, |m, r| m.max(r.abs())),
+            train_rms: rms_of(&residual, &self.rows.fitted),
+            heldout_rms: rms_of(&residual, &self.rows.judging),
+            heldout_max_abs: judging.fold(0.0, |m, (r, _)| m.max(r.abs())),
         }
+    }
+
+    /// rms over the rows that choose, deg/s.
+    fn choosing_rms(&self, model: &Model) -> f64 {
+        rms_of(&model.residual(self.whole), &self.rows.choosing)
     }
 
     fn closure(&self) -> std::result::Result<Closure, crate::statistics::Unusable> {
         let left = self.found.left.is_some();
         let residual = self.after.residual(self.search.channels);
-        let rows = residual.iter().zip(&self.judged.accidents);
+        let rows = residual.iter().zip(&self.rows.accidents);
         let usual = rows.filter(|(r, accident)| r.is_finite() && !**accident);
         let usual: Vec<f64> = usual.map(|(r, _)| *r).collect();
         let steps = self.steps()?;
@@ -269,7 +301,7 @@ impl Told<'_> {
         Ok(search.selection_frequency(self.after, k, &without, self.found.first.iter()))
     }
 
-    /// The steps in their order, each with the held-out error of itself and those before it.
+    /// The steps in their order, each with the error of itself and those before it.
     fn steps(&self) -> std::result::Result<Vec<Step>, crate::statistics::Unusable> {
         let terms = &self.found.terms;
         let estimates = self.search.estimates(self.after);

@@ -11,6 +11,7 @@ use crate::design::{Design, Gyro, RecordMapping};
 use crate::error::{InputError, Result};
 use crate::record::columns::THERMOMETERS;
 use crate::record::{ThermalRecord, Warning, condensed};
+use crate::statistics::blocks::{Role, Split};
 use crate::statistics::stats;
 use crate::statistics::weights;
 use crate::text::number;
@@ -118,8 +119,12 @@ fn without_glitches(record: &ThermalRecord) -> Option<(ThermalRecord, Vec<Warnin
 pub struct Intake<'a> {
     /// The rows that are closed.
     pub record: Cow<'a, ThermalRecord>,
-    /// As candidates see them.
+    /// As the search and all that comes before it see them: without the output of the rows that judge.
     pub channels: Channels,
+    /// What each row is for.
+    pub split: Split,
+    /// Output less applied rate of every row, deg/s, NaN where not measured: for the error of the answer alone.
+    pub error_dps: Vec<f64>,
     /// What is said of the record, in order.
     pub warnings: Vec<Warning>,
 }
@@ -128,7 +133,7 @@ impl<'a> Intake<'a> {
     /// Takes a record in; `warnings` are what its reader said of it.
     ///
     /// # Errors
-    /// No thermometer of the name that the design gives; a column without a reading.
+    /// No thermometer of the name that the design gives; a column without a reading; too few rows.
     pub fn of(
         record: &'a ThermalRecord,
         design: &Design,
@@ -143,24 +148,51 @@ impl<'a> Intake<'a> {
             warnings.extend(said);
             record = Cow::Owned(cleaned);
         }
-        let channels = channels_of(&record, design, &mut warnings)?;
+        let (channels, split, error_dps) = channels_of(&record, design, &mut warnings)?;
         Ok(Intake {
             record,
             channels,
+            split,
+            error_dps,
             warnings,
         })
     }
+
+    /// The channels with the output of the rows that judge as well.
+    pub fn whole(&self) -> Channels {
+        Channels {
+            error_dps: self.error_dps.clone(),
+            ..self.channels.clone()
+        }
+    }
 }
 
-/// A record as candidates see it.
+/// Takes the output out of the rows that judge. What it was in every row, and what each row is for, which the output has no say in.
+fn hide_judges(columns: &mut BTreeMap<String, Vec<f64>>, split: Split) -> (Vec<f64>, Split) {
+    let whole = columns.get("rate_out_dps").cloned().unwrap_or_default();
+    let rows = whole.iter().zip(&split.roles);
+    let split = match rows
+        .clone()
+        .any(|(o, r)| *r == Role::Judge && o.is_finite())
+    {
+        true => split,
+        false => split.without_judges(),
+    };
+    let output = columns.get_mut("rate_out_dps").into_iter().flatten();
+    let judging = output.zip(&split.roles).filter(|(_, r)| **r == Role::Judge);
+    judging.for_each(|(o, _)| *o = f64::NAN);
+    (whole, split)
+}
+
+/// A record as candidates see it, what each row is for, and output less applied rate of every row, deg/s.
 ///
 /// # Errors
-/// No thermometer of the name that the design gives; a column that is needed and holds no value.
-pub(crate) fn channels_of(
+/// No thermometer of the name that the design gives; a column that is needed and holds no value; too few rows.
+fn channels_of(
     record: &ThermalRecord,
     design: &Design,
     warnings: &mut Vec<Warning>,
-) -> Result<Channels> {
+) -> Result<(Channels, Split, Vec<f64>)> {
     let name = thermometer(record, &design.record)?;
     let mut columns = record.columns.clone();
     let name = name.unwrap_or_else(|| {
@@ -192,6 +224,9 @@ pub(crate) fn channels_of(
         let made = Channels::new(&record.time_s, columns, &name, degc);
         made.map_err(|missing| refused(record, format!("column {missing} holds no measured value")))
     };
+    let split = seen(&columns)?.split();
+    let split = split.map_err(|e| refused(record, e.to_string()))?;
+    let (mut whole, split) = hide_judges(&mut columns, split);
     let mut channels = seen(&columns)?;
     let step_u = quantised::step_u(&channels);
     if let Some(course) = repeated::course(&channels) {
@@ -204,12 +239,12 @@ pub(crate) fn channels_of(
         channels = seen(&columns)?;
     }
     let mut rounding_dps = 0.0;
-    if let Some(undithered) = adc_rows::found(&columns, &channels, design, seen)? {
+    if let Some(undithered) = adc_rows::found((&columns, &whole), &channels, design, seen)? {
         warnings.push(undithered.warning(design));
         rounding_dps = undithered.left_dps();
-        if let Some((cleaned, _)) = undithered.removed {
-            channels = seen(&cleaned)?;
-            columns = cleaned;
+        if let Some(removed) = undithered.removed {
+            channels = seen(&removed.columns)?;
+            (columns, whole) = (removed.columns, removed.output_dps);
         }
     }
     if let Some(said) = quadrature::contains_output(&channels) {
@@ -217,11 +252,14 @@ pub(crate) fn channels_of(
         columns.remove(quadrature::NAME);
         channels = seen(&columns)?;
     }
-    Ok(Channels {
+    columns.insert("rate_out_dps".to_owned(), whole);
+    let error_dps = seen(&columns)?.error_dps;
+    let channels = Channels {
         rounding_dps,
         step_u,
         ..channels
-    })
+    };
+    Ok((channels, split, error_dps))
 }
 
 /// What is said of a thermometer that is read less often than the output.

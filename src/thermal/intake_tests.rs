@@ -2,7 +2,7 @@
 
 use super::channels::Channels;
 use super::close::close;
-use super::intake::channels_of;
+use super::intake::Intake;
 use super::search::Effort;
 use super::synthetic::{Random, record, triangle};
 use crate::design::{Design, reader};
@@ -27,10 +27,10 @@ fn taken(nominal_hz: f64, more: Option<&str>) -> (Channels, Vec<&'static str>) {
     record
         .columns
         .extend(more.map(|name| (name.to_owned(), degc.clone())));
-    let mut warnings = Vec::new();
-    let channels = channels_of(&record, &design, &mut warnings).unwrap();
-    assert_eq!(channels.thermometer, "freq_hz");
-    (channels, warnings.iter().map(|w| w.code).collect())
+    let intake = Intake::of(&record, &design, Vec::new()).unwrap();
+    assert_eq!(intake.channels.thermometer, "freq_hz");
+    let codes = intake.warnings.iter().map(|w| w.code).collect();
+    (intake.whole(), codes)
 }
 
 #[test]
@@ -126,7 +126,7 @@ fn a_column_that_is_nearly_empty_is_no_thermometer() {
         };
         let phase = (0..200).map(phase).collect();
         record.columns.insert("phase_rad".to_owned(), phase);
-        let channels = channels_of(&record, &design(), &mut Vec::new()).unwrap();
-        assert_eq!(channels.thermometer, expected, "{every}");
+        let intake = Intake::of(&record, &design(), Vec::new()).unwrap();
+        assert_eq!(intake.channels.thermometer, expected, "{every}");
     }
 }

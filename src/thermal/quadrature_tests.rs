@@ -4,7 +4,7 @@ use super::*;
 use crate::design::reader;
 use crate::record::ThermalRecord;
 use crate::thermal::close::close;
-use crate::thermal::intake::channels_of;
+use crate::thermal::intake::Intake;
 use crate::thermal::search::Effort;
 use crate::thermal::synthetic::{Random, record, triangle};
 
@@ -31,13 +31,11 @@ fn made(seed: u64, leaks: f64, turned: f64) -> ThermalRecord {
 }
 
 fn said_of(record: &ThermalRecord) -> (bool, bool) {
-    let mut warnings = Vec::new();
     let design = reader::parse("", None).unwrap();
-    let channels = channels_of(record, &design, &mut warnings).unwrap();
-    let said = warnings
-        .iter()
-        .any(|w| w.code == "quadrature_contains_output");
-    (said, channels.column(NAME).is_none())
+    let intake = Intake::of(record, &design, Vec::new()).unwrap();
+    let mut said = intake.warnings.iter();
+    let said = said.any(|w| w.code == "quadrature_contains_output");
+    (said, intake.channels.column(NAME).is_none())
 }
 
 #[test]

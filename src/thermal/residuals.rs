@@ -6,8 +6,9 @@ use crate::record::rows::{Kind, RowWriter};
 use std::path::Path;
 
 /// Writes a row for each one that was closed: `time_s`, the thermometer as the model sees it, `held_out` and `outlier` (0 or 1),
-/// and the error, deg/s, of the declared model (`before_dps`), with the steps (`after_dps`) and of the firmware
-/// (`firmware_dps`). NaN: no reading, or no firmware.
+/// the error, deg/s, of the declared model (`before_dps`), with the steps (`after_dps`) and of the firmware
+/// (`firmware_dps`), and `role` (`fit`, `choose`, `judge`). NaN: no reading, or no firmware. `held_out` is 1 in rows that judge or,
+/// where there are none, in those that choose.
 ///
 /// The held-out errors of `closure.json` are over the rows with `held_out` = 1 and `outlier` = 0.
 ///
@@ -23,20 +24,23 @@ pub fn write(closed: &Closed, path: &Path) -> Result<()> {
         "before_dps",
         "after_dps",
         "firmware_dps",
+        "role",
     ];
     let (before, after) = (closed.before.residual(c), closed.after.residual(c));
     let flag = |on: bool| f64::from(u8::from(on));
+    let held_out = closed.split.judging();
     let mut writer = RowWriter::create(path, &names, Kind::Float)?;
     for row in 0..c.len() {
-        writer.write_floats(&[
+        let values = [
             c.time_s[row],
             c.centre + c.half * c.u[row],
-            flag(closed.split.heldout[row]),
+            flag(held_out[row]),
             flag(closed.accidents[row]),
             before[row],
             after[row],
             closed.firmware_dps.as_ref().map_or(f64::NAN, |f| f[row]),
-        ])?;
+        ];
+        writer.write_floats_and(&values, closed.split.roles[row].word())?;
     }
     writer.finish()
 }

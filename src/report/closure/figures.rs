@@ -116,7 +116,7 @@ fn over_time(view: &View, width: f64) -> Figure {
     svg.figure(
         title,
         format!(
-            "Output less applied rate and less the model. No estimate has seen the held-out rows. The noise floor is the white \
+            "Output less applied rate and less the model. The errors are of the held-out rows. The noise floor is the white \
              noise from differences of neighbouring rows. Triangles at an edge stand for readings beyond it.{scales} {CROWDED}"
         ),
     )

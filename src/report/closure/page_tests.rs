@@ -127,8 +127,8 @@ fn held_out_blocks_are_those_of_the_split() {
     let view = View::new(&closed);
     let blocks = view.blocks();
     assert!(blocks.len() >= 4);
-    for (t, held) in closed.channels.time_s.iter().zip(&closed.split.heldout) {
+    for (t, held) in closed.channels.time_s.iter().zip(closed.split.judging()) {
         let inside = blocks.iter().any(|(a, b)| a < t && t < b);
-        assert_eq!(inside, *held, "{t}");
+        assert_eq!(inside, held, "{t}");
     }
 }

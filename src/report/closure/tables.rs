@@ -2,6 +2,7 @@
 
 use super::view::View;
 use crate::report::text::{fixed, grouped, minus, significant, trimmed};
+use crate::statistics::blocks::Role;
 use crate::statistics::stats;
 use crate::thermal::close::Closed;
 use crate::thermal::effects::Sheet;
@@ -126,8 +127,8 @@ pub fn finding(view: &View) -> String {
         c.unit_text()
     );
     if !c.residual_structure.left && c.after.heldout_rms > SLOW * c.noise_floor_rms {
-        let rows = view.after.iter().zip(&view.closed.split.heldout);
-        let held: Vec<f64> = rows.filter(|(_, h)| **h).map(|(r, _)| *r).collect();
+        let rows = view.after.iter().zip(view.closed.split.judging());
+        let held: Vec<f64> = rows.filter(|(_, h)| *h).map(|(r, _)| *r).collect();
         out += if stats::robust_std(&held) > 0.75 * SLOW * c.noise_floor_rms {
             " What the held-out error has beyond it is slow noise (1/f or a walk), which no model of the channels removes."
         } else {
@@ -329,7 +330,16 @@ pub fn evidence(c: &Closure) -> Vec<Told> {
 /// Where it comes from.
 pub fn provenance(closed: &Closed) -> Vec<[String; 2]> {
     let c = &closed.closure;
-    let held = closed.split.heldout.iter().filter(|h| **h).count();
+    let count = |role| closed.split.roles.iter().filter(|r| **r == role).count();
+    let [choose, judge] = [Role::Choose, Role::Judge].map(|role| grouped(count(role) as u64));
+    let held_out = match closed.split.roles.contains(&Role::Judge) {
+        true => {
+            format!("{choose} to choose between models, {judge} held out of all but the errors")
+        }
+        false => format!(
+            "{choose} held out, to choose between models and for the errors: too few to keep these apart"
+        ),
+    };
     let noise = &closed.after.fit.noise;
     let strengths = format!(
         "white {} deg/s a row, 1/f {} deg/s, walk {} deg/s/√s",
@@ -344,9 +354,8 @@ pub fn provenance(closed: &Closed) -> Vec<[String; 2]> {
         (
             "rows",
             format!(
-                "{}, {} of them held out",
-                grouped(closed.channels.len() as u64),
-                grouped(held as u64)
+                "{}; of these {held_out}",
+                grouped(closed.channels.len() as u64)
             ),
         ),
         ("thermometer", closed.channels.thermometer.clone()),

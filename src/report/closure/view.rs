@@ -93,9 +93,9 @@ impl<'a> View<'a> {
         (moving, still)
     }
 
-    /// From when to when each held-out block lasts, s; the border is halfway between rows.
+    /// From when to when each block of rows lasts that the errors are of, s; the border is halfway between rows.
     pub fn blocks(&self) -> Vec<(f64, f64)> {
-        let (time, held) = (&self.closed.channels.time_s, &self.closed.split.heldout);
+        let (time, held) = (&self.closed.channels.time_s, self.closed.split.judging());
         let mut out = Vec::new();
         let mut start = None;
         for i in 0..=held.len().min(time.len()) {

@@ -6,9 +6,10 @@ use crate::design::Design;
 use crate::record::{ThermalRecord, Warning};
 use crate::statistics::stats;
 use crate::text::number;
+use crate::thermal::channels::Channels;
 use crate::thermal::firmware;
 
-/// A held-out error that is so many times another one is more: that of firmware beside the model's, or the declared one's.
+/// An error that is so many times another one is more: that of firmware beside the model's, or the declared one's.
 const MORE: f64 = 1.02;
 
 /// Codes of what `intake` takes out of a record's readings, and firmware does not.
@@ -18,14 +19,15 @@ const TAKEN_OUT: [&str; 3] = [
     "adc_not_dithered",
 ];
 
-/// The full scale of the rate, deg/s, that a record's own rates ask for, as they come in and as they go out; and the gyro's, which
-/// a record at rest says nothing of.
-fn full_scales_dps(record: &ThermalRecord, design: &Design) -> (f64, Option<f64>) {
-    let most = |name: &str| {
-        let (low, high) = stats::extremes(record.column(name).unwrap_or(&[])).unwrap_or_default();
+/// The full scale of the rate, deg/s, that a record's own rates ask for, as they come in and as they go out (of the rows that are
+/// seen); and the gyro's, which a record at rest says nothing of.
+fn full_scales_dps(seen: &Channels, design: &Design) -> (f64, Option<f64>) {
+    let most = |values: &[f64]| {
+        let (low, high) = stats::extremes(values).unwrap_or_default();
         low.abs().max(high.abs())
     };
-    let (out, applied) = (most("rate_out_dps"), most("rate_dps"));
+    let out = most(&seen.output_dps());
+    let applied = most(seen.column("rate_dps").unwrap_or(&[]));
     let own = 1.25 * out.max(applied).max(1e-3);
     let gyros = design.thermal_run.sense_full_scale_dps;
     (own, (applied == 0.0).then(|| own.max(gyros)))
@@ -42,7 +44,7 @@ impl Told<'_> {
         let c = self.search.channels;
         let estimates = self.search.estimates(self.after);
         let noise = self.after.fit.noise.white_rms_dps;
-        let (own, gyros) = full_scales_dps(record, design);
+        let (own, gyros) = full_scales_dps(c, design);
         let planned = |full_scale_dps| firmware::plan(c, self.after, &estimates, full_scale_dps);
         let fits = |plan: &Plan| Formats::choose(plan, noise).is_ok();
         let wide = gyros.and_then(planned).filter(fits);
@@ -55,7 +57,7 @@ impl Told<'_> {
             );
             return None;
         };
-        let judged = |plan: &Plan| firmware::judged(plan, record, c, &self.judged.heldout, noise);
+        let judged = |plan: &Plan| firmware::judged(plan, record, c, noise);
         if plan.keeps() {
             let said = "a lag goes on while the power is off: firmware keeps its state and makes up for the periods \
                         without power (the manual's \"The correction of averaged readings\"), as it did for the figures \
@@ -71,14 +73,16 @@ impl Told<'_> {
         };
         // Coefficients that cancel may be a model's; in words they are worse than no step at all.
         let declared = firmware::plan(c, self.before, &[], plan.full_scale_dps);
-        let declared = declared.and_then(|plan| judged(&plan).ok()?.errors.heldout_rms);
-        if let (Some(with), Some(without)) = (carried.errors.heldout_rms, declared)
+        let declared = declared.and_then(|plan| judged(&plan).ok());
+        let chosen = carried.errors(&self.rows.choosing);
+        let without = declared.and_then(|d| d.errors(&self.rows.choosing).heldout_rms);
+        if let (Some(with), Some(without)) = (chosen.heldout_rms, without)
             && !self.after.terms.is_empty()
             && with > MORE * without
         {
             let said = format!(
                 "the steps' coefficients cancel each other, and rounded to firmware's words they do so no more: they leave {with} \
-                 deg/s rms of held-out rows, the declared model alone {without}. No firmware is written. Do the \
+                 deg/s rms of the rows that models are chosen by, the declared model alone {without}. No firmware is written. Do the \
                  experiment that separates the steps (`evidence` names it)",
                 with = number(with, 3),
                 without = number(without, 3)
@@ -87,8 +91,8 @@ impl Told<'_> {
             return None;
         }
         if !self.after.terms.is_empty() {
-            let [none, model] = [self.before, self.after].map(|m| self.errors(m).heldout_rms);
-            if let Err(told) = carried.errors.unless_useless(none, model, "deg/s") {
+            let [none, model] = [self.before, self.after].map(|m| self.choosing_rms(m));
+            if let Err(told) = chosen.unless_useless(none, model, "deg/s") {
                 warnings.push(Warning::general("firmware_useless", told));
                 return None;
             }
@@ -101,7 +105,7 @@ impl Told<'_> {
     /// What is said where firmware leaves more than the model does.
     fn behind(&self, carried: &firmware::Judged, said: &[Warning]) -> Option<Warning> {
         let model = self.errors(self.after).heldout_rms;
-        let firmware = carried.errors.heldout_rms?;
+        let firmware = carried.errors(&self.rows.judging).heldout_rms?;
         let terms = &carried.correction.plan.terms;
         let mut reasons = Vec::new();
         if terms.iter().any(Term::remembers) {
@@ -115,8 +119,10 @@ impl Told<'_> {
         if said.iter().any(|w| TAKEN_OUT.contains(&w.code)) {
             reasons.push("it has the readings as they are, and what was taken out of them for the model is in its error");
         }
-        let without_rounding = carried.unrounded_rms_dps / model;
-        if without_rounding < MORE {
+        let without_rounding = carried.unrounded_rms_dps(&self.rows.judging) / model;
+        // The greater part of what firmware leaves more.
+        let by_words = firmware / model - without_rounding > (without_rounding - 1.0).abs();
+        if by_words {
             reasons.push("its words are too short for this correction");
         } else if reasons.is_empty() {
             reasons.push("it has each reading with its noise or its rounding, where the model has the course without them");

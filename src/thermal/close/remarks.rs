@@ -70,10 +70,10 @@ impl Told<'_> {
     /// What is said of rows that no figure has in it.
     fn accidents(&self) -> Option<Warning> {
         let search = self.search;
-        let residual = self.after.residual(search.channels);
-        let accidents = self.judged.accidents.iter().enumerate();
+        let residual = self.after.residual(self.whole);
+        let accidents = self.rows.accidents.iter().enumerate();
         let rows: Vec<usize> = accidents.filter(|(_, a)| **a).map(|(row, _)| row).collect();
-        let held = rows.iter().filter(|row| search.heldout[**row]).count();
+        let unfitted = rows.iter().filter(|row| !search.train[**row]).count();
         let farthest = rows
             .iter()
             .copied()
@@ -82,12 +82,11 @@ impl Told<'_> {
             "outliers",
             "rate_out_dps",
             format!(
-                "{} of {} rows ({} held out) stand out by more than six deviations, whatever the model, alone or a few in a \
+                "{} of {} rows ({unfitted} not fitted) stand out by more than six deviations, whatever the model, alone or a few in a \
                  row. They are taken for accidents and are not in the errors. Look at the farthest: at {} s it is off by {} \
                  deg/s",
                 rows.len(),
                 residual.len(),
-                held,
                 search.channels.time_s[farthest],
                 number(residual[farthest], 3)
             ),
@@ -98,13 +97,13 @@ impl Told<'_> {
     fn riddled(&self) -> Option<Warning> {
         let search = self.search;
         let rows = search.riddled(self.after)?;
-        let held = rows.iter().filter(|row| search.heldout[**row]).count();
+        let unfitted = rows.iter().filter(|row| !search.train[**row]).count();
         let first = rows.first().map(|row| search.channels.time_s[*row])?;
         Some(Warning::on(
             "many_outliers",
             "rate_out_dps",
             format!(
-                "{} of {} rows ({held} held out) are more than six deviations off the others, the first at {first} s: too many \
+                "{} of {} rows ({unfitted} not fitted) are more than six deviations off the others, the first at {first} s: too many \
                  for accidents, so they are in the errors, and no candidate makes them. Do the output and the applied \
                  rate of a row belong to one time (a rate table that moves within rows, an output that comes late)?",
                 rows.len(),

@@ -1,6 +1,7 @@
 //! Dead bands, beside a bias, in sweeps and in means over a swinging rate.
 
 use super::*;
+use crate::statistics::blocks::Role;
 use crate::thermal::search::{Effort, Search, Term as Step};
 use crate::thermal::synthetic::{Random, triangle};
 use std::collections::BTreeMap;
@@ -147,7 +148,10 @@ fn a_dead_band_claims_no_more_than_fitted_rows_show_where_held_out_ones_contradi
     // Rates within the band, just outside of it and far outside; those just outside in held-out rows alone.
     let far = |k: usize| [2.1, -1.7, 0.05, -2.3, 1.9, -0.06][k / 6 % 6];
     let rates: Vec<f64> = (0..600).map(far).collect();
-    let held = banded(&rates, half_dps, 0.008, 5).split().unwrap().heldout;
+    let held = banded(&rates, half_dps, 0.008, 5)
+        .split()
+        .unwrap()
+        .rows(Role::Choose);
     let near = |(o, held): (&f64, &bool)| match *held {
         true => 2.0 * half_dps * o.signum(),
         false => *o,
@@ -156,7 +160,8 @@ fn a_dead_band_claims_no_more_than_fitted_rows_show_where_held_out_ones_contradi
     let c = banded(&rates, half_dps, 0.008, 5);
     let split = c.split().unwrap();
     let search = Search::new(&c, &split, Effort::default(), Vec::new());
-    let contradicted = |i: usize| split.heldout[i] && (0.2..1.0).contains(&rates[i].abs());
+    let contradicted =
+        |i: usize| split.roles[i] == Role::Choose && (0.2..1.0).contains(&rates[i].abs());
     assert!((0..600).filter(|i| contradicted(*i)).count() > 50);
     let found = search.run().unwrap();
     let names: Vec<String> = found.terms.iter().map(|t| t.id()).collect();

@@ -1,6 +1,7 @@
 //! A drive whose gain pulls the measured phase, small and large.
 
 use super::*;
+use crate::statistics::blocks::Role;
 use crate::thermal::search::{Effort, Search, Term as Step};
 use crate::thermal::synthetic::{Pull, Random, triangle};
 use std::collections::BTreeMap;
@@ -151,8 +152,8 @@ fn named(pull: &Pull) -> (f64, f64) {
     let estimate = search.estimates(&model).remove(0);
     let reported = found.terms[0].candidate.report(c, &estimate);
     let held = |values: &[f64]| -> f64 {
-        let pairs = values.iter().zip(&split.heldout);
-        pairs.filter(|(_, h)| **h).map(|(v, _)| v * v).sum()
+        let pairs = values.iter().zip(split.rows(Role::Choose));
+        pairs.filter(|(_, h)| *h).map(|(v, _)| v * v).sum()
     };
     let square = held(&model.residual(c)) / held(&pulled.noise_dps);
     (reported["pull_rad"].0 / pull.pull_rad, square.sqrt())

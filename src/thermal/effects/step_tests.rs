@@ -3,6 +3,7 @@
 use super::{Bias, Candidate, Point, at_jumps};
 use crate::correction::Term;
 use crate::design::reader;
+use crate::statistics::blocks::Role;
 use crate::thermal::channels::Channels;
 use crate::thermal::close::close;
 use crate::thermal::effects::Reported;
@@ -203,7 +204,7 @@ fn a_loop_switches_at_the_row_where_the_error_jumps() {
     for seed in 0..3 {
         let c = dense(seed);
         let split = c.split().unwrap();
-        let places = at_jumps(&c, &split.train);
+        let places = at_jumps(&c, &split.rows(Role::Fit));
         let is_loop = |p: &&Point| p.form == 1 && (p.theta[1] - 6.0 / 35.0).abs() < 1e-2;
         assert!(places.iter().any(|p| is_loop(&p)), "{seed}: {places:?}");
         let found = Search::new(&c, &split, Effort::default(), Vec::new()).run();

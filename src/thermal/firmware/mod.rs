@@ -138,54 +138,56 @@ fn stream(plan: &Plan, record: &ThermalRecord, c: &Channels) -> Result<(Vec<Read
 pub struct Judged {
     /// What runs.
     pub correction: Correction,
-    /// Its errors over the rows that are judged.
-    pub errors: FirmwareErrors,
     /// What it leaves of each row, bit for bit, deg/s; NaN without a reading.
     pub residual_dps: Vec<f64>,
-    /// What the same block without quantisation leaves of the rows that are judged, deg/s.
-    pub unrounded_rms_dps: f64,
+    /// The same of the block without quantisation.
+    unrounded_dps: Vec<f64>,
 }
 
-/// The correction of a plan, its words chosen for the record's noise, and its errors, bit for bit.
+impl Judged {
+    /// Its errors over some rows.
+    pub fn errors(&self, rows: &[bool]) -> FirmwareErrors {
+        let errors = of_rows(&self.residual_dps, rows);
+        FirmwareErrors {
+            compensable: true,
+            heldout_rms: Some(stats::rms(&errors)),
+            heldout_max_abs: Some(errors.iter().fold(0.0, |m: f64, e| m.max(e.abs()))),
+        }
+    }
+
+    /// What the same block without quantisation leaves of some rows, deg/s rms.
+    pub fn unrounded_rms_dps(&self, rows: &[bool]) -> f64 {
+        stats::rms(&of_rows(&self.unrounded_dps, rows))
+    }
+}
+
+/// What is left of the rows that are meant and have a reading.
+fn of_rows(residual_dps: &[f64], rows: &[bool]) -> Vec<f64> {
+    let rows = residual_dps.iter().zip(rows);
+    let rows = rows.filter(|(r, row)| **row && r.is_finite());
+    rows.map(|(r, _)| *r).collect()
+}
+
+/// The correction of a plan, its words chosen for the record's noise, beside the record, bit for bit.
 ///
 /// # Errors
 /// A plan that cannot become firmware, with the rule.
-pub fn judged(
-    plan: &Plan,
-    record: &ThermalRecord,
-    c: &Channels,
-    heldout: &[bool],
-    noise_dps: f64,
-) -> Result<Judged> {
+pub fn judged(plan: &Plan, record: &ThermalRecord, c: &Channels, noise_dps: f64) -> Result<Judged> {
     plan.check()?;
     let formats = Formats::choose(plan, noise_dps)?;
     let correction = Correction::new(plan, &formats)?;
     let (all, places) = stream(plan, record, c)?;
-    let rows = |corrected: Vec<f64>| -> Vec<f64> { places.iter().map(|p| corrected[*p]).collect() };
     let applied = record.column("rate_dps");
-    let of_row = |(i, r): (usize, &f64)| {
-        let rate = applied.map_or(0.0, |a| if a[i].is_nan() { 0.0 } else { a[i] });
-        r - rate
-    };
     let left = |corrected: Vec<f64>| -> Vec<f64> {
-        rows(corrected).iter().enumerate().map(of_row).collect()
+        let of_row = |(i, place): (usize, &usize)| {
+            let rate = applied.map_or(0.0, |a| if a[i].is_nan() { 0.0 } else { a[i] });
+            corrected[*place] - rate
+        };
+        places.iter().enumerate().map(of_row).collect()
     };
-    let judged = |residual: &[f64]| -> Vec<f64> {
-        let rows = residual.iter().zip(heldout);
-        let rows = rows.filter(|(r, h)| **h && r.is_finite());
-        rows.map(|(r, _)| *r).collect()
-    };
-    let residual_dps = left(correction.run(&all));
-    let errors = judged(&residual_dps);
-    let unrounded_rms_dps = stats::rms(&judged(&left(correction.run_float(&all))));
     Ok(Judged {
+        residual_dps: left(correction.run(&all)),
+        unrounded_dps: left(correction.run_float(&all)),
         correction,
-        errors: FirmwareErrors {
-            compensable: true,
-            heldout_rms: Some(stats::rms(&errors)),
-            heldout_max_abs: Some(errors.iter().fold(0.0, |m: f64, e| m.max(e.abs()))),
-        },
-        residual_dps,
-        unrounded_rms_dps,
     })
 }

@@ -1,4 +1,4 @@
-//! Rows that no estimate used.
+//! Rows that no fit used, and that models are compared on.
 
 use super::otherwise::stand_together;
 use super::{Model, Search};
@@ -6,6 +6,7 @@ use crate::statistics::noise::Timeline;
 use crate::statistics::reml::whitener_of;
 use crate::statistics::robust::are_accidents;
 use crate::statistics::stats;
+use crate::thermal::channels::Channels;
 
 /// Most that one row's innovation counts.
 const MOST: f64 = 16.0;
@@ -25,6 +26,33 @@ fn is_riddled(far: &[bool]) -> bool {
 /// Rows by which a step's place may be off.
 const ASTRAY: usize = 3;
 
+/// By how much a model's residual would change, deg/s, if a step that a row is near to came on its other side: of what
+/// the neighbours have, what suits the row best. 0 where no step is near.
+fn across_steps(c: &Channels, model: &Model) -> Vec<f64> {
+    let mut by_dps = vec![0.0; c.len()];
+    let residual = model.residual(c);
+    let parts = model.contributions(c);
+    let steps = model.terms.iter().zip(&parts);
+    for (_, part) in steps.filter(|(t, _)| t.candidate.is_local()) {
+        for row in 0..part.len() {
+            let near = row.saturating_sub(ASTRAY)..(row + ASTRAY + 1).min(part.len());
+            for neighbour in near {
+                let by = part[row] - part[neighbour];
+                if (residual[row] + by).abs() < (residual[row] + by_dps[row]).abs() {
+                    by_dps[row] = by;
+                }
+            }
+        }
+    }
+    by_dps
+}
+
+/// What is said of the rows that are meant, in their order.
+fn in_order(of: &[bool], rows: &[bool]) -> Vec<bool> {
+    let rows = of.iter().zip(rows).filter(|(_, row)| **row);
+    rows.map(|(of, _)| *of).collect()
+}
+
 impl Search<'_> {
     /// Sum of squares over held-out rows of the residual's innovations under the noise of `judge`, in units of their
     /// variance, each at most 16: slow noise, which no model predicts, counts little. Of one judge, comparable.
@@ -40,10 +68,19 @@ impl Search<'_> {
     /// Rows, fitted or held out, that are accidents to all models that are compared: few, far off, and each by itself or with a
     /// few neighbours. One of them may outweigh whatever the models differ by, so that errors are of the other rows.
     pub fn accidents<const N: usize>(&self, models: [&Model; N]) -> Vec<bool> {
-        let far = self.far(models);
-        let rows: Vec<usize> = self.judged_rows().collect();
-        let in_order: Vec<bool> = rows.iter().map(|row| far[*row]).collect();
-        let few = rows.len() >= LEAST && !is_riddled(&in_order);
+        self.accidents_among(self.channels, &self.seen_rows(), models)
+    }
+
+    /// The same of other rows of the same record, whose output `c` has.
+    pub fn accidents_among<const N: usize>(
+        &self,
+        c: &Channels,
+        rows: &[bool],
+        models: [&Model; N],
+    ) -> Vec<bool> {
+        let far = self.far(c, rows, models);
+        let in_order = in_order(&far, rows);
+        let few = in_order.len() >= LEAST && !is_riddled(&in_order);
         if few && (!stand_together(&in_order) || are_accidents(&in_order)) {
             return far;
         }
@@ -52,61 +89,38 @@ impl Search<'_> {
 
     /// Rows that a model leaves far off, where they are too many for accidents.
     pub fn riddled(&self, model: &Model) -> Option<Vec<usize>> {
-        let far = self.far([model]);
-        let in_order: Vec<bool> = self.judged_rows().map(|row| far[row]).collect();
+        let seen = self.seen_rows();
+        let far = self.far(self.channels, &seen, [model]);
+        let in_order = in_order(&far, &seen);
         let rows = || (0..far.len()).filter(|row| far[*row]).collect();
         (in_order.len() >= LEAST && is_riddled(&in_order)).then(rows)
     }
 
-    /// Rows that errors are of, fitted or held out.
-    fn judged_rows(&self) -> impl Iterator<Item = usize> {
-        let rows = self.train.iter().zip(&self.heldout).enumerate();
-        rows.filter(|(_, (train, held))| **train || **held)
-            .map(|(row, _)| row)
+    /// Rows that are fitted or held out.
+    fn seen_rows(&self) -> Vec<bool> {
+        let rows = self.train.iter().zip(&self.heldout);
+        rows.map(|(train, held)| *train || *held).collect()
     }
 
-    /// Rows that are far off of all models that are compared. A row next to a step, on whose other side it would be none, is
-    /// an error of the model.
-    fn far<const N: usize>(&self, models: [&Model; N]) -> Vec<bool> {
-        let residuals = models.map(|m| m.residual(self.channels));
-        let switched = models.map(|m| self.across_steps(m));
+    /// Of these rows, those that are far off of all models that are compared. A row next to a step, on whose other side it would be
+    /// none, is an error of the model.
+    fn far<const N: usize>(&self, c: &Channels, rows: &[bool], models: [&Model; N]) -> Vec<bool> {
+        let residuals = models.map(|m| m.residual(c));
+        let switched = models.map(|m| across_steps(c, m));
         let least = |row: usize| {
             let of_model = residuals.iter().zip(&switched);
             let of_row = of_model.map(|(r, by)| (r[row] + by[row]).abs().min(r[row].abs()));
             of_row.fold(f64::INFINITY, f64::min)
         };
         let deviation_dps = residuals.iter().map(|r| {
-            let sizes: Vec<f64> = self.judged_rows().map(|row| r[row].abs()).collect();
+            let of_rows = r.iter().zip(rows).filter(|(_, row)| **row);
+            let sizes: Vec<f64> = of_rows.map(|(r, _)| r.abs()).collect();
             stats::MAD_TO_STD * stats::median(&sizes)
         });
         let far_dps = ACCIDENT * deviation_dps.fold(f64::INFINITY, f64::min);
         let far_dps = far_dps.max(self.nothing_dps());
-        let mut out = vec![false; self.train.len()];
-        for row in self.judged_rows() {
-            out[row] = least(row) > far_dps;
-        }
-        out
-    }
-
-    /// By how much a model's residual would change, deg/s, if a step that a row is near to came on its other side: of what
-    /// the neighbours have, what suits the row best. 0 where no step is near.
-    fn across_steps(&self, model: &Model) -> Vec<f64> {
-        let mut by_dps = vec![0.0; self.train.len()];
-        let residual = model.residual(self.channels);
-        let parts = model.contributions(self.channels);
-        let steps = model.terms.iter().zip(&parts);
-        for (_, part) in steps.filter(|(t, _)| t.candidate.is_local()) {
-            for row in 0..part.len() {
-                let near = row.saturating_sub(ASTRAY)..(row + ASTRAY + 1).min(part.len());
-                for neighbour in near {
-                    let by = part[row] - part[neighbour];
-                    if (residual[row] + by).abs() < (residual[row] + by_dps[row]).abs() {
-                        by_dps[row] = by;
-                    }
-                }
-            }
-        }
-        by_dps
+        let rows = rows.iter().enumerate();
+        rows.map(|(k, row)| *row && least(k) > far_dps).collect()
     }
 
     /// Mean squares over the held-out rows, (deg/s)^2, of models that are compared, without accidents.

@@ -50,10 +50,9 @@ pub use super::declared_bias::{declared, declared_by, powers, weighted};
 use super::effects::{self, Bias, Candidate, Missing, Point};
 use super::rails::{self, Rails};
 use crate::statistics::Unusable;
-use crate::statistics::blocks::Split;
+use crate::statistics::blocks::{Role, Split};
 use crate::statistics::linear::add_scaled;
-use crate::statistics::reml;
-use crate::statistics::reml::Fit;
+use crate::statistics::reml::{self, Fit};
 use crate::statistics::robust::ACCIDENT;
 use crate::statistics::tail::Tail;
 use acting::Settling;
@@ -203,7 +202,7 @@ pub struct Search<'a> {
     pub used: Vec<bool>,
     /// Rows of the training blocks.
     pub train: Vec<bool>,
-    /// Rows to judge on.
+    /// Rows that no fit is of, to choose between models by.
     pub heldout: Vec<bool>,
     /// How hard.
     pub effort: Effort,
@@ -235,8 +234,8 @@ impl<'a> Search<'a> {
         let mut candidates = extra;
         candidates.extend(effects::catalogue(channels).into_iter().map(Arc::from));
         candidates.extend(effects::outside::all(channels).into_iter().map(Arc::from));
-        let train: Vec<bool> = both(&split.train);
-        // Rows that judge must not say what readings err by, nor which rows stand at a rail.
+        let train: Vec<bool> = both(&split.rows(Role::Fit));
+        // Rows that choose must not say what readings err by, nor which rows stand at a rail.
         let seen = channels.seen(&train);
         let rails = rails::of(&seen, &train);
         let free = |(i, row): (usize, &bool)| *row && !rails.as_ref().is_some_and(|r| r.rows[i]);
@@ -244,7 +243,7 @@ impl<'a> Search<'a> {
             channels,
             used: train.iter().enumerate().map(free).collect(),
             train,
-            heldout: both(&split.heldout),
+            heldout: both(&split.rows(Role::Choose)),
             effort,
             rails,
             blur: reading::errors_of(&seen),

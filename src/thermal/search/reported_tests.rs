@@ -1,6 +1,7 @@
 //! Found names, with and without something left beside them.
 
 use super::*;
+use crate::statistics::blocks::Role;
 use crate::thermal::channels::Channels;
 use crate::thermal::search::Effort;
 use crate::thermal::synthetic::{Random, triangle};
@@ -189,7 +190,7 @@ fn names_that_outweigh_what_is_known_of_the_rest_need_not_explain_most() {
 fn names_that_predict_worse_than_none_are_dropped() {
     // Its gain has the other sign in the rows that are held out.
     let c = channels(|_| 4.0, 5.0);
-    let search_rows = c.split().unwrap().heldout;
+    let search_rows = c.split().unwrap().rows(Role::Choose);
     let against = channels(|k| if search_rows[k] { -9.0 } else { 4.0 }, 5.0);
     assert_eq!(kept(&against, 1e-60, 0, false).0, BOTH[1..]);
     // What was dropped is left, and the other name too weak beside it.

@@ -1,7 +1,7 @@
 //! Records whose residual only resembles an effect, and the effect itself beside each.
 
 use super::*;
-use crate::statistics::blocks::Split;
+use crate::statistics::blocks::{Role, Split};
 use crate::thermal::channels::Channels;
 use crate::thermal::effects::{Candidate, Point};
 use crate::thermal::search::Effort;
@@ -220,10 +220,8 @@ fn a_clip_of_one_row_is_an_accident_and_one_of_two_is_none() {
     ]);
     let time_s: Vec<f64> = (0..ROWS).map(|k| 10.0 * k as f64).collect();
     let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
-    let all = |heldout: bool| vec![!heldout; ROWS];
     let split = Split {
-        train: all(false),
-        heldout: all(true),
+        roles: vec![Role::Fit; ROWS],
         ..c.split().unwrap()
     };
     let search = Search::new(&c, &split, Effort::default(), Vec::new());
@@ -308,7 +306,7 @@ fn a_dropped_name_leaves_something_if_it_was_beyond_what_chance_makes() {
         Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap()
     };
     // The held-out rows have it the other way round.
-    let held = channels(&|_| 0.0).split().unwrap().heldout;
+    let held = channels(&|_| 0.0).split().unwrap().rows(Role::Choose);
     let c = channels(&|k| if held[k] { -4.0 } else { 4.0 });
     let search = Search::new(&c, &c.split().unwrap(), Effort::default(), Vec::new());
     let is_it = |c: &&Arc<dyn Candidate>| c.id() == "supply_sensitivity";
