@@ -123,7 +123,7 @@ pub fn close(
     let record: &ThermalRecord = &taken.intake.record;
     let refuse = |why: String| refused(record, why);
     let mut warnings = taken.intake.warnings.clone();
-    warnings.extend(one_direction(record, design));
+    warnings.extend(course(record, design));
     let (closure, before, after, accidents, firmware) = {
         let search = taken.search(effort);
         if !search.heldout.contains(&true) {
@@ -172,11 +172,11 @@ pub fn close(
     })
 }
 
-/// What `run` says of a record that was heated or cooled alone: names of effects in time mean less there.
-fn one_direction(record: &ThermalRecord, design: &Design) -> Option<Warning> {
+/// What `run` says of a record that was heated or cooled alone, where names of effects in time mean less, or not at all.
+fn course(record: &ThermalRecord, design: &Design) -> Option<Warning> {
     let fit = baseline::fit(record, &design.record, &design.fit).ok()?;
     let mut warnings = fit.warnings.into_iter();
-    warnings.find(|w| w.code == "one_direction")
+    warnings.find(|w| ["one_direction", "thermometer_constant"].contains(&w.code))
 }
 
 /// The rows that errors are of, and those that stand out, alone or a few in a row.
