@@ -103,6 +103,12 @@ pub fn constant(value: f64, digits: usize) -> String {
     }
 }
 
+/// "1 segment", "2 segments".
+pub fn counted(count: u64, noun: &str) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{count} {noun}{plural}")
+}
+
 /// A bound in a sentence: [`number`], rounded away from 0, so that what is printed is never below what was proved.
 pub fn at_most(value: f64, digits: usize) -> String {
     number(away_from_zero(value, digits), digits)

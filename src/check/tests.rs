@@ -49,7 +49,7 @@ fn every_word_of_the_default_is_proved_or_has_its_path() {
     );
     let bias = node(&c, "compensation.output bias");
     assert_eq!(bias.overflow, Overflows::Possible);
-    assert_eq!(bias.path.last().unwrap(), "column rate");
+    assert_eq!(bias.path.last().unwrap(), "output column rate");
     assert!(!bias.operands.is_empty() && bias.witness.is_none());
     // Rounded at every sample of a tone: a line of its own, near LSB / sqrt(12).
     let line = node(&c, "circuit.decimator.output sense_i")

@@ -1,6 +1,6 @@
 //! The table of forms that meet a bound.
 
-use crate::cost::function::FunctionCost;
+use crate::cost::function::{BYTES_A_CYCLE, FunctionCost};
 use comfy_table::Table;
 
 /// A line: form in words, cost, errors as they are shown, undominated, chosen.
@@ -10,6 +10,14 @@ pub(super) struct Line<'a> {
     pub errors: Vec<String>,
     pub undominated: bool,
     pub chosen: bool,
+}
+
+/// What the marks mean.
+pub(super) fn marks() -> String {
+    format!(
+        "chosen: the least of cycles + ROM bytes / {BYTES_A_CYCLE}. not beaten: no other form is as good or better in ROM, multiplies, \
+         adds and error at once."
+    )
 }
 
 /// The table; `errors` are the titles of the errors' columns.
@@ -27,7 +35,7 @@ pub(super) fn table<'a>(errors: &[&str], lines: impl Iterator<Item = Line<'a>>) 
     for line in lines {
         let mark = match (line.chosen, line.undominated) {
             (true, _) => "chosen",
-            (false, true) => "undominated",
+            (false, true) => "not beaten",
             (false, false) => "",
         };
         let mut row = vec![

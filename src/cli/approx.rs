@@ -16,7 +16,7 @@ use crate::tabulate::job;
 use crate::tabulate::job::{Asked, Request, Weight};
 use crate::tabulate::outcome::{Alternative, Outcome, Search};
 use crate::tabulate::selection::Reason;
-use crate::text::{at_most, number};
+use crate::text::{at_most, counted, number};
 use crate::timing;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -73,7 +73,7 @@ pub struct Arguments {
     /// Run every input code where there are up to 2^32 of them; without it, up to 2^24.
     #[arg(long)]
     exhaustive: bool,
-    /// The processor whose cycles decide which form is cheapest (an estimate).
+    /// The processor whose cycles (an estimate) decide, with the ROM, which form is chosen.
     #[arg(long, value_enum, default_value = "host")]
     target: Target,
     /// Prefix of the emitted names: a C identifier.
@@ -212,6 +212,7 @@ fn print(o: &Outcome, out: &std::path::Path) {
     if let Some(listed) = &o.alternatives {
         let table = alternatives::table(&["certified error"], listed.iter().map(alternative));
         super::terminal::show(&table);
+        say!("{}", alternatives::marks());
     }
     if let Some(search) = &o.search {
         let mut table = super::terminal::table(&[
@@ -233,22 +234,32 @@ fn print(o: &Outcome, out: &std::path::Path) {
     }
     say!("{} on {}: {}", o.function, o.domain, o.detail);
     let f = &o.formats;
+    let words = |format: &str| match format.starts_with("2^") {
+        true => format!("in steps of {format}"),
+        false => format.to_owned(),
+    };
+    let steps = f.intermediate.as_deref();
     say!(
-        "input {}, output {}, coefficients {}, intermediate {}",
+        "input {}, output {}, coefficients {}{}",
         f.input,
         f.output,
-        f.coefficients,
-        f.intermediate.as_deref().unwrap_or("none")
+        words(&f.coefficients),
+        steps.map_or(String::new(), |f| format!(
+            ", intermediate results {}",
+            words(f)
+        ))
     );
     let lsb = f.output.parse::<Format>().map_or(1.0, Format::lsb);
     let mut table = super::terminal::table(&["largest error", "value", "LSB of the output", "of"]);
+    // A bound is rounded up, what was seen to the nearest, as in the table of coefficients.
     let mut row = |what: &str, v: f64, of: String| {
-        table.add_row([what.to_owned(), at_most(v, 6), at_most(v / lsb, 4), of]);
+        let shown = if what == "observed" { number } else { at_most };
+        table.add_row([what.to_owned(), shown(v, 6), shown(v / lsb, 4), of]);
     };
     row(
         "certified",
         o.error.certified_max_abs,
-        "every x of the domain: proved, and never exceeded".to_owned(),
+        "every x of the domain (proved)".to_owned(),
     );
     let at = o.error.at_input_raw;
     match (o.error.exhaustive_max_abs, o.error.sampled_max_abs) {
@@ -270,7 +281,7 @@ fn print(o: &Outcome, out: &std::path::Path) {
     row(
         "of the coefficients alone",
         o.error.coefficients_only_max_abs,
-        "every x, without any rounding of steps and output: proved".to_owned(),
+        "every x, without the rounding of steps and output (proved)".to_owned(),
     );
     super::terminal::numbers(&mut table, 1..3);
     super::terminal::show(&table);
@@ -282,10 +293,10 @@ fn print(o: &Outcome, out: &std::path::Path) {
         );
     }
     say!(
-        "{} bytes, {} multiplications, {} additions, about {} cycles on {}",
+        "{} bytes, {}, {}, about {} cycles on {}",
         o.cost.rom_bytes,
-        o.cost.multiplies,
-        o.cost.adds,
+        counted(o.cost.multiplies.into(), "multiplication"),
+        counted(o.cost.adds.into(), "addition"),
         o.cost.cycles,
         spelled(&o.target)
     );
@@ -338,5 +349,5 @@ fn taken(search: &Search) -> String {
         _ if search.proved_best => ". It is proved that none have less than the least error found",
         _ => "",
     };
-    format!("taken: {why}{gain}{best}.")
+    format!("choice of coefficients (row \"taken\"): {why}{gain}{best}.")
 }

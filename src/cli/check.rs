@@ -69,7 +69,7 @@ fn print(check: &Check) {
         "headroom, bits",
         "overflow",
         "own rounding, LSB rms",
-        "in the rate, deg/s rms",
+        "adds to the rate, deg/s rms",
         "mean, deg/s",
     ]);
     for node in &check.nodes {
@@ -83,18 +83,20 @@ fn print(check: &Check) {
     };
     for node in open() {
         say!(
-            "{} is not proved to fit: its value is within {} (proved), and {} holds {}. Beyond that it would {}. From there it \
-             reaches {}.",
+            "{} is not proved to fit: its value is within {} (proved), and {} holds {}. Beyond that it would {}. Words that an \
+             overflow would change: {}.",
             node.name,
             node.in_units(node.proved),
             node.format,
             node.in_units(node.limits),
             node.mode,
-            node.path.get(1..).unwrap_or_default().join(" > ")
+            node.path.get(1..).unwrap_or_default().join(", ")
         );
     }
-    // Words of a compensation whose thermometer is none of the circuit's are not run.
-    let (run, not_run): (Vec<_>, Vec<_>) = open().partition(|n| n.budget.is_some());
+    // Words of a compensation whose thermometer is none of the circuit's are not run, and there is no rate then.
+    let is_run =
+        |n: &&NodeCheck| check.rate_rms_dps.is_some() || !n.name.starts_with("compensation.");
+    let (run, not_run): (Vec<_>, Vec<_>) = open().partition(is_run);
     if !run.is_empty() {
         say!(
             "None of these overflows happened in the {} samples of the design's own gyro. The check fails only where one did, or where \
@@ -104,7 +106,7 @@ fn print(check: &Check) {
     }
     for node in not_run {
         say!(
-            "{} was not run: its input is no word of the circuit. Whether it overflows is untested.",
+            "{} was not run, as the thermometer is not a word of the circuit: whether it overflows is untested.",
             node.name
         );
     }
@@ -167,7 +169,7 @@ fn print(check: &Check) {
             count => format!("{} ({count} words)", key(remark)),
         };
         say!(
-            "{node}: {}. To mend it, {} [{}]",
+            "{node}: {}. Suggestion: {} [{}]",
             remark.message,
             remark.mend,
             remark.code

@@ -17,6 +17,7 @@ use crate::record::{ThermalRecord, Warning};
 use crate::report::closure::Beside;
 use crate::report::design_diff::DesignDiff;
 use crate::selftest::controls::Controls;
+use crate::statistics::blocks::Role;
 use crate::text::number;
 use crate::thermal::close;
 use crate::thermal::close::Closed;
@@ -128,13 +129,13 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         (None, None) => Ok(()),
     };
     let mut results = super::common::claim(out, &PLANNED, recorded, look)?;
-    let (closure, compared, controls) = if let Some(path) = &arguments.capture {
+    let (closure, said, compared, controls) = if let Some(path) = &arguments.capture {
         watch.stage("closing");
         let closed = capture::close(path, &design, &recorded.command)?;
         watch.stage("writing");
         let page = crate::report::capture::html(&closed, &name_of(path))?;
         results.write("report.html", page.as_bytes())?;
-        (closed.closure, None, None)
+        (closed.closure, None, None, None)
     } else if let Some(path) = &arguments.record {
         if !arguments.force {
             crate::verify::firmware::refuse_edited(out)?;
@@ -157,6 +158,9 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
                 ..Effort::default()
             },
         )?;
+        if arguments.format == OutputFormat::Text {
+            say!("rows: {}", record.rows_understood(&closed.closure.warnings));
+        }
         watch.stage("emitting and verifying");
         let prefix = correction::prefix(&design.name);
         let sources = sources(&closed, &prefix)?;
@@ -184,7 +188,8 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
             beside,
             (&mut results, arguments.force),
         )?;
-        (closed.closure, compared, controls)
+        let said = Some(Said::of(&closed));
+        (closed.closure, said, compared, controls)
     } else {
         return Ok(());
     };
@@ -200,11 +205,15 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     results.finish()?;
     match arguments.format {
         OutputFormat::Json => super::terminal::give(&json),
-        OutputFormat::Text => print(&closure, compared.as_ref(), controls.as_ref(), out),
+        OutputFormat::Text => print(
+            &closure,
+            said.as_ref(),
+            compared.as_ref(),
+            controls.as_ref(),
+            out,
+        ),
     }
-    for warning in &closure.warnings {
-        talk!("warning: {} [{}]", warning.message, warning.code);
-    }
+    super::warnings(&closure.warnings);
     let differences = compared.map_or(Vec::new(), |c| c.differences());
     let mut failures = Vec::new();
     if !differences.is_empty() {
@@ -236,6 +245,28 @@ fn nothing_measured(path: &Path) -> Error {
         .in_file(path)
         .help(help)
         .into()
+}
+
+/// What the terminal says of a record's closing that is not in `closure.json`.
+struct Said {
+    /// What each cause adds to the rate output.
+    equations: Vec<String>,
+    /// Part of the rows that judge, and part that choose.
+    roles: [f64; 2],
+}
+
+impl Said {
+    fn of(closed: &Closed) -> Self {
+        let terms = closed.after.terms.iter();
+        let roles = &closed.split.roles;
+        let share = |role: Role| {
+            roles.iter().filter(|r| **r == role).count() as f64 / roles.len().max(1) as f64
+        };
+        Said {
+            equations: terms.map(|t| t.candidate.equation()).collect(),
+            roles: [Role::Judge, Role::Choose].map(share),
+        }
+    }
 }
 
 /// `closure.json` with what was asked for beside it.
@@ -331,7 +362,13 @@ fn write(
     Ok(())
 }
 
-fn print(c: &Closure, compared: Option<&Emitted>, controls: Option<&Controls>, out: &Path) {
+fn print(
+    c: &Closure,
+    said: Option<&Said>,
+    compared: Option<&Emitted>,
+    controls: Option<&Controls>,
+    out: &Path,
+) {
     if !c.steps.is_empty() {
         // A cause that another effect explains as well is told with its rivals; mostly there are none.
         let rivals = c.steps.iter().any(|s| !s.indistinguishable_from.is_empty());
@@ -360,6 +397,18 @@ fn print(c: &Closure, compared: Option<&Emitted>, controls: Option<&Controls>, o
             table.add_row(row);
         }
         super::terminal::show(&table);
+        if let Some(said) = said {
+            say!(
+                "what a cause adds to rate_out_dps{}:",
+                match c.firmware.compensable {
+                    true => ", and firmware subtracts",
+                    false => "",
+                }
+            );
+            for (step, equation) in c.steps.iter().zip(&said.equations) {
+                say!("  {}: {equation}", step.effect);
+            }
+        }
     }
     say!("{}", sentence(c));
     say!(
@@ -382,7 +431,7 @@ fn print(c: &Closure, compared: Option<&Emitted>, controls: Option<&Controls>, o
     } else if c.unit == "deg/s" {
         say!("firmware cannot carry this: the warnings say why");
     }
-    say!("{}", held_out(c));
+    say!("{}", held_out(said));
     if let Some(compared) = compared {
         super::terminal::show(&super::comparison_table(&compared.functions));
         say!("emitted C and Rust: {}", compared.sentence());
@@ -394,13 +443,23 @@ fn print(c: &Closure, compared: Option<&Emitted>, controls: Option<&Controls>, o
 }
 
 /// Which rows the held-out figures are of.
-fn held_out(c: &Closure) -> &'static str {
-    match c.unit {
-        "deg/s" => {
-            "held out: about a quarter of the record, in blocks that no fit used. They help to choose among causes. `run` predicts \
-             each of its blocks in turn, so that its figure is another one."
+fn held_out(said: Option<&Said>) -> String {
+    match said {
+        Some(Said { roles, .. }) => {
+            let [judge, choose] = roles.map(|share| format!("{:.0} %", 100.0 * share));
+            let which = match roles[0] > 0.0 {
+                true => format!(
+                    "{judge} of the rows, which neither a fit nor a choice has used (by another {choose} causes were chosen)"
+                ),
+                false => format!(
+                    "{choose} of the rows, which no fit has used; causes were chosen by them"
+                ),
+            };
+            format!(
+                "held out: {which}. `run` predicts each of its blocks in turn, so that its held-out rms is another one."
+            )
         }
-        _ => "held out: a part of the capture that no fit used",
+        None => "held out: a part of the capture that no fit used".to_owned(),
     }
 }
 

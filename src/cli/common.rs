@@ -6,6 +6,7 @@ use crate::error::Result;
 use crate::firmware::files::EmittedFile;
 use crate::firmware::replace;
 use crate::output::Results;
+use crate::record::Warning;
 use crate::verify::compare::{Compared, language_name};
 use std::path::{Path, PathBuf};
 
@@ -141,6 +142,18 @@ pub(super) fn languages(asked: Option<Language>) -> Result<Vec<Language>> {
         talk!("note: only the emitted code of one language ({other}) is built and compared: {why}");
     }
     Ok(found)
+}
+
+/// What the user should know of, a line each on stderr.
+pub(super) fn warnings(all: &[Warning]) {
+    for warning in all {
+        talk!(
+            "{}: {} [{}]",
+            warning.label(),
+            warning.message,
+            warning.code
+        );
+    }
 }
 
 /// A bundle among the results, in `folder` below theirs and in the place of the bundle that is there; says what was in

@@ -42,7 +42,7 @@ pub fn print(c: &Controls) {
     if !c.positive.is_empty() {
         let mut table = super::terminal::table(&[
             "planted",
-            "90 % from",
+            "90 % found from",
             "planted x",
             "which is",
             "named",

@@ -3,7 +3,7 @@
 use super::recorded::Recorded;
 use super::stages::Stages;
 use super::terminal::OutputFormat;
-use crate::cosim::stream::stimulus;
+use crate::cosim::stream::{STEPS, stimulus};
 use crate::design::Design;
 use crate::emit::views::Language;
 use crate::equivalence::job::{self, Request, Stimulus};
@@ -50,7 +50,7 @@ pub struct Arguments {
 
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
 enum Kind {
-    /// Those of the design's simulated gyro through its thermal run.
+    /// Those of the design's simulated gyro, at 24 temperatures of its thermal run, at rest and turning.
     Operating,
     /// Tones beside the oscillator, full-scale squares, constants, steps, noise.
     Adversarial,
@@ -131,14 +131,17 @@ fn codes(design: &Design, arguments: &Arguments) -> Result<(Vec<i32>, Vec<i32>, 
     let (codes, origin) = match arguments.stimulus {
         Kind::Operating => (
             stimulus(design, samples)?,
-            "the design's gyro in closed loop through its thermal run",
+            format!(
+                "the design's gyro in closed loop, in {STEPS} equal stretches at temperatures of its thermal run (up and down), at rest \
+                 and turning"
+            ),
         ),
         Kind::Adversarial => (
             crate::vectors::stimulus::capture(design, samples, 1),
-            "tones, squares, constants, steps and noise",
+            "tones, squares, constants, steps and noise".to_owned(),
         ),
     };
-    Ok((codes.0, codes.1, origin.to_owned()))
+    Ok((codes.0, codes.1, origin))
 }
 
 /// The first codes of a capture.
@@ -175,7 +178,7 @@ fn print(e: &Equivalence, out: &Path) {
     super::terminal::numbers(&mut table, 1..1 + 7);
     super::terminal::show(&table);
     say!(
-        "An error is fixed point less floating point, in LSB of the node. The bound holds at every sample. A node whose LSB is in \
+        "error: fixed point less floating point, in LSB of the node. Its bound holds at every sample. A node whose LSB is in \
          deg/s is the bias or the rate, or a step on the way to them."
     );
     say!("{} ADC samples, {} rows: {}", e.samples, e.rows, e.stimulus);
@@ -239,9 +242,10 @@ fn print_spurs(e: &Equivalence) {
     };
     let db = |level: Option<f64>| level.map_or("none".to_owned(), |l| format!("{l:.2} dBc"));
     say!(
-        "The NCO at {:.3} Hz has its worst spur at {} (predicted {}), of {} in all. With the design's quadrature the spurs make \
-         a tone of {} deg/s in the rate.",
+        "spurs of the NCO at {:.3} Hz: {}, the strongest {} (predicted {}). Mixed with the design's quadrature, the worst of them \
+         makes a tone of {} deg/s in the rate.",
         s.carrier_hz,
+        measured.spurs,
         db(measured.sfdr_dbc.map(|l| -l)),
         db(
             match (s.predicted.truncation_dbc(), s.predicted.table_dbc) {
@@ -249,7 +253,6 @@ fn print_spurs(e: &Equivalence) {
                 (a, b) => a.or(b),
             }
         ),
-        measured.spurs,
         number(s.quadrature_tone_dps, 3)
     );
 }

@@ -30,7 +30,7 @@ mod verify;
 
 use crate::error::{Error, Result};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use common::{comparison_table, design, json, threads};
+use common::{comparison_table, design, json, threads, warnings};
 use recorded::Recorded;
 use std::process::ExitCode;
 

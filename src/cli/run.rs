@@ -7,6 +7,7 @@ use super::terminal::OutputFormat;
 use crate::emit::views::Language;
 use crate::error::{Error, Result};
 use crate::job;
+use crate::job::DRIFT_BINS;
 use crate::job::bound::Line;
 use crate::job::outcome::{Drift, Outcome};
 use crate::text::{at_most, constant};
@@ -108,9 +109,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         OutputFormat::Json => super::terminal::give(&json),
         OutputFormat::Text => print(&outcome, &arguments.out),
     }
-    for warning in &outcome.summary.warnings {
-        talk!("warning: {} [{}]", warning.message, warning.code);
-    }
+    super::warnings(&outcome.summary.warnings);
     if design.correction.is_some() {
         talk!("{}", super::emit::lacks_correction("compensation"));
     }
@@ -125,15 +124,16 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
 
 fn print(outcome: &Outcome, out: &std::path::Path) {
     let s = &outcome.summary;
-    if let Some(columns) = &outcome.parts.understood {
+    if let Some([columns, rows]) = &outcome.parts.understood {
         say!("read: {columns}");
+        say!("rows: {rows}");
     }
     super::terminal::show(&super::comparison_table(&s.equivalence.functions));
     let mut table = super::terminal::table(&[
         "rate output at rest",
-        "drift pp, deg/s",
-        "rms, deg/s",
-        "pp, of before",
+        "drift of bin means, deg/s",
+        "rms of readings, deg/s",
+        "drift left",
     ]);
     let before = s.before.drift_pp_dps;
     let mut row = |name: &str, drift: Drift| {
@@ -141,10 +141,10 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
             name.to_owned(),
             format!("{:.4}", drift.drift_pp_dps),
             format!("{:.4}", drift.rms_dps),
-            format!(
-                "{:.2} %",
-                100.0 * drift.drift_pp_dps / before.max(f64::MIN_POSITIVE)
-            ),
+            match before > 0.0 {
+                true => format!("{:.2} %", 100.0 * drift.drift_pp_dps / before),
+                false => "-".to_owned(),
+            },
         ]);
     };
     row("before compensation", s.before);
@@ -160,12 +160,14 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
     }
     super::terminal::numbers(&mut table, 1..);
     super::terminal::show(&table);
-    if s.warnings.iter().any(|w| w.code == "heating_cooling_loop") {
-        say!(
-            "The peak to peak is of means over bins of temperature, in which heating and cooling cancel: see the warning on their \
-             loop."
-        );
-    }
+    say!(
+        "drift: largest less smallest mean over {DRIFT_BINS} bins of the thermometer, in which noise averages out{}. rms: of every \
+         reading about zero, with noise and a constant bias, so that it can be larger than the drift.",
+        match s.warnings.iter().any(|w| w.code == "heating_cooling_loop") {
+            true => " and heating and cooling cancel (see the warning on their loop)",
+            false => "",
+        }
+    );
     say!("fit in {}: {}.", s.fit.thermometer, s.fit.reason);
     say!(
         "held-out rms {:.4} deg/s: each of {} blocks in time was predicted from the others. Noise alone makes {:.4} deg/s rms.",
@@ -177,10 +179,9 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
         say!("chosen: {chosen}");
     }
     say!(
-        "error budget: the words of the compensation keep bias and rate within {} deg/s of the fitted polynomial. That is proved. \
-         What calibration and fit add is about {:.4} deg/s rms, the held-out error. That is an estimate.",
-        at_most(s.budget.bound_dps, 3),
-        s.budget.estimate_dps
+        "error budget: fixed point keeps the compensated rate within {} deg/s of what the fitted polynomial gives (proved: rounding \
+         of the thermometer, the coefficients, the steps, the bias and the rate). The fit's own error is the held-out rms (an estimate).",
+        at_most(s.budget.bound_dps, 3)
     );
     for line in &s.certainty_text {
         say!("{line}");
@@ -194,6 +195,7 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
             kept.target.name(),
             alternatives::table(&errors, kept.alternatives.iter().map(alternative))
         );
+        say!("{}", alternatives::marks());
     }
     say!(
         "calibrated for {} .. {} {}",

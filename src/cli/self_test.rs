@@ -10,6 +10,7 @@ use crate::output::Results;
 use crate::report::text::significant;
 use crate::selftest::outcome::{EffectScore, Minimum, Outcome};
 use crate::selftest::{self, Request};
+use crate::text::counted;
 use crate::timing;
 use std::path::PathBuf;
 
@@ -35,6 +36,9 @@ pub struct Options {
     #[arg(long, value_name = "N", requires = "self_test", value_parser = super::values::whole::<u16>(1..=1024))]
     threads: Option<u16>,
 }
+
+/// Records of one size that show, all found, a probability of 0.9 with 90 % confidence: the least n with 0.9^n < 0.1.
+const RECORDS_FOR_90: usize = 22;
 
 /// Runs the self-test.
 ///
@@ -106,6 +110,19 @@ fn print(o: &Outcome) {
          of a row ({} deg/s) beyond the declared model",
         significant(o.noise.white_rms_dps, 3)
     );
+    let sizes = o.effects.iter().flat_map(|e| &e.by_size);
+    let records = sizes.map(|s| s.records).max().unwrap_or(0);
+    say!(
+        "90 % found from: where a logistic curve through the counts of all sizes reaches 90 %.{}",
+        match records < RECORDS_FOR_90 {
+            true => format!(
+                " With {} of each size it is a rough figure: {RECORDS_FOR_90}, all found, show 90 % with 90 % confidence (--records \
+                 {RECORDS_FOR_90}).",
+                counted(records as u64, "record")
+            ),
+            false => String::new(),
+        }
+    );
     for e in o.effects.iter().filter(|e| !e.wrong_names.is_empty()) {
         say!("{}: wrongly {}", e.effect, listed(&e.wrong_names));
     }
@@ -149,7 +166,7 @@ fn row(e: &EffectScore) -> Vec<String> {
     }));
     let wrong: usize = e.by_size.iter().map(|s| s.wrong).sum();
     row.push(if wrong == 0 {
-        String::new()
+        "-".to_owned()
     } else {
         wrong.to_string()
     });

@@ -19,7 +19,8 @@ use std::path::{Path, PathBuf};
 pub struct Arguments {
     #[command(flatten)]
     design: super::common::DesignFile,
-    /// Simulate every ADC sample of the first S seconds of the design's thermal run, instead of its averaged readings.
+    /// Simulate every ADC sample of the first S seconds of the design's thermal run, instead of its averaged readings; the
+    /// compensation is not run then.
     #[arg(
         long,
         value_name = "S",
@@ -132,9 +133,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         OutputFormat::Json => super::terminal::give(&json),
         OutputFormat::Text => print(&outcome, &arguments.out),
     }
-    for warning in &outcome.summary.warnings {
-        talk!("warning: {} [{}]", warning.message, warning.code);
-    }
+    super::warnings(&outcome.summary.warnings);
     let failures = outcome.failures();
     if failures.is_empty() {
         return Ok(());
@@ -188,9 +187,9 @@ fn print(outcome: &Outcome, out: &Path) {
     }
     let mut table = super::terminal::table(&[
         "rate output",
-        "drift pp, deg/s",
-        "rms, deg/s",
-        "pp, of before",
+        "drift of readings, deg/s",
+        "rms of readings, deg/s",
+        "drift left",
     ]);
     let mut rows = |name: &str, both: &Both| {
         for (path, drift, before) in [
@@ -212,8 +211,27 @@ fn print(outcome: &Outcome, out: &Path) {
     }
     super::terminal::numbers(&mut table, 1..);
     super::terminal::show(&table);
+    say!(
+        "drift: largest less smallest reading. rms: of the readings about zero, so that a constant bias is in it and not in the \
+         drift."
+    );
+    if s.after.is_none() {
+        say!(
+            "There are no rows \"after\", for no compensation was run: {}.",
+            match outcome.parts.run.continuous {
+                true => "that takes the averaged readings of a thermal run (leave --duration out)",
+                false =>
+                    "that takes a run at rest over some temperatures, to which it can be fitted",
+            }
+        );
+    }
     if !s.loops.is_empty() {
         show_loops(&s.loops);
+    }
+    if outcome.parts.run.profile.is_some() {
+        say!(
+            "Loops and power-on are those of the temperatures in [thermal_run] of the design, not of the profile."
+        );
     }
     print_sentences(outcome);
     say!("wrote {}", out.display());
@@ -288,9 +306,8 @@ pub(super) fn show_loops(found: &[Hunting]) {
     super::terminal::numbers(&mut table, 1..);
     super::terminal::show(&table);
     say!(
-        "The loops run without noise; pp is what still moves, peak to peak. The prediction has neither ADC nor NCO, so that the \
-         error may be larger by what these two add. By theory no error is too small for a loop to correct: there is no dead \
-         band."
+        "The loops run without noise. pp: what still moves, peak to peak. The prediction leaves ADC and NCO out: the error may be \
+         larger by what these two add at most. By theory the loops have no dead band: they correct every error, however small."
     );
 }
 

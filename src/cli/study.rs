@@ -17,18 +17,19 @@ use std::path::PathBuf;
 use std::sync::Mutex;
 use std::time::Instant;
 
-/// Study the word lengths: the cheapest designs for each error, verified bit for bit, and what each bit does.
+/// Study the word lengths: the cheapest design for each size of error, verified bit for bit, and the effect of each bit.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     #[command(flatten)]
     design: super::common::DesignFile,
-    /// What the word lengths may add, as "bias_dps<=0.01 arw_deg_rth<=0.01", in place of the design's `[requirements]`.
+    /// The most that the word lengths may add to each error, such as "bias_dps<=0.01 arw_deg_rth<=0.01"; replaces the design's
+    /// `[requirements]`.
     #[arg(long = "for", value_name = "LIMITS")]
     limits: Option<String>,
-    /// Run only this part of the designs that are known beforehand, K of N, and write it for `--merge`.
+    /// Run only part K of N of those designs that are known before the search, and write their results for `--merge`.
     #[arg(long, value_name = "K/N", conflicts_with_all = ["merge", "limits"])]
     shard: Option<Part>,
-    /// Folders with all parts of a study; go on from them.
+    /// Folders with the results of all parts (`--shard`) of a study: search from there.
     #[arg(long, value_name = "DIR", num_args = 1..)]
     merge: Vec<PathBuf>,
     /// Threads, 1 to 1024; as many as the machine has if left out. The result does not depend on it.

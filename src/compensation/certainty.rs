@@ -346,7 +346,7 @@ pub fn sentences(design: &Design, bounds: &Bounds) -> Vec<String> {
 pub fn run_sentence(design: &Design, certainty: &Certainty) -> String {
     let c = certainty;
     format!(
-        "Run over {}{} calibrated inputs, the firmware's bias was at most {} from the polynomial (at input word {}){}.",
+        "That bound was tried on {}{} calibrated inputs: the bias was at most {} from the polynomial (at input word {}){}.",
         if c.exhaustive { "all " } else { "" },
         c.inputs_checked,
         figure(design, c.exhaustive_max_dps),

@@ -14,6 +14,9 @@ use crate::plant::profile::{self, Profile};
 /// The most ADC samples that a stream may have.
 const LIMIT: usize = 1 << 28;
 
+/// Temperatures of [`stimulus`], and rates at each of them.
+pub const STEPS: usize = 24;
+
 /// Codes of the closed loop for comparisons, `samples` of them: the run's temperatures from its start to its
 /// top and back in steps, at rest and at the table's rate both ways in turn. The loops follow by
 /// themselves; an overflow saturates where the design says `error`.
@@ -21,8 +24,6 @@ const LIMIT: usize = 1 << 28;
 /// # Errors
 /// None that is known: no cast of such a design stops.
 pub fn stimulus(design: &Design, samples: usize) -> Result<(Vec<i32>, Vec<i32>)> {
-    /// Temperatures, and rates at each of them.
-    const STEPS: usize = 24;
     let dwells = profile::dwells(&design.thermal_run);
     let ratio = design.circuit.decimator.ratio as usize;
     let rows = samples.div_ceil(ratio * STEPS).max(1);

@@ -7,7 +7,7 @@ use crate::numeric::trace::ir::{Op, Program};
 use serde::Serialize;
 
 /// Bytes of read-only memory that weigh as much as a cycle.
-const BYTES_A_CYCLE: u64 = 32;
+pub const BYTES_A_CYCLE: u64 = 32;
 
 /// What a form costs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, schemars::JsonSchema)]

@@ -169,7 +169,7 @@ pub fn path(design: &Design, node: &str) -> Vec<String> {
         reached = "circuit.decimator.output";
     }
     if reached == "circuit.decimator.output" {
-        push(format!("column {channel}"));
+        push(format!("output column {channel}"));
         if drive {
             push("circuit.cordic phase".into());
             push("circuit.cordic magnitude".into());
@@ -179,29 +179,29 @@ pub fn path(design: &Design, node: &str) -> Vec<String> {
         }
     }
     if reached == "circuit.cordic.width" {
-        push("column phase".into());
-        push("column magnitude".into());
+        push("output column phase".into());
+        push("output column magnitude".into());
         if circuit.phase_loop.is_some() {
             push("circuit.phase_loop.integrator_bits".into());
-            push("column tuning_word".into());
+            push("output column tuning_word".into());
         }
         if circuit.amplitude_loop.is_some() {
             push("circuit.amplitude_loop integrator".into());
-            push("column gain".into());
+            push("output column gain".into());
         }
         if on_phase {
             reached = "compensation.accumulator";
             push(reached.into());
         }
     } else if reached == "circuit.phase_loop.integrator_bits" {
-        push("column tuning_word".into());
+        push("output column tuning_word".into());
     }
     if reached == "compensation.accumulator" {
         push("compensation.output bias".into());
     }
     if reached.starts_with("compensation.") {
         push("compensation.output rate".into());
-        push("column rate".into());
+        push("output column rate".into());
     }
     path.dedup();
     path

@@ -44,7 +44,7 @@ pub struct Prediction {
 pub const FLAGS: [(&str, &str); 12] = [
     (
         "coherent_nco",
-        "the oscillator visits few phases again and again, so that its table errors are lines, not noise, and roundings may repeat. The predicted figure takes the table's errors as they are, and the roundings as noise",
+        "the oscillator steps through few phases over and over, so that the errors of its table are spectral lines, not noise, and roundings may repeat. The predicted rms takes the table's errors as they are, and the roundings as noise",
     ),
     (
         "near_coherent_nco",
@@ -69,7 +69,7 @@ pub const FLAGS: [(&str, &str); 12] = [
     ("closed_loop", "the phase loop feeds the error back"),
     (
         "open_loop_integral",
-        "this node adds its error up from row to row, so that it grows with time. Its rms has no prediction",
+        "the node sums its errors over the rows, so that they grow with time. Its rms is not predicted",
     ),
     (
         "other_form",
@@ -77,7 +77,7 @@ pub const FLAGS: [(&str, &str); 12] = [
     ),
     (
         "overflow",
-        "this node or one before it has overflowed. Its error says nothing of rounding",
+        "the node or one before it has overflowed, so that its error is not one of rounding",
     ),
     (
         "phase_cut",

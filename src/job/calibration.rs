@@ -98,7 +98,7 @@ fn by_record(fit: &BaselineFit, simulated: bool) -> String {
              takes (fit.order = \"by_record\")"
         ),
         (false, _) if fit.order != SIMULATED_ORDER as usize => format!(
-            "{}; the simulated run of a design takes {SIMULATED_ORDER} whatever its record says (fit.order = \"by_record\")",
+            "{} (for its simulated record `run` takes order {SIMULATED_ORDER} instead: fit.order = \"by_record\")",
             fit.reason
         ),
         _ => fit.reason.clone(),

@@ -138,11 +138,11 @@ pub fn fill(design: &mut Design, fit: &BaselineFit, record: &ThermalRecord) -> R
         overflow: Overflow::Saturate,
     };
     said.push(format!(
-        "coefficients {coefficient}: the integer bits hold the largest, {largest:.4} deg/s, and the rest of {WORD_BITS} bits are \
+        "coefficients {coefficient}: the integer bits hold twice the largest, {largest:.4} deg/s, and the rest of {WORD_BITS} bits are \
          fraction"
     ));
     said.push(format!(
-        "accumulator {accumulator}: holds all terms at once, {sum:.4} deg/s"
+        "accumulator {accumulator}: holds twice the sum of all terms, {sum:.4} deg/s"
     ));
     said.push(match is_wide {
         true => format!(
@@ -233,11 +233,17 @@ fn channel(
     let offset_raw = (fit.centre / lsb).round() as i128;
     let half_range = (fit.half_span / lsb).max(1.0);
     let scale_bits = (half_range.log2().ceil() as u32).clamp(1, 64);
-    let said = vec![format!(
-        "input {format} of {}: one LSB moves the bias by {:.6} deg/s, far below the noise floor of {floor:.6} deg/s",
-        fit.thermometer,
-        slope * lsb
-    )];
+    let said = vec![match slope == 0.0 {
+        true => format!(
+            "input {format} of {}, on which the bias does not depend",
+            fit.thermometer
+        ),
+        false => format!(
+            "input {format} of {}: one LSB moves the bias by at most {:.6} deg/s, far below the noise floor of {floor:.6} deg/s",
+            fit.thermometer,
+            slope * lsb
+        ),
+    }];
     Ok((
         CompensationInput::Channel(ChannelInput {
             column: fit.thermometer.clone(),

@@ -29,7 +29,7 @@ use crate::emit::views::Language;
 use crate::error::Result;
 use crate::record::{self};
 use outcome::Outcome;
-pub use points::{Point, Points, drift_pp, rms};
+pub use points::{DRIFT_BINS, Point, Points, drift_pp, rms};
 use reading::{clamped_bias, compensation, no_compensation, thermometer_raw, warning};
 use std::path::Path;
 use word_lengths::WordLengths;
@@ -91,7 +91,10 @@ pub fn run(
     let compared = firmware.compare(&design)?;
 
     say("running the record through float, fixed and emitted code");
-    let understood = record_path.map(|_| record.understood());
+    let understood = record_path.map(|_| {
+        let rows = record.rows_understood(&warnings);
+        [record.understood(), rows]
+    });
     let points = match &simulated {
         Some(run) => run.points(&design, &fit, &firmware)?,
         None => from_record::points(&design, &fit, record, &firmware)?,

@@ -28,8 +28,8 @@ pub struct Parts {
     pub command: String,
     /// The record, if it was measured.
     pub record_path: Option<PathBuf>,
-    /// Its columns with their units, as they were understood.
-    pub understood: Option<String>,
+    /// Its columns with their units, and its rows, as they were understood.
+    pub understood: Option<[String; 2]>,
     /// The record, if it was simulated.
     pub record_csv: Option<String>,
     /// The fit.
@@ -273,9 +273,7 @@ impl Outcome {
                 outliers: fit.outliers.len(),
             },
             chosen: parts.chosen.clone(),
-            finding: parts
-                .word_lengths
-                .sentence(fit.heldout_rms_dps, parts.budget.bound_dps),
+            finding: parts.word_lengths.sentence(fit.heldout_rms_dps),
             word_lengths: parts.word_lengths.clone(),
             budget: parts.budget.clone(),
             certainty_text: {

@@ -85,17 +85,18 @@ impl fmt::Debug for Points {
     }
 }
 
+/// Bins over the thermometer's range, of whose means the drift is.
+pub const DRIFT_BINS: usize = 24;
+
 /// Points' drift: greatest minus least of the means over bins of the thermometer.
 pub fn drift_pp(points: &Points, of: impl Fn(&Point) -> f64) -> f64 {
-    /// Bins over the thermometer's range.
-    const BINS: usize = 24;
     let readings = || points.iter().map(|p| p.thermometer);
     let low = readings().fold(f64::INFINITY, f64::min);
     let high = readings().fold(f64::NEG_INFINITY, f64::max);
-    let width = (high - low).max(f64::MIN_POSITIVE) / BINS as f64;
-    let mut sums = [(0.0, 0usize); BINS];
+    let width = (high - low).max(f64::MIN_POSITIVE) / DRIFT_BINS as f64;
+    let mut sums = [(0.0, 0usize); DRIFT_BINS];
     for point in points.iter() {
-        let bin = (((point.thermometer - low) / width) as usize).min(BINS - 1);
+        let bin = (((point.thermometer - low) / width) as usize).min(DRIFT_BINS - 1);
         sums[bin].0 += of(&point);
         sums[bin].1 += 1;
     }

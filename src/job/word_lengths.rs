@@ -118,9 +118,8 @@ impl WordLengths {
         )
     }
 
-    /// What it says, beside what the fit leaves (`fit_dps`, rms) and how far the compensation alone may be from the
-    /// fitted polynomial (`bound_dps`).
-    pub fn sentence(&self, fit_dps: f64, bound_dps: f64) -> String {
+    /// What it says, beside what the fit leaves (`fit_dps`, rms).
+    pub fn sentence(&self, fit_dps: f64) -> String {
         let limiting = if self.rms_dps < fit_dps {
             "The fit limits the result"
         } else {
@@ -131,15 +130,15 @@ impl WordLengths {
             Covers::Compensation => "word lengths of the compensation",
         };
         let mut text = format!(
-            "{limiting}: fit {} deg/s held-out rms, {whose} {} deg/s rms. Over {} readings fixed point and floating point differ by \
-             {} deg/s at most",
+            "{limiting}: fit {} deg/s held-out rms, {whose} {} deg/s rms. Over these {} readings the compensated rate in fixed point \
+             differed from that in floating point by {} deg/s at most (measured)",
             shown(fit_dps, 3),
             shown(self.rms_dps, 2),
             self.readings,
             shown(self.max_dps, 2)
         );
         if self.covers == Covers::Compensation {
-            text += ". A record passes no other part than the compensation";
+            text += ". The circuit before the compensation is not in it: a record begins after it";
         }
         match &self.largest {
             Some(w) => {
@@ -156,11 +155,7 @@ impl WordLengths {
             }
             None => {}
         }
-        text += &format!(
-            ". The compensation alone is within {} deg/s of the fitted polynomial, which is proved.",
-            shown(bound_dps, 2)
-        );
-        text
+        text + "."
     }
 }
 

@@ -1,6 +1,9 @@
 //! A thermal record: rows of averaged readings.
 
+use super::warning::Warning;
 use crate::design::{record_columns, units};
+use crate::statistics::stats;
+use crate::text::number;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -119,6 +122,24 @@ impl ThermalRecord {
             }
         });
         said.collect::<Vec<_>>().join(", ")
+    }
+
+    /// How many rows there are, how far apart, and whether they are means of the file's, as `warnings` of the same record say.
+    pub fn rows_understood(&self, warnings: &[Warning]) -> String {
+        let averaged: Vec<&str> = warnings
+            .iter()
+            .filter(|w| matches!(w.code, "rows_averaged" | "log_averaged"))
+            .filter_map(|w| w.message.split(": ").next())
+            .collect();
+        if !averaged.is_empty() {
+            return averaged.join("; ");
+        }
+        let steps: Vec<f64> = self.time_s.windows(2).map(|w| w[1] - w[0]).collect();
+        format!(
+            "{}, one every {} s (median), each taken as it is (`average_s` in [record] averages them)",
+            self.len(),
+            number(stats::median(&steps), 4)
+        )
     }
 
     /// How many rows of a column are measured; 0 if there is none of that name.

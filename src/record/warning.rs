@@ -14,6 +14,14 @@ pub struct Warning {
 }
 
 impl Warning {
+    /// `note` where something was done as it is always, or as file or design ask for it; else `warning`.
+    pub fn label(&self) -> &'static str {
+        match self.code {
+            "units_converted" | "rows_averaged" | "log_averaged" => "note",
+            _ => "warning",
+        }
+    }
+
     /// A remark on one column.
     pub fn on(code: &'static str, column: &str, message: impl Into<String>) -> Self {
         Warning {

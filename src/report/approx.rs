@@ -168,7 +168,7 @@ fn form(a: &Alternative) -> Form {
         chosen: a.chosen,
         mark: match (a.chosen, a.undominated) {
             (true, _) => "chosen",
-            (false, true) => "undominated",
+            (false, true) => "not beaten",
             (false, false) => "",
         },
     }
@@ -286,9 +286,9 @@ fn front(o: &Outcome, listed: &[Alternative], width: f64) -> Figure {
             (
                 "before dots",
                 Swatch::Marker(Shape::Dot),
-                "keeps to the bound, dominated",
+                "keeps to the bound, beaten",
             ),
-            ("after dots", Swatch::Marker(Shape::Dot), "undominated"),
+            ("after dots", Swatch::Marker(Shape::Dot), "not beaten"),
             ("fixed", Swatch::Marker(Shape::Circle), "chosen"),
             ("bound", Swatch::Line, "bound"),
         ]
@@ -342,6 +342,6 @@ fn front(o: &Outcome, listed: &[Alternative], width: f64) -> Figure {
     }
     svg.figure(
         "Forms that keep to the bound",
-        "Undominated: no other form is at least as good in memory, multiplications, additions and error. Cycles are an estimate.",
+        "Not beaten: no other form is at least as good in memory, multiplications, additions and error. Cycles are an estimate.",
     )
 }

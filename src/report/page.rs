@@ -93,7 +93,7 @@ pub struct Alternative {
     pub numbers: [String; 6],
     /// The firmware's.
     pub chosen: bool,
-    /// `chosen`, `undominated` or nothing.
+    /// `chosen`, `not beaten` or nothing.
     pub mark: &'static str,
 }
 

@@ -74,7 +74,7 @@ impl Made {
         let word_lengths = WordLengths::measure(&design, &fit, &[1.0, 2.5], &[1.0, 2.0], None);
         let word_lengths = word_lengths.unwrap();
         let summary = Summary {
-            finding: word_lengths.sentence(fit.heldout_rms_dps, budget.bound_dps),
+            finding: word_lengths.sentence(fit.heldout_rms_dps),
             word_lengths,
             chosen: Vec::new(),
             schema: "gyrogen.run/1",

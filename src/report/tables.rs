@@ -84,7 +84,7 @@ pub fn alternatives(shown: &Shown) -> Vec<Alternative> {
         chosen: l.chosen,
         mark: match (l.chosen, l.undominated) {
             (true, _) => "chosen",
-            (false, true) => "undominated",
+            (false, true) => "not beaten",
             (false, false) => "",
         },
     };

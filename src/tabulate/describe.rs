@@ -8,6 +8,7 @@ use crate::approx::form::split::{Spacing, Split};
 use crate::approx::form::table::Kind;
 use crate::numeric::arithmetic::Table as Entries;
 use crate::numeric::cast::Target as Quantised;
+use crate::text::counted;
 
 /// A form in words.
 pub fn detail(form: &Form) -> String {
@@ -22,7 +23,8 @@ pub fn detail(form: &Form) -> String {
         };
         match split.spacing {
             Spacing::Uniform { bits } => {
-                format!("{} segments of 2^{bits} codes{symmetry}", split.count)
+                let segments = counted(split.count as u64, "segment");
+                format!("{segments} of 2^{bits} codes{symmetry}")
             }
             Spacing::PowerOfTwo { .. } => {
                 format!(

@@ -76,7 +76,8 @@ fn span(c: &Checked<'_>) -> Option<Warning> {
             "thermometer_constant",
             &fit.thermometer,
             format!(
-                "{} is {} {unit} in every row. Only a constant bias can be fitted. Record over a range of temperatures",
+                "{} is {} {unit} in every row, so that no dependence on temperature can be fitted: the firmware subtracts a constant. \
+                 Record over a range of temperatures",
                 fit.thermometer,
                 g(low)
             ),

@@ -123,7 +123,7 @@ pub fn close(
     let record: &ThermalRecord = &taken.intake.record;
     let refuse = |why: String| refused(record, why);
     let mut warnings = taken.intake.warnings.clone();
-    warnings.extend(one_direction(record, design));
+    warnings.extend(course(record, design));
     warnings.extend(no_judges(&taken.intake.split));
     let whole = taken.intake.whole();
     let (closure, before, after, accidents, firmware) = {
@@ -175,11 +175,11 @@ pub fn close(
     })
 }
 
-/// What `run` says of a record that was heated or cooled alone: names of effects in time mean less there.
-fn one_direction(record: &ThermalRecord, design: &Design) -> Option<Warning> {
+/// What `run` says of a record that was heated or cooled alone, where names of effects in time mean less, or not at all.
+fn course(record: &ThermalRecord, design: &Design) -> Option<Warning> {
     let fit = baseline::fit(record, &design.record, &design.fit).ok()?;
     let mut warnings = fit.warnings.into_iter();
-    warnings.find(|w| w.code == "one_direction")
+    warnings.find(|w| ["one_direction", "thermometer_constant"].contains(&w.code))
 }
 
 /// What is said of a record without rows that do nothing but judge.

@@ -136,13 +136,17 @@ pub fn planted(p: &Planted) -> [String; 6] {
         1 => name.clone(),
         count => format!("{name} ({count})"),
     });
+    let wrong: Vec<String> = wrong.collect();
     [
         p.effect.clone(),
         p.detectable.as_ref().map_or_else(none, least),
         p.times_noise.map_or_else(none, |t| significant(t, 2)),
         own,
         found,
-        wrong.collect::<Vec<_>>().join(", "),
+        match wrong.is_empty() {
+            true => none(),
+            false => wrong.join(", "),
+        },
     ]
 }
 

@@ -19,7 +19,7 @@ struct Leakage;
 const LEAKAGE: Sheet = Sheet {
     id: "quadrature_leakage",
     physics: "a constant phase error of the demodulator lets part of the quadrature into the rate",
-    equation: "Q sin(theta)",
+    equation: "Q sin(phase), Q the quadrature",
     parameters: &[Parameter {
         name: "phase_rad",
         plausible: (1e-5, 0.1),
@@ -69,7 +69,7 @@ const PHASE_DRIFT: Sheet = Sheet {
     id: "demod_phase_drift",
     physics: "the demodulator's phase error moves with temperature and lets a varying part of the \
               quadrature into the rate",
-    equation: "Q theta_1 (T - T_0)",
+    equation: "Q rad_per_k (T - reference), Q the quadrature",
     parameters: &[
         Parameter {
             name: "rad_per_k",

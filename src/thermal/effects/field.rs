@@ -50,7 +50,7 @@ const CHOICE: f64 = 4.0;
 const SUPPLY: Sheet = Sheet {
     id: "supply_sensitivity",
     physics: "references and charge pump follow the supply",
-    equation: "k V; and where the law bends b s^2, b s^3 or b s u with it, s the supply and u the temperature scaled to -1..1",
+    equation: "gain V, V the supply; and where the law bends b s^2, b s^3 or b s u with it, s the supply and u the temperature scaled to -1..1",
     parameters: &[
         Parameter {
             name: "gain_dps_per_v",
@@ -67,7 +67,7 @@ const SUPPLY: Sheet = Sheet {
 const G: Sheet = Sheet {
     id: "g_sensitivity",
     physics: "acceleration moves the proof mass and unbalances the sense axis",
-    equation: "g1 a; and where the law bends b s^2, b s^3 or b s u with it, s the acceleration and u the temperature scaled to -1..1",
+    equation: "gain a, a the acceleration; and where the law bends b s^2, b s^3 or b s u with it, s the acceleration and u the temperature scaled to -1..1",
     parameters: &[
         Parameter {
             name: "gain_dps_per_g",
@@ -84,7 +84,7 @@ const G: Sheet = Sheet {
 const G_SQUARED: Sheet = Sheet {
     id: "g_squared_sensitivity",
     physics: "vibration rectification: the answer to acceleration has a square",
-    equation: "g2 a^2; and where the law bends b s, b s^3 or b s^2 u with it, s the acceleration and u the temperature scaled to -1..1",
+    equation: "gain a^2, a the acceleration; and where the law bends b s, b s^3 or b s^2 u with it, s the acceleration and u the temperature scaled to -1..1",
     parameters: &[
         Parameter {
             name: "gain_dps_per_g2",

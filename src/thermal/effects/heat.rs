@@ -28,8 +28,8 @@ const THERMAL_LAG: Sheet = Sheet {
     id: "thermal_lag",
     physics: "part of the bias (electronics, package) follows a temperature that lags the \
               structure's: a loop between heating and cooling that closes in dwells",
-    equation: "k (T - T_l), or k (T - T_l) + q (T^2 - T_l^2), T from the middle; tau dT_l/dt = T - T_l, \
-               T_l as T or free at the first row and after gaps",
+    equation: "gain (T - T_l), or gain (T - T_l) + curvature (T^2 - T_l^2) with T from the middle of its range; T_l lags T: \
+               tau dT_l/dt = T - T_l, T_l as T or free at the first row and after gaps",
     parameters: &[
         Parameter {
             name: "gain_dps_per_k",
@@ -261,7 +261,7 @@ struct TemperatureRate;
 const TEMPERATURE_RATE: Sheet = Sheet {
     id: "temperature_rate",
     physics: "a temperature gradient over the die bends it while the temperature changes",
-    equation: "k dT/dt",
+    equation: "gain dT/dt",
     parameters: &[Parameter {
         name: "gain_dps_s_per_k",
         plausible: (0.1, 1000.0),

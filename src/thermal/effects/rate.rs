@@ -76,7 +76,7 @@ const SCALE_TEMPERATURE: Sheet = Sheet {
     id: "scale_factor_temperature",
     physics: "the modes' split, the gap and the references move with temperature, and the scale \
               factor with them",
-    equation: "rate s1 (T - T_0), where that does not do with s2 (T - T_0)^2",
+    equation: "rate (slope (T - reference)), where that does not do with curvature (T - reference)^2 in the brackets",
     parameters: &[
         Parameter {
             name: "slope_ppm_per_k",

@@ -20,8 +20,8 @@ const STRESS_JUMP: Sheet = Sheet {
     id: "stress_jump",
     physics: "a joint (die attach, solder, lid) gives way at a temperature and comes back at the \
               same or a lower one, or never",
-    equation: "h H(T - T_s), T_s higher by the gap on the way up than on the way down; or, where the parts of the \
-               joint give way one after the other, h / (1 + exp(-2 (T - T_s) / width))",
+    equation: "the height where T is above T_s, else 0, T_s higher by the hysteresis on the way up than on the way down; or, where \
+               the parts of the joint give way one after the other, height / (1 + exp(-2 (T - T_s) / width))",
     parameters: &[
         Parameter {
             name: "height_dps",

@@ -130,7 +130,8 @@ const MODE_CROSSING: Sheet = Sheet {
     physics: "at one temperature a parasitic mode has the drive's frequency and takes energy from \
               it: a bump, or a swing to both sides, in temperature",
     equation: "(a + d 2 x) / (1 + x^2), or a / sqrt(1 + x^2) where the other mode's amplitude acts, or a exp(-x^2 / 2) \
-               where the crossing is blurred (several modes, a gradient over the die), x = (T - T_c) / width",
+               where the crossing is blurred (several modes, a gradient over the die); x = (T - center) / half width, a absorptive, \
+               d dispersive",
     parameters: &[
         Parameter {
             name: "center_degc",

@@ -22,7 +22,7 @@ const SLOWEST_S: f64 = 2000.0;
 const WARMUP: Sheet = Sheet {
     id: "warmup_transient",
     physics: "self-heating and settling of references after each power-on",
-    equation: "w exp(-t_on / tau); or w s exp(-t_on / tau), s = 1 at first and less after a power-off that was too short to \
+    equation: "amplitude exp(-t_on / tau), t_on the time since power-on; or s times that, s = 1 at first and less after a power-off that was too short to \
                cool down: what had settled goes back with a time constant of its own",
     parameters: &[
         Parameter {
