@@ -250,10 +250,9 @@ impl<'a> Caller<'a> {
     fn store_counts(&self, store: usize, call: &Evaluated) -> bool {
         let place = |k: usize| self.program.place_of_store(self.number, k);
         let kept = |without: Option<usize>| {
-            let stores = self.function.stores.iter().enumerate();
+            let mut stores = self.function.stores.iter().enumerate();
             stores
-                .filter(|(k, _)| Some(*k) != without && place(*k) == place(store))
-                .last()
+                .rfind(|(k, _)| Some(*k) != without && place(*k) == place(store))
                 .map_or(call.state[place(store)], |(_, (_, _, id))| call.values[*id])
         };
         kept(None) != kept(Some(store))
