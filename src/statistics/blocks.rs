@@ -12,7 +12,8 @@
 //!    thermometer's range, taken as a whole and on the way up and down, and of which no more than a third of the highest and
 //!    of the lowest readings of any other input are taken (the applied rate among them: a clip shows in few rows); the first
 //!    among equals: the error is about interpolation.
-//! 4. Of these four the first three quarters choose and the last quarter judges, about 7 % of the rows.
+//! 4. Of these four the first rows choose and the last quarter judges, about 7 % of the rows; of a short record three rows of each,
+//!    or half, so that the error is of eight rows at least, of twelve from 90 rows on.
 //! 5. In a record of fewer than [`JUDGED`] rows, or where none of those that would judge has an output, the rows that choose judge
 //!    too.
 //!
@@ -38,11 +39,14 @@ const FINEST: usize = 5;
 /// Fewest rows of a record some of which do nothing but judge.
 pub const JUDGED: usize = 60;
 
-/// Segments of every 15 that are not fitted, how far apart they are at least, and which part of each, its last, judges: one in so
-/// many rows.
+/// Segments of every 15 that are not fitted, and how far apart they are at least.
 const TAKEN: usize = 4;
 const APART: usize = 3;
+
+/// Of each of these segments the last rows judge: one in so many, and as many at least, but half at most (convention: an rms of
+/// twelve rows of white noise has a standard error of a fifth).
 const JUDGE_ONE_IN: usize = 4;
+const JUDGE_ROWS: usize = 3;
 
 /// What a row is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -115,11 +119,9 @@ pub fn split(times_s: &[f64], thermometer: &[f64], cared: &[&[f64]]) -> Result<S
         let to = from + stretch.len();
         let number = stretch[0];
         if taken.contains(&(number % SPANS)) && !is_an_end(number, &segment) {
-            let judging = if n >= JUDGED {
-                stretch.len() / JUDGE_ONE_IN
-            } else {
-                0
-            };
+            let length = stretch.len();
+            let judging = (length / JUDGE_ONE_IN).max(JUDGE_ROWS).min(length / 2);
+            let judging = if n >= JUDGED { judging } else { 0 };
             roles[from..to - judging].fill(Role::Choose);
             roles[to - judging..to].fill(Role::Judge);
         }
