@@ -75,7 +75,7 @@ fn each_mistake_has_its_warning() {
         ),
         (
             "chamber_degc",
-            |k| 223.15 + k,
+            |k| 210.15 + k,
             Some("temperature_in_kelvin"),
         ),
         ("board_degc", |k| 300.0 + k, Some("temperature_in_kelvin")),

@@ -363,7 +363,8 @@ mod tests {
                 }
             }
         }
+        // Few damages move a word across a limit that stops the run.
         let counts = [told, untold, faults];
-        assert!(counts.iter().all(|count| *count > 20), "{counts:?}");
+        assert!(told > 1000 && untold > 1000 && faults > 3, "{counts:?}");
     }
 }
