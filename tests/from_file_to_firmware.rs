@@ -219,7 +219,8 @@ fn a_simulated_run_and_its_own_record_say_why_their_orders_differ() {
         "{own}"
     );
     assert!(
-        again.contains(": order 3 ") && again.contains("for its simulated record `run` takes order 2 instead"),
+        again.contains(": order 3 ")
+            && again.contains("for its simulated record `run` takes order 2 instead"),
         "{again}"
     );
     let floor = |lines: &str| {
