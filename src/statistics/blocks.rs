@@ -12,8 +12,8 @@
 //!    thermometer's range, taken as a whole and on the way up and down, and of which no more than a third of the highest and
 //!    of the lowest readings of any other input are taken (the applied rate among them: a clip shows in few rows); the first
 //!    among equals: the error is about interpolation.
-//! 4. Of these four the first rows choose and the last quarter judges, about 7 % of the rows; of a short record three rows of each,
-//!    or half, so that the error is of eight rows at least, of twelve from 90 rows on.
+//! 4. Of these four the first rows choose and the last quarter judges, about 7 % of the rows; of a stretch of less than
+//!    twelve rows three, or half, so that the error is of eight rows at least, of twelve from 90 rows on.
 //! 5. In a record of fewer than [`JUDGED`] rows, or where none of those that would judge has an output, the rows that choose judge
 //!    too.
 //!
