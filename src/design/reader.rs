@@ -170,10 +170,39 @@ fn syntax(doc: &Doc, e: &toml::de::Error) -> Error {
         "write `key = value` in a line of its own, `[table]` before the keys of a table"
     };
     let offset = e.span().map_or(0, |span| span.start);
-    let help = of_value(doc.text, offset).unwrap_or(help.to_owned());
+    let bracket = ["unclosed", "between array elements"];
+    let open = bracket.iter().any(|word| said.contains(word));
+    let help = Some(doc.text)
+        .filter(|_| open)
+        .and_then(|text| open_bracket(text, offset))
+        .or_else(|| of_value(doc.text, offset))
+        .unwrap_or(help.to_owned());
     doc.error(offset, format!("this is not TOML: {said}"))
         .help(help)
         .into()
+}
+
+/// What to do about a value in brackets that is open at a mistake.
+fn open_bracket(text: &str, offset: usize) -> Option<String> {
+    let before = text.get(..offset)?;
+    let equals = before.rfind('=')?;
+    let value = before[equals + 1..].trim_start();
+    let close = match value.chars().next()? {
+        '[' => ']',
+        '{' => '}',
+        _ => return None,
+    };
+    let line = before[..equals].matches('\n').count() + 1;
+    let key = before[..equals].lines().last().unwrap_or("").trim();
+    Some(match text[offset..].trim().is_empty() {
+        true => format!(
+            "the file ends inside the value of `{key}` that line {line} begins: write its `{close}`, or, if a copy of the file was cut \
+             short, copy it again"
+        ),
+        false => format!(
+            "the value of `{key}` that line {line} begins is still open here: write its `{close}`, and a comma between two elements"
+        ),
+    })
 }
 
 /// What to write instead of the value in the line of a mistake: a decimal comma, a number with its unit, a text without

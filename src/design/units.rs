@@ -273,6 +273,16 @@ pub fn accepted(column: &str) -> String {
     names.join(", ")
 }
 
+/// The unit that one of `seen` is, where `seen` was found in values that were converted from `taken`. `None`: none that is known.
+pub fn product(taken: Unit, seen: Unit) -> Option<&'static str> {
+    let times = taken.times * seen.times;
+    let is_scale = taken.plus == 0.0 && seen.plus == 0.0 && taken.of == seen.of;
+    let mut units = UNITS.iter().filter(|u| is_scale && u.2 == taken.of && u.4 == 0.0);
+    units
+        .find(|u| (u.3 / times - 1.0).abs() < 1e-9)
+        .map(|u| u.1)
+}
+
 /// The unit that a file's column states for a quantity: in brackets behind its name, or as the end of it. `None`: it
 /// states none. A letter alone counts where it can be meant.
 pub fn stated(file_name: &str, column: &str) -> Option<Unit> {

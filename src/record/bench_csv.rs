@@ -309,20 +309,24 @@ const MARKS: [&str; 12] = [
     "nan",
 ];
 
+/// Whether a cell says that the instrument has no number.
+pub(super) fn is_mark(cell: &str) -> bool {
+    let bare = cell
+        .trim_start_matches(['+', '-', '<', '>'])
+        .to_lowercase();
+    MARKS.contains(&bare.as_str())
+}
+
 /// The first of the rows right before the first whole one whose cells are marks of an overload and numbers alone; its
 /// first mark.
 fn overloaded_row(before: &[&str], separator: u8, width: usize) -> Option<(usize, String)> {
-    let is_mark = |c: &String| {
-        let bare = c.trim_start_matches(['+', '-', '<', '>']).to_lowercase();
-        MARKS.contains(&bare.as_str())
-    };
     let mark = |line: &&str| {
         let cells = cells(line, separator);
         let is_row = cells.len() == width
             && cells
                 .iter()
                 .all(|c| is_mark(c) || number(c, separator).is_some());
-        cells.into_iter().find(is_mark).filter(|_| is_row)
+        cells.into_iter().find(|c| is_mark(c)).filter(|_| is_row)
     };
     let rows = before.iter().enumerate().rev();
     let marked = rows.map_while(|(k, line)| Some((k, mark(line)?)));

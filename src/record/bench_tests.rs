@@ -293,6 +293,27 @@ fn marks_of_an_overload_are_no_names() {
     }
 }
 
+#[test]
+fn no_sample_in_the_middle_is_said_to_be_left_out() {
+    let marked = "drive_code,sense_code\n1,2\nOVL,3\n5,6\n".to_owned();
+    let volts = format!("TIME,CH1,CH2\n{}0.5,OVL,1\n1.0,2,3\n", table(",", 1.0));
+    let keys = "drive_column = 1\nsense_column = 2\nvolts_per_code = 1.0\n";
+    for text in [marked, volts] {
+        let (_, error) = csv(text).beside("capture.toml", keys).rows(Q15, 9999);
+        let told = error.expect("an overload is no code").to_string();
+        assert!(told.contains("overloaded here"), "{told}");
+        assert!(told.contains("none in the middle can be left out"), "{told}");
+    }
+    // Only a last row that was cut short can be taken away.
+    for (end, cut) in [("", true), ("\n", false)] {
+        let text = format!("drive_code,sense_code\n1,2\n3{end}");
+        let (_, error) = csv(text).rows(Q15, 9999);
+        let told = error.expect("a cell is missing").to_string();
+        assert_eq!(told.contains("the file ends here"), cut, "{told}");
+        assert_eq!(told.contains("take it away"), cut, "{told}");
+    }
+}
+
 fn interleaved(item: fn(i32) -> Vec<u8>, channels: usize) -> Vec<u8> {
     let row = |(d, s): &(i32, i32)| {
         let other = (2..channels).map(|k| item(k as i32 * 11));

@@ -267,7 +267,18 @@ fn broken_records_are_refused_with_their_place() {
             with_row(19, "19,0."),
             plain.clone(),
             Some((21, 6)),
-            &["2 cells"],
+            &["2 cells", "an empty cell still needs its comma"],
+        ),
+        (
+            "a file that ends in the middle of a row",
+            {
+                let mut text = with_row(19, "19");
+                text.pop();
+                text
+            },
+            plain.clone(),
+            Some((21, 3)),
+            &["1 cell, and", "the file ends in the middle of this row"],
         ),
         (
             "a comment among the rows",

@@ -176,9 +176,13 @@ impl CsvSource {
                 number,
                 bytes,
             };
-            let [d, s] = match self.bench {
-                None => slow_row(line, self.layout, self.codes)?,
-                Some(bench) => bench_row(line, self.layout, self.codes, bench)?,
+            let codes = match self.bench {
+                None => slow_row(line, self.layout, self.codes),
+                Some(bench) => bench_row(line, self.layout, self.codes, bench),
+            };
+            let [d, s] = match codes {
+                Err(Error::Input(e)) if self.lines.is_unfinished() => return Err(e.help(CUT_HELP).into()),
+                codes => codes?,
             };
             drive.push(d);
             sense.push(s);
@@ -305,7 +309,7 @@ fn slow_row(line: Line<'_>, layout: Layout, codes: Codes) -> Result<[i32; 2]> {
                     layout.cells
                 ),
             )
-            .help("every row has as many cells as the header; repair the row or take it away")
+            .help(format!("every row has as many cells as the header; {ROW_HELP}"))
             .into());
     }
     problem.map_or(Ok(found), Err)
@@ -316,7 +320,6 @@ fn slow_row(line: Line<'_>, layout: Layout, codes: Codes) -> Result<[i32; 2]> {
 fn bench_row(line: Line<'_>, layout: Layout, codes: Codes, bench: Bench) -> Result<[i32; 2]> {
     let text = String::from_utf8_lossy(line.bytes);
     let cells = bench_csv::cells(&text, bench.separator);
-    let help = "repair the row or take it away";
     let start = |cell: usize| -> usize {
         let cells = line.bytes.split(|b| *b == bench.separator).take(cell);
         cells.map(|c| c.len() + 1).sum()
@@ -327,7 +330,7 @@ fn bench_row(line: Line<'_>, layout: Layout, codes: Codes, bench: Bench) -> Resu
             cells.len(),
             layout.cells
         );
-        return Err(line.refuse(start(layout.cells), &message).help(help).into());
+        return Err(line.refuse(start(layout.cells), &message).help(ROW_HELP).into());
     }
     let mut found = [0; 2];
     for ((out, column), name) in found.iter_mut().zip(layout.used).zip(COLUMNS) {
@@ -335,10 +338,7 @@ fn bench_row(line: Line<'_>, layout: Layout, codes: Codes, bench: Bench) -> Resu
         let shown = shorten(cell.as_bytes());
         let refuse = |message: &str| line.refuse(start(column).min(line.bytes.len()), message);
         let Some(value) = bench_csv::number(cell, bench.separator) else {
-            let message = match cell.is_empty() {
-                true => format!("the cell of the {name} is empty"),
-                false => format!("`{shown}` of the {name} is no finite number"),
-            };
+            let (message, help) = no_reading(cell, name, "finite number");
             return Err(refuse(&message).help(help).into());
         };
         let code = match bench.scale {
@@ -363,6 +363,31 @@ fn bench_row(line: Line<'_>, layout: Layout, codes: Codes, bench: Bench) -> Resu
     Ok(found)
 }
 
+/// Remedy for a row of a capture that cannot be read.
+const ROW_HELP: &str = "repair the row. The rows are samples at one rate, so that none in the middle can be left out: else use the \
+                        part before it, or the part behind it, as a capture of its own";
+
+/// A cell that holds no `wanted`: message and remedy.
+fn no_reading(cell: &str, name: &str, wanted: &str) -> (String, String) {
+    if bench_csv::is_mark(cell) {
+        return (
+            format!("{name} is `{cell}`: the instrument was overloaded here, or had no reading"),
+            "capture again with a larger range. The rows are samples at one rate, so that none in the middle can be left out: else \
+             use the part before this row, or the part behind the last such row, as a capture of its own"
+                .to_owned(),
+        );
+    }
+    let message = match cell.is_empty() {
+        true => format!("the cell of {name} is empty"),
+        false => format!("{name} `{cell}` is no {wanted}"),
+    };
+    (message, ROW_HELP.to_owned())
+}
+
+/// Remedy for a last row that cannot be read and lacks the end of its line.
+const CUT_HELP: &str = "the file ends here, in the middle of a line: if copying or recording was cut short, do it again; else repair \
+                        this last row or take it away";
+
 /// Reads one cell that is used; `start` is its byte offset in the line.
 fn read_cell(line: Line<'_>, start: usize, cell: &[u8], name: &str, codes: Codes) -> Result<i32> {
     let lead = cell.iter().take_while(|&&b| is_blank(b)).count();
@@ -370,16 +395,12 @@ fn read_cell(line: Line<'_>, start: usize, cell: &[u8], name: &str, codes: Codes
     let text = cell
         .get(lead..cell.len().saturating_sub(tail))
         .unwrap_or(b"");
-    let help = "a code is a whole number (`-?[0-9]+`); repair the row or take it away";
-    if text.is_empty() {
-        let message = format!("the cell of {name} is empty");
-        return Err(line.refuse(start, &message).help(help).into());
-    }
     let shown = shorten(text);
     let digits = text.strip_prefix(b"-").unwrap_or(text);
     if digits.is_empty() || !digits.iter().all(u8::is_ascii_digit) {
-        let message = format!("{name} `{shown}` is no integer");
-        return Err(line.refuse(start + lead, &message).help(help).into());
+        let (message, help) = no_reading(&shown, name, "integer (`-?[0-9]+`)");
+        let at = if text.is_empty() { start } else { start + lead };
+        return Err(line.refuse(at, &message).help(help).into());
     }
     let size = digits.iter().fold(0i64, |v, b| {
         v.saturating_mul(10).saturating_add(i64::from(b - b'0'))

@@ -49,6 +49,8 @@ pub(super) struct Lines {
     /// 1-based number of the line at `start`.
     pub(super) number: usize,
     ended: bool,
+    /// The file's last byte is no line's end, as where copying or recording was cut short.
+    unfinished: bool,
 }
 
 impl Lines {
@@ -63,7 +65,13 @@ impl Lines {
             filled: 0,
             number: 1,
             ended: false,
+            unfinished: false,
         }
+    }
+
+    /// True if the line taken last is the file's last one and has no end.
+    pub(super) fn is_unfinished(&self) -> bool {
+        self.unfinished && self.start == self.whole
     }
 
     /// The lines at hand, read from the file if there are none; empty = the end. The last line
@@ -93,10 +101,7 @@ impl Lines {
             if count == 0 {
                 self.ended = true;
                 if self.filled > self.whole {
-                    self.buffer.truncate(self.filled);
-                    self.buffer.push(b'\n');
-                    self.filled += 1;
-                    self.whole = self.filled;
+                    self.finish();
                 }
             } else if let Some(last) = self.buffer[fresh.clone()].iter().rposition(|&b| b == b'\n')
             {
@@ -128,6 +133,15 @@ impl Lines {
         Ok(Some(line.strip_suffix(b"\r").unwrap_or(line)))
     }
 
+    /// Gives the last line the end that it lacks.
+    fn finish(&mut self) {
+        self.buffer.truncate(self.filled);
+        self.buffer.push(b'\n');
+        self.filled += 1;
+        self.whole = self.filled;
+        self.unfinished = true;
+    }
+
     fn refill(&mut self) -> Result<()> {
         self.buffer.copy_within(self.whole..self.filled, 0);
         self.filled -= self.whole;
@@ -153,10 +167,7 @@ impl Lines {
             if count == 0 {
                 self.ended = true;
                 if self.filled > 0 {
-                    self.buffer.truncate(self.filled);
-                    self.buffer.push(b'\n');
-                    self.filled += 1;
-                    self.whole = self.filled;
+                    self.finish();
                 }
             } else if let Some(last) = self.buffer[fresh.clone()].iter().rposition(|&b| b == b'\n')
             {

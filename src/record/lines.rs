@@ -40,6 +40,11 @@ impl<'a> Lines<'a> {
         self.text.bytes().filter(|b| *b == ending).count() + 1
     }
 
+    /// True for the last line of a text that does not end with the end of a line.
+    pub(super) fn is_cut(self, line: Line<'_>) -> bool {
+        !self.text.ends_with(self.ending) && line.number == self.count()
+    }
+
     fn all(self) -> impl Iterator<Item = Line<'a>> {
         let path = self.path;
         let lines = self.text.split(self.ending).enumerate();

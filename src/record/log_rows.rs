@@ -358,6 +358,7 @@ fn made(
         columns: BTreeMap::new(),
         lines: (1..=rows.len()).collect(),
         renamed: BTreeMap::new(),
+        units: BTreeMap::new(),
     };
     for (column, channel) in columns {
         let Some(channel) = *channel else { continue };

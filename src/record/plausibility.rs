@@ -87,7 +87,7 @@ fn phase(c: &Column<'_>) -> Option<Warning> {
     let steps = c.values.windows(2).map(|w| (w[1] - w[0]).abs());
     let wraps = steps.filter(|d| (*d - TAU).abs() < 0.25 * TAU).count();
     let span = c.quantile(0.95) - c.quantile(0.05);
-    let said = |unit: &str| {
+    let said = |unit: &'static str| {
         format!(
             "If it is, say so: {}",
             c.record.unit_in_design("phase_rad", unit)

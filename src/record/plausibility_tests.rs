@@ -176,3 +176,24 @@ fn the_applied_rate_shows_sign_and_unit() {
     let found = codes(header, |k| format!("{k},{},{}", k * 10.0, wiggle(k)));
     assert!(found.is_empty(), "{found:?}");
 }
+
+#[test]
+fn a_remedy_is_not_what_stands_there_already() {
+    let rows: Vec<String> = (0..40)
+        .map(|k| format!("{},{}", f64::from(k) * 1e6, wiggle(f64::from(k))))
+        .collect();
+    let text = format!("t,rate_out_dps\n{}\n", rows.join("\n"));
+    let mapping = RecordMapping {
+        columns: [("time_s".to_owned(), "t".to_owned())].into(),
+        units: [("time_s".to_owned(), "ms".to_owned())].into(),
+        ..RecordMapping::default()
+    };
+    let (_, warnings) = parse(text.as_bytes(), Path::new("r.csv"), &mapping).unwrap();
+    let told = &warnings
+        .iter()
+        .find(|w| w.code == "time_step_implausible")
+        .expect("a row every 1000 s")
+        .message;
+    assert!(told.contains("looks like us"), "{told}");
+    assert!(told.contains("unit = \"us\""), "{told}");
+}

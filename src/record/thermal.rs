@@ -129,7 +129,7 @@ fn parse_text(
             .into());
     }
     let roles = columns::resolve(header, mapping).map_err(|e| commented(e, header, before))?;
-    let (values, rows) = cells(lines, &roles, source.count())?;
+    let (values, rows) = cells(lines, &roles, source)?;
     if rows.is_empty() {
         return Err(header
             .error(
@@ -148,6 +148,7 @@ fn parse_text(
         columns: BTreeMap::new(),
         lines: rows,
         renamed: BTreeMap::new(),
+        units: roles.units.iter().cloned().collect(),
     };
     for ((file_name, names), column) in roles.columns.iter().zip(values) {
         let Some(column) = column else { continue };
@@ -257,8 +258,9 @@ fn decode<'a>(bytes: &'a [u8], path: &Path) -> Result<&'a str> {
 fn cells<'a>(
     lines: impl Iterator<Item = Line<'a>>,
     roles: &Roles,
-    expected: usize,
+    source: Lines<'_>,
 ) -> Result<(Vec<ReadColumn>, Vec<usize>)> {
+    let expected = source.count();
     let mut columns: Vec<ReadColumn> = (0..roles.columns.len())
         .map(|_| ReadColumn {
             values: Vec::with_capacity(expected),
@@ -268,7 +270,7 @@ fn cells<'a>(
     let mut rows = Vec::with_capacity(expected);
     for line in lines {
         if !plain_numbers(line.text, &mut columns, rows.len()) {
-            any_cells(line, roles, &mut columns)?;
+            any_cells(line, roles, &mut columns, source)?;
         }
         rows.push(line.number);
     }
@@ -308,7 +310,7 @@ fn plain_numbers(text: &str, columns: &mut [ReadColumn], rows: usize) -> bool {
 }
 
 /// Reads any row, and refuses it with the place of what is wrong.
-fn any_cells(line: Line<'_>, roles: &Roles, columns: &mut [ReadColumn]) -> Result<()> {
+fn any_cells(line: Line<'_>, roles: &Roles, columns: &mut [ReadColumn], source: Lines<'_>) -> Result<()> {
     let is_first = columns.iter().all(|c| c.values.is_empty());
     if line.text.trim_start().starts_with('#') {
         return Err(line
@@ -339,7 +341,7 @@ fn any_cells(line: Line<'_>, roles: &Roles, columns: &mut [ReadColumn]) -> Resul
             .into());
     }
     if cells.len() != roles.columns.len() {
-        return Err(wrong_width(&line, &cells, roles).into());
+        return Err(wrong_width(&line, &cells, roles, source).into());
     }
     for ((cell, column), (name, names)) in cells.iter().zip(columns).zip(&roles.columns) {
         let value = cells::number(&cell.text).unwrap_or_else(|why| {
@@ -415,12 +417,23 @@ fn usable(read: Vec<ReadColumn>, first: Line<'_>, roles: &Roles) -> Result<(Valu
 }
 
 /// A row whose number of cells is not the header's.
-fn wrong_width(line: &Line<'_>, cells: &[cells::Cell<'_>], roles: &Roles) -> InputError {
+fn wrong_width(
+    line: &Line<'_>,
+    cells: &[cells::Cell<'_>],
+    roles: &Roles,
+    source: Lines<'_>,
+) -> InputError {
     let width = roles.columns.len();
     let (column, help) = match cells.get(width) {
         Some(extra) => (
             extra.column,
             "remove what is too much; if it is a decimal comma, export with decimal points"
+                .to_owned(),
+        ),
+        None if source.is_cut(*line) => (
+            line.text.chars().count() + 1,
+            "the file ends in the middle of this row: if copying or recording was cut short, do it again; else repair the row or take \
+             it away"
                 .to_owned(),
         ),
         None => (
@@ -433,7 +446,11 @@ fn wrong_width(line: &Line<'_>, cells: &[cells::Cell<'_>], roles: &Roles) -> Inp
     };
     line.error(
         column,
-        format!("{} cells, and the header has {width}", cells.len()),
+        format!(
+            "{} cell{}, and the header has {width}",
+            cells.len(),
+            if cells.len() == 1 { "" } else { "s" }
+        ),
         help,
     )
 }

@@ -1,7 +1,8 @@
 //! A thermal record: rows of averaged readings.
 
 use super::warning::Warning;
-use crate::design::{record_columns, units};
+use crate::design::record_columns;
+use crate::design::units::{self, Unit};
 use crate::statistics::stats;
 use crate::text::number;
 use std::collections::BTreeMap;
@@ -22,6 +23,8 @@ pub struct ThermalRecord {
     pub lines: Vec<usize>,
     /// Contract name -> column of the file, where they differ.
     pub renamed: BTreeMap<String, String>,
+    /// Contract name -> the unit that the file has the column in, where it is another one than the name's.
+    pub units: BTreeMap<String, Unit>,
 }
 
 impl ThermalRecord {
@@ -75,9 +78,21 @@ impl ThermalRecord {
         self.time_s.len()
     }
 
-    /// How a column's unit is said in the design, with the file's own name of the column.
-    pub(super) fn unit_in_design(&self, column: &str, unit: &str) -> String {
+    /// The file's unit of a column whose values, as they were understood, look like `unit`. `None`: none that is known.
+    pub(super) fn unit_in_file(&self, column: &str, unit: &'static str) -> Option<&'static str> {
+        match self.units.get(column) {
+            None => Some(unit),
+            Some(taken) => units::product(*taken, units::parse(unit)?),
+        }
+    }
+
+    /// How a column's unit is said in the design, with the file's own name of the column; `unit` as in [`Self::unit_in_file`].
+    pub(super) fn unit_in_design(&self, column: &str, unit: &'static str) -> String {
         let named = self.renamed.get(column).map_or(column, String::as_str);
+        let Some(unit) = self.unit_in_file(column, unit) else {
+            let taken = self.units.get(column).map_or("", |u| u.name);
+            return format!("column {named} is taken as {taken}: correct that in [record.columns] or in its name");
+        };
         match units::stated(named, column) {
             // Two statements that contradict each other are refused.
             Some(said) if said.name != unit => format!(

@@ -55,6 +55,11 @@ fn too_long(record: &ThermalRecord, lasts_s: f64) -> Option<Warning> {
     let thousands = step >= 1000.0 && record.time_s.iter().all(|t| t % 1000.0 == 0.0);
     (step > 3600.0 || days > 5.0 || thousands).then(|| {
         let (unit, name, per_s) = likely(step);
+        // What looks like milliseconds after milliseconds were taken off is microseconds.
+        let name = match record.unit_in_file("time_s", unit) {
+            Some(own) if own != unit => own,
+            _ => name,
+        };
         Warning::on(
             "time_step_implausible",
             "time_s",

@@ -82,6 +82,7 @@ impl Scene {
             columns,
             lines: (2..self.len() + 2).collect(),
             renamed: Default::default(),
+            units: Default::default(),
         }
     }
 

@@ -61,6 +61,7 @@ pub(crate) fn record(thermometer: &str, t: &[f64], rate: &[f64]) -> ThermalRecor
         columns,
         lines: (2..t.len() + 2).collect(),
         renamed: BTreeMap::new(),
+        units: BTreeMap::new(),
     }
 }
 
