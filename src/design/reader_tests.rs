@@ -300,9 +300,18 @@ fn a_bracket_that_stays_open_is_named_with_its_line() {
     let cut = "[study]\nwords = [\"a\",\n  \"b\"";
     let going_on = "[study]\nwords = [\"a\",\n  \"b\"\n\n[fit]\norder = 2\n";
     for (text, says) in [
-        (cut, "the file ends inside the value of `words` that line 2 begins: write its `]`"),
-        ("x = { a = 1, b", "the file ends inside the value of `x` that line 1 begins: write its `}`"),
-        (going_on, "the value of `words` that line 2 begins is still open here: write its `]`"),
+        (
+            cut,
+            "the file ends inside the value of `words` that line 2 begins: write its `]`",
+        ),
+        (
+            "x = { a = 1, b",
+            "the file ends inside the value of `x` that line 1 begins: write its `}`",
+        ),
+        (
+            going_on,
+            "the value of `words` that line 2 begins is still open here: write its `]`",
+        ),
     ] {
         let e = parse(text, None).unwrap_err().to_string();
         assert!(e.contains(says), "{e}");

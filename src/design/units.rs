@@ -277,7 +277,9 @@ pub fn accepted(column: &str) -> String {
 pub fn product(taken: Unit, seen: Unit) -> Option<&'static str> {
     let times = taken.times * seen.times;
     let is_scale = taken.plus == 0.0 && seen.plus == 0.0 && taken.of == seen.of;
-    let mut units = UNITS.iter().filter(|u| is_scale && u.2 == taken.of && u.4 == 0.0);
+    let mut units = UNITS
+        .iter()
+        .filter(|u| is_scale && u.2 == taken.of && u.4 == 0.0);
     units
         .find(|u| (u.3 / times - 1.0).abs() < 1e-9)
         .map(|u| u.1)

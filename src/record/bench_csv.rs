@@ -311,9 +311,7 @@ const MARKS: [&str; 12] = [
 
 /// Whether a cell says that the instrument has no number.
 pub(super) fn is_mark(cell: &str) -> bool {
-    let bare = cell
-        .trim_start_matches(['+', '-', '<', '>'])
-        .to_lowercase();
+    let bare = cell.trim_start_matches(['+', '-', '<', '>']).to_lowercase();
     MARKS.contains(&bare.as_str())
 }
 

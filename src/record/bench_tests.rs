@@ -302,7 +302,10 @@ fn no_sample_in_the_middle_is_said_to_be_left_out() {
         let (_, error) = csv(text).beside("capture.toml", keys).rows(Q15, 9999);
         let told = error.expect("an overload is no code").to_string();
         assert!(told.contains("overloaded here"), "{told}");
-        assert!(told.contains("none in the middle can be left out"), "{told}");
+        assert!(
+            told.contains("none in the middle can be left out"),
+            "{told}"
+        );
     }
     // Only a last row that was cut short can be taken away.
     for (end, cut) in [("", true), ("\n", false)] {

@@ -181,7 +181,9 @@ impl CsvSource {
                 Some(bench) => bench_row(line, self.layout, self.codes, bench),
             };
             let [d, s] = match codes {
-                Err(Error::Input(e)) if self.lines.is_unfinished() => return Err(e.help(CUT_HELP).into()),
+                Err(Error::Input(e)) if self.lines.is_unfinished() => {
+                    return Err(e.help(CUT_HELP).into());
+                }
                 codes => codes?,
             };
             drive.push(d);
@@ -309,7 +311,9 @@ fn slow_row(line: Line<'_>, layout: Layout, codes: Codes) -> Result<[i32; 2]> {
                     layout.cells
                 ),
             )
-            .help(format!("every row has as many cells as the header; {ROW_HELP}"))
+            .help(format!(
+                "every row has as many cells as the header; {ROW_HELP}"
+            ))
             .into());
     }
     problem.map_or(Ok(found), Err)
@@ -330,7 +334,10 @@ fn bench_row(line: Line<'_>, layout: Layout, codes: Codes, bench: Bench) -> Resu
             cells.len(),
             layout.cells
         );
-        return Err(line.refuse(start(layout.cells), &message).help(ROW_HELP).into());
+        return Err(line
+            .refuse(start(layout.cells), &message)
+            .help(ROW_HELP)
+            .into());
     }
     let mut found = [0; 2];
     for ((out, column), name) in found.iter_mut().zip(layout.used).zip(COLUMNS) {

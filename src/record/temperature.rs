@@ -60,7 +60,8 @@ pub(super) fn refuse(
 pub(super) fn temperature(c: &Column<'_>) -> Option<Warning> {
     let name = c.name;
     let range = format!("{:.2} to {:.2}", c.min(), c.max());
-    let said = |unit: &'static str| format!("If it is, say so: {}", c.record.unit_in_design(name, unit));
+    let said =
+        |unit: &'static str| format!("If it is, say so: {}", c.record.unit_in_design(name, unit));
     if (200.0..=450.0).contains(&c.median()) && c.quantile(0.05) > 150.0 {
         return c.warn(
             "temperature_in_kelvin",

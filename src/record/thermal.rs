@@ -310,7 +310,12 @@ fn plain_numbers(text: &str, columns: &mut [ReadColumn], rows: usize) -> bool {
 }
 
 /// Reads any row, and refuses it with the place of what is wrong.
-fn any_cells(line: Line<'_>, roles: &Roles, columns: &mut [ReadColumn], source: Lines<'_>) -> Result<()> {
+fn any_cells(
+    line: Line<'_>,
+    roles: &Roles,
+    columns: &mut [ReadColumn],
+    source: Lines<'_>,
+) -> Result<()> {
     let is_first = columns.iter().all(|c| c.values.is_empty());
     if line.text.trim_start().starts_with('#') {
         return Err(line

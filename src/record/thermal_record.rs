@@ -91,7 +91,9 @@ impl ThermalRecord {
         let named = self.renamed.get(column).map_or(column, String::as_str);
         let Some(unit) = self.unit_in_file(column, unit) else {
             let taken = self.units.get(column).map_or("", |u| u.name);
-            return format!("column {named} is taken as {taken}: correct that in [record.columns] or in its name");
+            return format!(
+                "column {named} is taken as {taken}: correct that in [record.columns] or in its name"
+            );
         };
         match units::stated(named, column) {
             // Two statements that contradict each other are refused.

@@ -30,6 +30,11 @@ fn of_bias(share: f64) -> Curve {
 /// Four heatings; `late` is a part of the bias that follows a temperature which lags; noise of 0.01 deg/s, no power
 /// in these rows.
 fn closed(late: Curve, without_power: &[Range<usize>]) -> Closed {
+    closed_read(late, without_power, 0.0)
+}
+
+/// The same, by a thermometer with noise.
+fn closed_read(late: Curve, without_power: &[Range<usize>], noise_degc: f64) -> Closed {
     let mut random = Random::new(8);
     let degc: Vec<f64> = [triangle(ROWS / 4), triangle(ROWS / 4)].concat().repeat(2);
     let time_s: Vec<f64> = (0..ROWS).map(|k| k as f64).collect();
@@ -39,7 +44,11 @@ fn closed(late: Curve, without_power: &[Range<usize>]) -> Closed {
         .zip(&behind)
         .map(|(t, l)| at(BIAS, *t) + at(late, *t) - at(late, *l) + 0.01 * random.normal())
         .collect();
-    let mut record = synthetic::record("die_degc", &degc, &output);
+    let read: Vec<f64> = degc
+        .iter()
+        .map(|t| t + noise_degc * random.normal())
+        .collect();
+    let mut record = synthetic::record("die_degc", &read, &output);
     if !without_power.is_empty() {
         let on = |k: usize| {
             let ends = without_power.iter().map(|off| off.end);
@@ -118,6 +127,17 @@ fn what_lags_in_proportion_has_no_curvature() {
             "{step:?}"
         );
         assert!(firmware_over_float(&closed) < 1.02);
+    }
+}
+
+#[test]
+fn a_second_lag_is_worth_its_delay_only_where_the_thermometers_noise_shows() {
+    // 0.057 deg/s per K beside 0.01 deg/s of noise.
+    for (noise_degc, lags_due) in [(0.01, 1), (0.3, 2)] {
+        let closed = closed_read([0.0, -2.0, 0.0], &[], noise_degc);
+        only(&closed);
+        assert_eq!(lags(&closed).len(), lags_due, "{noise_degc}");
+        assert!(firmware_over_float(&closed) < 1.1);
     }
 }
 

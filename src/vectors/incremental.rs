@@ -2,18 +2,9 @@
 //! nothing else. A search for vectors asks this for each damage at some thousand vectors.
 
 use super::damage::Damage;
-use super::interpreter::{Evaluated, Interpreter, Spare};
+use super::interpreter::{Evaluated, Interpreter, Spare, Step};
 use crate::numeric::trace::ir::{Function, Id, Op};
-use std::cell::RefCell;
-
-/// What is evaluated together.
-#[derive(Debug, Clone, Copy)]
-enum Step {
-    /// A node outside of loops.
-    Node(Id),
-    /// A loop.
-    Loop(usize),
-}
+use std::cell::{OnceCell, RefCell};
 
 /// What depends on one operation.
 #[derive(Debug)]
@@ -37,6 +28,8 @@ pub(super) struct Caller<'a> {
     operands: Vec<Vec<Id>>,
     /// By node: an output, or what the state keeps.
     is_kept: Vec<bool>,
+    /// By node: what its value depends on, in the order of evaluation.
+    needs: Vec<OnceCell<Vec<Step>>>,
     memory: RefCell<Memory>,
 }
 
@@ -73,6 +66,7 @@ impl<'a> Caller<'a> {
                 .map(|id| function.operands(id))
                 .collect(),
             is_kept,
+            needs: vec![OnceCell::new(); function.nodes.len()],
             memory: RefCell::default(),
         }
     }
@@ -88,8 +82,57 @@ impl<'a> Caller<'a> {
         let Memory { call, spare, .. } = &mut *self.memory.borrow_mut();
         call.start(state, self.function.nodes.len());
         let mut run = self.program.run(self.number, None, inputs, call, spare);
-        run.up_to(node + 1);
+        self.needs(node).iter().for_each(|step| run.take(*step));
         call.values[node]
+    }
+
+    /// What a node's value depends on, itself included.
+    fn needs(&self, node: Id) -> &[Step] {
+        self.needs[node].get_or_init(|| self.sought(node))
+    }
+
+    /// The same, by following operands backwards.
+    fn sought(&self, node: Id) -> Vec<Step> {
+        let mut needed = vec![false; self.function.nodes.len()];
+        needed[node] = true;
+        let mut needed_loops = vec![false; self.function.loops.len()];
+        let mut loops = self.function.loops.iter().enumerate().rev().peekable();
+        let mut steps = Vec::new();
+        let mut end = self.function.nodes.len();
+        while end > 0 {
+            if let Some((number, l)) = loops.next_if(|(_, l)| l.end == end) {
+                end = l.start;
+                let mut body = l.start..l.end;
+                if needed_loops[number] || body.any(|id| needed[id]) {
+                    let operands = (l.start..l.end).flat_map(|id| &self.operands[id]);
+                    operands.chain(&l.inits).for_each(|id| needed[*id] = true);
+                    steps.push(Step::Loop(number));
+                }
+                continue;
+            }
+            end -= 1;
+            let op = &self.function.nodes[end].op;
+            // Calls that work on the same words count all.
+            let is_shared = self.shares_state && end < node && matches!(op, Op::Call(_));
+            if !needed[end] && !is_shared {
+                continue;
+            }
+            match *op {
+                // A loop or a call puts its value there.
+                Op::LoopOut(number, _) => needed_loops[number] = true,
+                Op::CallOut(call, _) => {
+                    let is_made = |op: &Op| matches!(op, Op::Call(c) if *c == call);
+                    let made = self.nodes().filter(|(_, op)| is_made(op));
+                    made.for_each(|(id, _)| needed[id] = true);
+                }
+                _ => {
+                    self.operands[end].iter().for_each(|id| needed[*id] = true);
+                    steps.push(Step::Node(end));
+                }
+            }
+        }
+        steps.reverse();
+        steps
     }
 
     /// A call without damage.
@@ -281,12 +324,7 @@ impl<'a> Caller<'a> {
         let mut run = self
             .program
             .run(self.number, Some(damage), inputs, after, spare);
-        for (step, _) in steps {
-            match *step {
-                Step::Node(id) => run.step(id),
-                Step::Loop(number) => run.counted_loop(number),
-            }
-        }
+        steps.iter().for_each(|(step, _)| run.take(*step));
         let seen = look(after, saved);
         for (id, before) in &*saved {
             after.values[*id] = *before;
@@ -338,6 +376,13 @@ mod tests {
                 };
                 let mut vectors: Vec<_> = stimulus::random(&model.inputs, 6, 5).collect();
                 vectors.iter_mut().for_each(|words| model.repair(words));
+                for (words, shares_state) in vectors.iter().flat_map(|v| [(v, false), (v, true)]) {
+                    let mut caller = Caller::new(program, *number);
+                    caller.shares_state |= shares_state;
+                    let all = caller.evaluated(words).values;
+                    let each = (0..all.len()).map(|node| caller.value(words, node));
+                    assert!(each.eq(all.iter().copied()), "{}", model.name);
+                }
                 for (words, shares_state) in vectors.iter().flat_map(|v| [(v, false), (v, true)]) {
                     let mut caller = Caller::new(program, *number);
                     caller.shares_state |= shares_state;

@@ -87,6 +87,15 @@ impl Evaluated {
     }
 }
 
+/// What is evaluated together.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Step {
+    /// A node outside of loops.
+    Node(Id),
+    /// A loop.
+    Loop(usize),
+}
+
 /// Memory that calls leave to the next ones.
 #[derive(Debug, Default)]
 pub(super) struct Spare(Vec<Vec<i128>>);
@@ -300,26 +309,30 @@ impl Run<'_> {
         while id < end {
             match self.function.loops.get(next_loop) {
                 Some(l) if l.start == id => {
-                    self.counted_loop(next_loop);
+                    self.take(Step::Loop(next_loop));
                     id = l.end;
                     next_loop += 1;
                 }
                 _ => {
-                    self.step(id);
+                    self.take(Step::Node(id));
                     id += 1;
                 }
             }
         }
     }
 
-    /// Evaluates a node outside of loops.
-    pub(super) fn step(&mut self, id: Id) {
-        self.at = id;
-        self.node(id);
+    /// Evaluates a step.
+    pub(super) fn take(&mut self, step: Step) {
+        match step {
+            Step::Node(id) => {
+                self.at = id;
+                self.node(id);
+            }
+            Step::Loop(number) => self.counted_loop(number),
+        }
     }
 
-    /// Evaluates a loop.
-    pub(super) fn counted_loop(&mut self, number: usize) {
+    fn counted_loop(&mut self, number: usize) {
         let l = &self.function.loops[number];
         self.at = l.start;
         let mut carried = self.spare.take();

@@ -127,18 +127,19 @@ impl Search<'_> {
                         let about = |v: i128| [v - 1, v, v + 1];
                         let shift = cast.shift as u32;
                         let before = chosen.len();
-                        for target in about(0).into_iter().chain(about(half)) {
-                            self.tie(&many, a, shift, target, None, chosen);
+                        let targets = [about(0), about(half)].concat();
+                        let found = self.ties(&many, (a, shift), &targets, None);
+                        for (target, found) in targets.iter().zip(found) {
+                            chosen.extend(found);
                             if matches!(self.function.nodes[a].op, Op::Mul(..)) {
-                                self.tie_of_product(&starts, a, shift, target, chosen);
+                                self.tie_of_product(&starts, a, shift, *target, chosen);
                             }
                         }
                         let first = chosen[before..].to_vec();
                         // What a first rounding drops shows where a later one is at a tie as well.
                         for (earlier, vectors) in &ties {
-                            for target in about(0).into_iter().chain(about(half)) {
-                                self.tie(vectors, a, shift, target, Some(*earlier), chosen);
-                            }
+                            let found = self.ties(vectors, (a, shift), &targets, Some(*earlier));
+                            chosen.extend(found.concat());
                         }
                         ties.push((a, first));
                     }
@@ -148,9 +149,8 @@ impl Search<'_> {
                     let dropped = table.phase_bits - table.address_bits;
                     if (1..=62).contains(&dropped) {
                         let half = half_step(table);
-                        for target in [-half - 1, -half] {
-                            self.tie(&starts, phase, dropped, target, None, chosen);
-                        }
+                        let found = self.ties(&starts, (phase, dropped), &[-half - 1, -half], None);
+                        chosen.extend(found.concat());
                     }
                 }
                 _ => {}
@@ -199,26 +199,26 @@ impl Search<'_> {
         }
     }
 
-    /// Vectors at which the node is `target` modulo 2^bits: one word is moved, along which the node is linear. The
-    /// node `kept`, if any, keeps its value.
-    fn tie(
+    /// For each target, vectors at which the node is it modulo 2^bits: one word is moved, along which the node is linear.
+    /// The node `kept`, if any, keeps its value.
+    fn ties(
         &self,
         starts: &[Vec<i128>],
-        node: Id,
-        bits: u32,
-        target: i128,
+        (node, bits): (Id, u32),
+        targets: &[i128],
         kept: Option<Id>,
-        chosen: &mut Vec<Vec<i128>>,
-    ) {
-        let modulus = 1i128 << bits;
-        let mut found = 0;
+    ) -> Vec<Vec<Vec<i128>>> {
+        let mut found = vec![Vec::new(); targets.len()];
         for (tried, start) in spread(starts).enumerate() {
-            if found > 2 * STARTS || (found > 0 && tried >= SPREAD) {
-                return;
+            let is_open =
+                |found: &Vec<_>| found.len() <= 2 * STARTS && (found.is_empty() || tried < SPREAD);
+            let open: Vec<bool> = found.iter().map(is_open).collect();
+            if !open.contains(&true) {
+                break;
             }
+            let value = self.value(start, node);
+            let kept = kept.map(|id| (id, self.value(start, id)));
             let mut words = start.clone();
-            let values = self.values(&words);
-            let value = values[node];
             for k in 0..words.len() {
                 let range = self.model.inputs[k];
                 let unit = if words[k] < range.high { 1 } else { -1 };
@@ -227,34 +227,24 @@ impl Search<'_> {
                     .value(&words, node)
                     .wrapping_sub(value)
                     .wrapping_mul(unit);
-                words[k] = start[k];
-                let free = slope.trailing_zeros().min(127);
-                let off = target.wrapping_sub(value).rem_euclid(modulus);
-                if slope == 0 || free >= bits || off.trailing_zeros().min(127) < free {
-                    continue;
-                }
-                let period = 1i128 << (bits - free);
-                let step = (off >> free)
-                    .wrapping_mul(inverse(slope >> free))
-                    .rem_euclid(period);
-                let centred = if step > period / 2 {
-                    step - period
-                } else {
-                    step
-                };
-                for step in [centred, centred + period, centred - period] {
-                    words[k] = start[k] + step;
-                    let moved = self.values(&words);
-                    let hits = (moved[node].wrapping_sub(target)).rem_euclid(modulus) == 0
-                        && kept.is_none_or(|id| moved[id] == values[id]);
-                    if hits && self.is_allowed(&words) {
-                        chosen.push(words.clone());
-                        found += 1;
+                let targets = targets.iter().zip(&mut found).zip(&open);
+                for ((target, found), _) in targets.filter(|(_, open)| **open) {
+                    for step in steps_to(*target, value, slope, bits) {
+                        words[k] = start[k] + step;
+                        let hits = || {
+                            let off = self.value(&words, node).wrapping_sub(*target);
+                            off.rem_euclid(1i128 << bits) == 0
+                                && kept.is_none_or(|(id, value)| self.value(&words, id) == value)
+                        };
+                        if self.is_allowed(&words) && hits() {
+                            found.push(words.clone());
+                        }
                     }
                 }
                 words[k] = start[k];
             }
         }
+        found
     }
 
     /// Vectors at which a product with a constant is `target` modulo 2^bits: the other factor is solved for and
@@ -392,6 +382,26 @@ fn half_step(table: &SineTable) -> i128 {
         true => 1 << (dropped - 1),
         false => 0,
     }
+}
+
+/// The steps of a word that bring a value with this slope to the target modulo 2^bits: the shortest, and those of a period
+/// more and less; none where no step does.
+fn steps_to(target: i128, value: i128, slope: i128, bits: u32) -> Vec<i128> {
+    let free = slope.trailing_zeros().min(127);
+    let off = target.wrapping_sub(value).rem_euclid(1i128 << bits);
+    if slope == 0 || free >= bits || off.trailing_zeros().min(127) < free {
+        return Vec::new();
+    }
+    let period = 1i128 << (bits - free);
+    let step = (off >> free)
+        .wrapping_mul(inverse(slope >> free))
+        .rem_euclid(period);
+    let centred = if step > period / 2 {
+        step - period
+    } else {
+        step
+    };
+    vec![centred, centred + period, centred - period]
 }
 
 /// Vectors far from each other first.

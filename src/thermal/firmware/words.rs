@@ -40,8 +40,9 @@ pub struct Words {
     allowed: Vec<String>,
 }
 
-/// Largest rms error of a polynomial that stands for an effect of two channels, of the noise.
-const SURFACE: f64 = 0.1;
+/// Largest rms error with which terms of firmware stand for an effect, of the white noise of a reading (convention: it adds
+/// half a percent to the rms of the output).
+const NEAR: f64 = 0.1;
 
 impl Words {
     pub(super) fn new(c: &Channels, bias: &Bias, noise_dps: f64) -> Self {
@@ -92,6 +93,11 @@ impl Words {
         Some((at, x))
     }
 
+    /// Whether what terms leave of an effect, the sum of its squares over so many rows, is far below the noise.
+    pub fn is_near(&self, left_dps2: f64, rows: usize) -> bool {
+        left_dps2 <= (NEAR * self.noise_dps).powi(2) * rows as f64
+    }
+
     /// Terms for the sum of `columns` times `beta`, a smooth function of a column and of u: the
     /// polynomial in both that fits it over the record's rows; `None` if none does well enough.
     pub fn surface(
@@ -123,7 +129,7 @@ impl Words {
             let basis = Basis::new(&shapes);
             let mut rest = target.clone();
             let z = basis.project_off(&mut rest);
-            if dot(&rest, &rest) > (SURFACE * self.noise_dps).powi(2) * c.len() as f64 {
+            if !self.is_near(dot(&rest, &rest), c.len()) {
                 continue;
             }
             let terms = powers
