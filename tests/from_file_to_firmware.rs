@@ -314,6 +314,22 @@ fn arguments_that_are_nearly_right_are_shown_right() {
         (vec!["check", "-q", "-v"], "leave one of the two out"),
         (vec!["emit"], "add it; `--help`"),
         (
+            vec!["close", "--record", "r.csv", "--lang", "c"],
+            "always write both C and Rust",
+        ),
+        (
+            vec!["close"],
+            "gyrogen close [OPTIONS] [DESIGN] --capture FILE",
+        ),
+        (
+            vec!["replay", "r.csv"],
+            "the one file without an option is the design (TOML)",
+        ),
+        (
+            vec!["replay"],
+            "gyrogen replay [OPTIONS] [DESIGN] --capture FILE --out FILE",
+        ),
+        (
             vec!["verify", "fw", "--digest", "123"],
             "64 hexadecimal digits, and 3 characters were given",
         ),

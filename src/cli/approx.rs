@@ -213,6 +213,10 @@ fn print(o: &Outcome, out: &std::path::Path) {
         let table = alternatives::table(&["certified error"], listed.iter().map(alternative));
         super::terminal::show(&table);
         say!("{}", alternatives::marks());
+        say!(
+            "Certified errors in this table are bounds that are proved quickly. That of the chosen form is proved again below, from more \
+             input codes, and may be smaller."
+        );
     }
     if let Some(search) = &o.search {
         let mut table = super::terminal::table(&[
@@ -228,7 +232,7 @@ fn print(o: &Outcome, out: &std::path::Path) {
         super::terminal::show(&table);
         say!(
             "Ideal evaluation rounds the coefficients alone; whole evaluation rounds every step and the output too, as the emitted \
-             code does."
+             code does, and its error is the largest over the input codes that the search ran. Proved bounds are in the table below."
         );
         say!("{}", taken(search));
     }
@@ -259,20 +263,23 @@ fn print(o: &Outcome, out: &std::path::Path) {
     row(
         "certified",
         o.error.certified_max_abs,
-        "every x of the domain (proved)".to_owned(),
+        "the emitted code, at every x of the domain (proved)".to_owned(),
     );
     let at = o.error.at_input_raw;
     match (o.error.exhaustive_max_abs, o.error.sampled_max_abs) {
         (Some(v), _) => row(
             "observed",
             v,
-            format!("all {} input codes, at input {at}", o.inputs_checked),
+            format!(
+                "the emitted code, on all {} input codes, at input {at}",
+                o.inputs_checked
+            ),
         ),
         (None, Some(v)) => row(
             "observed",
             v,
             format!(
-                "{} of the input codes, at input {at} (`--exhaustive` runs all up to 2^32)",
+                "the emitted code, on {} of the input codes, at input {at} (`--exhaustive` runs all up to 2^32)",
                 o.inputs_checked
             ),
         ),
@@ -281,7 +288,7 @@ fn print(o: &Outcome, out: &std::path::Path) {
     row(
         "of the coefficients alone",
         o.error.coefficients_only_max_abs,
-        "every x, without the rounding of steps and output (proved)".to_owned(),
+        "the polynomial or table with its rounded coefficients, evaluated exactly, at every x (proved)".to_owned(),
     );
     super::terminal::numbers(&mut table, 1..3);
     super::terminal::show(&table);

@@ -8,7 +8,7 @@ use crate::check::remarks::Remark;
 use crate::check::{self, SAMPLES};
 use crate::error::{Error, Result};
 use crate::output::Results;
-use crate::text::number;
+use crate::text::{counted, number};
 use crate::timing;
 use std::path::PathBuf;
 
@@ -77,6 +77,11 @@ fn print(check: &Check) {
     }
     super::terminal::numbers(&mut table, 2..);
     super::terminal::show(&table);
+    for (name, what) in NAMED_BY_KEY {
+        if check.nodes.iter().any(|n| n.name == name) {
+            say!("{name}: {what}");
+        }
+    }
     let open = || {
         let nodes = check.nodes.iter();
         nodes.filter(|n| n.overflow == Overflows::Possible)
@@ -176,14 +181,33 @@ fn print(check: &Check) {
         );
         rest = others;
     }
-    let open = open().count();
-    match (check.holds, open) {
-        (false, _) => say!("does not hold"),
-        (true, 0) => say!("holds"),
-        (true, 1) => say!("holds, with 1 overflow that is not excluded"),
-        (true, _) => say!("holds, with {open} overflows that are not excluded"),
+    say!("{}", verdict(check.holds, open().count()));
+}
+
+/// The verdict; `open` words are not proved to hold every value.
+fn verdict(holds: bool, open: usize) -> String {
+    match (holds, open) {
+        (false, _) => "does not hold".to_owned(),
+        (true, 0) => "holds".to_owned(),
+        (true, _) => {
+            let words = counted(open as u64, "word");
+            let are = if open == 1 { "is" } else { "are" };
+            format!("holds: no overflow occurred, but {words} {are} not proved free of overflow")
+        }
     }
 }
+
+/// Words of the table that are called by a key of the design, and what they are.
+const NAMED_BY_KEY: [(&str, &str); 2] = [
+    (
+        "circuit.cordic.width",
+        "the CORDIC's x and y, over all iterations",
+    ),
+    (
+        "circuit.cordic.gain_bits",
+        "the CORDIC's magnitude, x times a gain constant of gain_bits bits, rounded",
+    ),
+];
 
 fn requirements(check: &Check) {
     if check.requirements.is_empty() {
@@ -247,4 +271,20 @@ fn row(n: &NodeCheck) -> Vec<String> {
         some(line.and_then(|l| l.rate_rms_dps)),
         some(line.and_then(|l| l.rate_mean_dps)),
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::verdict;
+
+    #[test]
+    fn the_verdict_says_what_is_not_proved() {
+        assert_eq!(verdict(true, 0), "holds");
+        assert_eq!(verdict(false, 2), "does not hold");
+        for (open, words) in [(1, "1 word is"), (2, "2 words are")] {
+            let due =
+                format!("holds: no overflow occurred, but {words} not proved free of overflow");
+            assert_eq!(verdict(true, open), due);
+        }
+    }
 }

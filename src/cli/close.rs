@@ -1,5 +1,6 @@
 //! `gyrogen close`: what a measurement says beyond its declared model.
 
+use super::closing::{self, Said};
 use super::recorded::Recorded;
 use super::stages::Stages;
 use super::terminal::OutputFormat;
@@ -17,15 +18,12 @@ use crate::record::{ThermalRecord, Warning};
 use crate::report::closure::Beside;
 use crate::report::design_diff::DesignDiff;
 use crate::selftest::controls::Controls;
-use crate::statistics::blocks::Role;
-use crate::text::number;
 use crate::thermal::close;
 use crate::thermal::close::Closed;
 use crate::thermal::firmware::emitted;
 use crate::thermal::firmware::emitted::{Emitted, Told};
 use crate::thermal::search::{Effort, Method};
 use crate::timing;
-use crate::verdict::{Closure, Verdict};
 use std::path::{Path, PathBuf};
 
 /// Find what a measured record holds beyond the declared bias: a named cause or an honest refusal, and new firmware.
@@ -34,8 +32,13 @@ use std::path::{Path, PathBuf};
 /// consists of. It searches for causes, such as a lag, a step or a mode crossing, and says how sure each one is. Its
 /// firmware takes off bias and causes together, so that it stands in place of that of `run`.
 #[derive(Debug, clap::Args)]
+#[command(
+    override_usage = "gyrogen close [OPTIONS] [DESIGN] --record FILE\n       \
+                            gyrogen close [OPTIONS] [DESIGN] --capture FILE\n       \
+                            gyrogen close [OPTIONS] [DESIGN] --self-test [--record FILE]"
+)]
 pub struct Arguments {
-    /// A measured thermal record (CSV, PX4 ULog, ArduPilot DataFlash).
+    /// A measured thermal record (CSV, PX4 ULog, ArduPilot DataFlash); needed unless --capture or --self-test is given.
     #[arg(long, value_name = "FILE", required_unless_present_any = ["capture", "self_test", "design"])]
     pub(super) record: Option<PathBuf>,
     /// Captured ADC codes in place of a record: CSV, or NPY with its keys in a TOML file beside it.
@@ -205,7 +208,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     results.finish()?;
     match arguments.format {
         OutputFormat::Json => super::terminal::give(&json),
-        OutputFormat::Text => print(
+        OutputFormat::Text => closing::print(
             &closure,
             said.as_ref(),
             compared.as_ref(),
@@ -245,28 +248,6 @@ fn nothing_measured(path: &Path) -> Error {
         .in_file(path)
         .help(help)
         .into()
-}
-
-/// What the terminal says of a record's closing that is not in `closure.json`.
-struct Said {
-    /// What each cause adds to the rate output.
-    equations: Vec<String>,
-    /// Part of the rows that judge, and part that choose.
-    roles: [f64; 2],
-}
-
-impl Said {
-    fn of(closed: &Closed) -> Self {
-        let terms = closed.after.terms.iter();
-        let roles = &closed.split.roles;
-        let share = |role: Role| {
-            roles.iter().filter(|r| **r == role).count() as f64 / roles.len().max(1) as f64
-        };
-        Said {
-            equations: terms.map(|t| t.candidate.equation()).collect(),
-            roles: [Role::Judge, Role::Choose].map(share),
-        }
-    }
 }
 
 /// `closure.json` with what was asked for beside it.
@@ -360,153 +341,4 @@ fn write(
         talk!("{}", diff.sentence());
     }
     Ok(())
-}
-
-fn print(
-    c: &Closure,
-    said: Option<&Said>,
-    compared: Option<&Emitted>,
-    controls: Option<&Controls>,
-    out: &Path,
-) {
-    if !c.steps.is_empty() {
-        // A cause that another effect explains as well is told with its rivals; mostly there are none.
-        let rivals = c.steps.iter().any(|s| !s.indistinguishable_from.is_empty());
-        let mut headers = vec!["cause", "parameters", "held-out rms", "p"];
-        headers.extend(rivals.then_some("explained as well by"));
-        let mut table = super::terminal::table(&headers);
-        for s in &c.steps {
-            let parameters: Vec<String> = s
-                .parameters
-                .iter()
-                .map(|(name, v)| {
-                    let std = s.parameter_std.get(name).copied().unwrap_or(0.0);
-                    format!("{name} = {}", with_deviation(*v, std))
-                })
-                .collect();
-            let mut row = vec![
-                s.effect.clone(),
-                parameters.join("\n"),
-                format!("{:.5}", s.heldout_rms),
-                match s.p_value < NO_CHANCE {
-                    true => "< 1e-12".to_owned(),
-                    false => number(s.p_value, 2),
-                },
-            ];
-            row.extend(rivals.then(|| s.indistinguishable_from.join("\n")));
-            table.add_row(row);
-        }
-        super::terminal::show(&table);
-        if let Some(said) = said {
-            say!(
-                "what a cause adds to rate_out_dps{}:",
-                match c.firmware.compensable {
-                    true => ", and firmware subtracts",
-                    false => "",
-                }
-            );
-            for (step, equation) in c.steps.iter().zip(&said.equations) {
-                say!("  {}: {equation}", step.effect);
-            }
-        }
-    }
-    say!("{}", sentence(c));
-    say!(
-        "held-out rms {:.5} -> {:.5} {}, noise floor {:.5}",
-        c.before.heldout_rms,
-        c.after.heldout_rms,
-        c.unit_text(),
-        c.noise_floor_rms
-    );
-    if let Some(rms) = c.firmware.heldout_rms {
-        say!(
-            "firmware's model, bit for bit{}: held-out rms {rms:.5} {}",
-            if compared.is_some() {
-                ""
-            } else {
-                " (--verify compiles and compares)"
-            },
-            c.unit_text()
-        );
-    } else if c.unit == "deg/s" {
-        say!("firmware cannot carry this: the warnings say why");
-    }
-    say!("{}", held_out(said));
-    if let Some(compared) = compared {
-        super::terminal::show(&super::comparison_table(&compared.functions));
-        say!("emitted C and Rust: {}", compared.sentence());
-    }
-    if let Some(controls) = controls {
-        super::controls::print(controls);
-    }
-    say!("wrote {}", out.display());
-}
-
-/// Which rows the held-out figures are of.
-fn held_out(said: Option<&Said>) -> String {
-    match said {
-        Some(Said { roles, .. }) => {
-            let [judge, choose] = roles.map(|share| format!("{:.0} %", 100.0 * share));
-            let which = match roles[0] > 0.0 {
-                true => format!(
-                    "{judge} of the rows, which neither a fit nor a choice has used (by another {choose} causes were chosen)"
-                ),
-                false => format!(
-                    "{choose} of the rows, which no fit has used; causes were chosen by them"
-                ),
-            };
-            format!(
-                "held out: {which}. `run` predicts each of its blocks in turn, so that its held-out rms is another one."
-            )
-        }
-        None => "held out: a part of the capture that no fit used".to_owned(),
-    }
-}
-
-/// Below it a chance's digits say nothing: the noise's law is not known so far out.
-const NO_CHANCE: f64 = 1e-12;
-
-/// A number with as many places as its standard deviation has at two digits.
-fn with_deviation(value: f64, std: f64) -> String {
-    if !(std > 0.0 && std.is_finite()) {
-        return format!("{value:.4}");
-    }
-    let places = (1.0 - std.log10().floor()).clamp(0.0, 12.0) as usize;
-    format!("{value:.places$} +- {std:.places$}")
-}
-
-/// The verdict in a sentence.
-fn sentence(c: &Closure) -> String {
-    let names: Vec<&str> = c.steps.iter().map(|s| s.effect.as_str()).collect();
-    let channel = c.residual_structure.strongest_channel.as_deref();
-    let channel = channel.map_or(String::new(), |c| format!(", most of it in {c}"));
-    match c.verdict {
-        Verdict::Complete => "complete: nothing beyond noise is left".to_owned(),
-        Verdict::Explained => format!("explained by {}", names.join(", ")),
-        Verdict::PartlyExplained => {
-            format!(
-                "partly explained by {}; structure is left{channel}",
-                names.join(", ")
-            )
-        }
-        Verdict::Unexplained => {
-            format!("unexplained: something is left that none of the known effects makes{channel}")
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::with_deviation;
-
-    #[test]
-    fn a_number_has_the_places_that_its_deviation_has() {
-        assert_eq!(with_deviation(-0.486_91, 0.004_26), "-0.4869 +- 0.0043");
-        assert_eq!(with_deviation(11_062.14, 222.5), "11062 +- 222");
-        assert_eq!(
-            with_deviation(0.001_942_3, 1.3e-6),
-            "0.0019423 +- 0.0000013"
-        );
-        assert_eq!(with_deviation(2.5, 0.0), "2.5000");
-    }
 }

@@ -74,8 +74,8 @@ fn refuse_record(path: &std::path::Path) -> Result<()> {
             let beside = path.with_file_name("design.toml");
             let help = match is_record {
                 true => format!(
-                    "`gyrogen run --record {0}` fits it, `gyrogen close --record {0}` looks for causes; a design is a TOML file, as \
-                     `gyrogen init` writes one",
+                    "`gyrogen run --record {0}` fits it, `gyrogen close --record {0}` looks for causes; captured ADC codes are given \
+                     with `--capture {0}` (`replay`, `equiv`, `close`); a design is a TOML file, as `gyrogen init` writes one",
                     path.display()
                 ),
                 // Of results, which have their design beside them.

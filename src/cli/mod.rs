@@ -12,6 +12,7 @@ mod alternatives;
 mod approx;
 mod check;
 mod close;
+mod closing;
 mod controls;
 mod emit;
 mod equiv;
@@ -200,6 +201,10 @@ fn of_missing(missing: &str) -> &'static str {
     if missing.contains("--profile") {
         return "`--readings` is how many readings are taken of a profile: add `--profile`, or leave `--readings` out";
     }
+    if missing.contains("--capture") {
+        return "give the captured ADC codes with `--capture FILE` and the file for the rows with `--out FILE`; the one file without an \
+                option is the design (TOML), which may be left out";
+    }
     if missing.contains("--record") {
         return "give the measured record with `--record FILE`; `close` takes a capture of ADC codes with `--capture FILE` in its place";
     }
@@ -216,6 +221,9 @@ fn of_unknown_argument(mut error: clap::Error) -> clap::Error {
     let advice = match argument.as_str() {
         "--record" => "records are taken by `run` and `close`",
         "--capture" => "captures are taken by `replay`, `equiv` and `close`",
+        "--lang" => {
+            "`close` and `approx` always write both C and Rust, without an option; `run`, `equiv` and `emit` take `--lang`"
+        }
         // A similar option, if there is one, is named beside this.
         option if option.starts_with('-') => "",
         _ => {

@@ -15,6 +15,7 @@ use std::time::{Duration, Instant};
 
 /// Run captured ADC codes through the circuit: one row of its words for each decimated sample.
 #[derive(Debug, clap::Args)]
+#[command(override_usage = "gyrogen replay [OPTIONS] [DESIGN] --capture FILE --out FILE")]
 pub struct Arguments {
     #[command(flatten)]
     design: super::common::DesignFile,

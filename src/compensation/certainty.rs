@@ -266,8 +266,18 @@ fn farthest(evaluation: &Evaluation, wanted: &Enclosure, end: i128, far: i128) -
         .fold(0.0, f64::max)
 }
 
-/// Sentences for the head of emitted sources and for the terminal.
+/// Sentences for the head of emitted sources.
 pub fn sentences(design: &Design, bounds: &Bounds) -> Vec<String> {
+    sentences_with(design, bounds, None)
+}
+
+/// The same for the terminal and the report; `least_certain`: the reading of the thermometer at which the fitted polynomial has
+/// its largest standard deviation, with its unit.
+pub fn sentences_with(
+    design: &Design,
+    bounds: &Bounds,
+    least_certain: Option<&str>,
+) -> Vec<String> {
     let Some(c) = &design.compensation else {
         return Vec::new();
     };
@@ -309,8 +319,9 @@ pub fn sentences(design: &Design, bounds: &Bounds) -> Vec<String> {
     }
     if let Some(fitted) = &c.fitted {
         lines.push(format!(
-            "Where the fitted polynomial is least certain, its standard deviation is {} deg/s. Rows that the fit has not seen are \
+            "Where the fitted polynomial is least certain{}, its standard deviation is {} deg/s. Rows that the fit has not seen are \
              {} deg/s rms from it.",
+            least_certain.map_or(String::new(), |at| format!(" (at {at})")),
             number(fitted.std_max_dps, 3),
             number(fitted.heldout_rms_dps, 3)
         ));

@@ -1,6 +1,6 @@
 //! The bounds against the bias itself, on random polynomials in random formats.
 
-use super::certainty::{bounds, certainty, sentences};
+use super::certainty::{bounds, certainty, sentences, sentences_with};
 use super::{Evaluation, coefficients};
 use crate::approx::draws::Draws;
 use crate::design::{Design, Fitted, Outside, reader};
@@ -178,6 +178,11 @@ fn a_loop_of_heating_and_cooling_is_told() {
     assert!(!sentences(&design, &found).join(" ").contains("cooling"));
     let fitted = design.compensation.as_mut().and_then(|c| c.fitted.as_mut());
     fitted.unwrap().loop_rms_dps = Some(0.125);
+    let at = sentences_with(&design, &found, Some("85 degC")).join(" ");
+    assert!(
+        at.contains("least certain (at 85 degC), its standard deviation is"),
+        "{at}"
+    );
     let said = sentences(&design, &found).join(" ");
     assert!(
         said.contains("Heating and cooling differ by 0.125 deg/s rms"),

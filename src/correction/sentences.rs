@@ -5,18 +5,16 @@ use super::plan::{Plan, Term, in_words};
 use super::run::Correction;
 use crate::text::{at_most, number};
 
-/// The plan and its words, one line each: how it is called, its inputs, its terms, its bound.
+/// The plan and its words, a line each: how it is called, its inputs, its terms, its bound.
 pub fn facts(correction: &Correction) -> Vec<String> {
     let (plan, formats) = (&correction.plan, &correction.formats);
-    let mut facts = vec![
-        called(plan),
-        format!(
-            "rate {} deg/s in and out, sum of the terms on 2^-{} deg/s, for a noise of {} deg/s rms",
-            formats.rate,
-            formats.sum_fraction_bits,
-            number(formats.noise_dps, 3)
-        ),
-    ];
+    let mut facts = called(plan);
+    facts.push(format!(
+        "rate {} deg/s in and out, sum of the terms on 2^-{} deg/s, for a noise of {} deg/s rms",
+        formats.rate,
+        formats.sum_fraction_bits,
+        number(formats.noise_dps, 3)
+    ));
     let inputs = plan.inputs.iter().zip(&formats.inputs);
     facts.extend(inputs.enumerate().map(|(k, (input, format))| {
         format!(
@@ -38,19 +36,22 @@ pub fn facts(correction: &Correction) -> Vec<String> {
     facts
 }
 
-fn called(plan: &Plan) -> String {
-    let period = format!("one call a reading, every {} s", in_words(plan.period_s));
-    let own = "It was found in readings that are averaged as the rows of the record are: average yours over the same time";
+/// How it is called: which readings it takes, and what to do after a gap.
+fn called(plan: &Plan) -> Vec<String> {
+    let period = in_words(plan.period_s);
+    let mut said = vec![format!(
+        "correction of readings: one call a reading, every {period} s. It was found in a record with one row per {period} s: give it \
+         one reading per {period} s, made as those rows were (averaged over the same time, or taken as it is)"
+    )];
     // Without a memory the number of calls changes nothing.
-    match plan.terms.iter().any(Term::remembers) {
+    said.push(match plan.terms.iter().any(Term::remembers) {
         true => format!(
-            "correction of averaged readings: {period}; after a gap of k periods, k calls with the new words. {own}, for its memory \
-             counts calls"
+            "it has a memory, which counts calls. After a gap of k periods of {period} s call it k times with the new reading: each call \
+             returns a rate, and the last one is the corrected rate of that reading; do not use those before it"
         ),
-        false => format!(
-            "correction of averaged readings: {period}. {own}; it has no memory, so that another number of calls changes nothing"
-        ),
-    }
+        false => "it has no memory: a missing or an extra call changes nothing".to_owned(),
+    });
+    said
 }
 
 /// Which members of the state are worth keeping over a power cycle, if any.
@@ -293,6 +294,9 @@ mod tests {
                 assert!(head.contains(&name(k)), "{} missing in: {head}", name(k));
             }
             let outlast = |t: &Term| t.is_kept() || matches!(t, Term::Step { once: true, .. });
+            let remembers = plan.terms.iter().any(Term::remembers);
+            assert_eq!(head.contains("After a gap of k"), remembers, "{head}");
+            assert_eq!(head.contains("it has no memory"), !remembers, "{head}");
             let told = head.contains("worth keeping over a power cycle");
             assert_eq!(told, plan.terms.iter().any(outlast), "{head}");
             let tables = correction.trace().tables.len();

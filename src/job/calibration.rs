@@ -94,7 +94,7 @@ fn by_record(fit: &BaselineFit, simulated: bool) -> String {
     let given = format!("order {SIMULATED_ORDER} as given");
     match (simulated, fit.reason.strip_prefix(&given)) {
         (true, Some(rest)) if !rest.is_empty() => format!(
-            "order {SIMULATED_ORDER}, as the paper has it for a simulated run{rest}, which `run --record` of this run's record \
+            "order {SIMULATED_ORDER}, as in Chen et al. (2004), for the simulated run{rest}, which `run --record` of this run's record \
              takes (fit.order = \"by_record\")"
         ),
         (false, _) if fit.order != SIMULATED_ORDER as usize => format!(

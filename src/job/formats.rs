@@ -6,7 +6,7 @@ use crate::design::{
     RecordMapping, TuningInput,
 };
 use crate::error::{InputError, Result};
-use crate::numeric::format::{Format, Overflow, Quantizer, Rounding};
+use crate::numeric::format::{Format, Overflow, Quantizer, Rounding, pow2};
 use crate::record::ThermalRecord;
 use crate::text::number;
 use crate::thermal::BaselineFit;
@@ -138,11 +138,13 @@ pub fn fill(design: &mut Design, fit: &BaselineFit, record: &ThermalRecord) -> R
         overflow: Overflow::Saturate,
     };
     said.push(format!(
-        "coefficients {coefficient}: the integer bits hold twice the largest, {largest:.4} deg/s, and the rest of {WORD_BITS} bits are \
-         fraction"
+        "coefficients {coefficient}: {}, so that twice the largest one, 2 * {largest:.4} deg/s, fits; the rest of {WORD_BITS} bits are \
+         fraction",
+        reach(coefficient)
     ));
     said.push(format!(
-        "accumulator {accumulator}: holds twice the sum of all terms, {sum:.4} deg/s"
+        "accumulator {accumulator}: {}, so that twice the sum of the terms' magnitudes, 2 * {sum:.4} deg/s, fits",
+        reach(accumulator)
     ));
     said.push(match is_wide {
         true => format!(
@@ -171,6 +173,12 @@ fn no_finer_than(peak: f64, step: f64, bits: std::ops::RangeInclusive<u32>) -> R
         }
     }
     Ok(format)
+}
+
+/// The range of a signed format in a sentence.
+fn reach(format: Format) -> String {
+    let end = pow2(format.integer_bits as i32 - 1);
+    format!("range +-{end} deg/s, a power of two")
 }
 
 /// True if the formats hold every coefficient of the fit.

@@ -27,7 +27,7 @@ use crate::design::Design;
 use crate::digest::sha256;
 use crate::emit::views::Language;
 use crate::error::Result;
-use crate::record::{self};
+use crate::record::{self, Warning};
 use outcome::Outcome;
 pub use points::{DRIFT_BINS, Point, Points, drift_pp, rms};
 use reading::{clamped_bias, compensation, no_compensation, thermometer_raw, warning};
@@ -63,7 +63,7 @@ pub fn run(
 
     say("fitting the bias polynomial");
     let calibration = calibration::calibrate(&mut design, &record, simulated.is_some())?;
-    warnings.extend(calibration.warnings);
+    Warning::add_of_fit(&mut warnings, calibration.warnings);
     if let Some(run) = &simulated {
         warnings.extend(run.warnings(&design));
     }

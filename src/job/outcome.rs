@@ -277,7 +277,10 @@ impl Outcome {
             word_lengths: parts.word_lengths.clone(),
             budget: parts.budget.clone(),
             certainty_text: {
-                let mut text = certainty::sentences(&parts.design, &parts.certainty.bounds);
+                let least_certain = format!("{} {}", number(fit.least_certain(), 5), fit.unit);
+                let at = (fit.order > 0).then_some(least_certain.as_str());
+                let bounds = &parts.certainty.bounds;
+                let mut text = certainty::sentences_with(&parts.design, bounds, at);
                 text.push(certainty::run_sentence(&parts.design, &parts.certainty));
                 text
             },

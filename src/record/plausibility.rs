@@ -24,7 +24,9 @@ pub(super) fn check(record: &ThermalRecord, warnings: &mut Vec<Warning>) {
         };
         let found = match name.as_str() {
             "phase_rad" => phase(&column),
-            "rate_out_dps" => rate(&column).or_else(|| at_rest(&column)),
+            "rate_out_dps" => rate(&column)
+                .or_else(|| at_rest(&column))
+                .or_else(|| counts(&column)),
             "rate_dps" | "quad_dps" => rate(&column),
             "freq_hz" => frequency(&column),
             "agc" => gain(&column),
@@ -185,8 +187,7 @@ const FULL_SCALES_DPS: [f64; 8] = [125.0, 250.0, 300.0, 450.0, 500.0, 1000.0, 20
 
 /// A gyro at rest shows its bias and its noise alone; both have a size.
 fn at_rest(c: &Column<'_>) -> Option<Warning> {
-    let applied = c.record.column("rate_dps").unwrap_or(&[]);
-    if c.record.is_of_log() || applied.iter().any(|r| !r.is_nan() && *r != 0.0) {
+    if c.record.is_of_log() || has_applied_rate(c.record) {
         return None;
     }
     let middle = c.median();
@@ -236,6 +237,44 @@ fn at_rest(c: &Column<'_>) -> Option<Warning> {
         );
     }
     None
+}
+
+/// Whether the gyro was turned at a rate that the record has.
+fn has_applied_rate(record: &ThermalRecord) -> bool {
+    let applied = record.column("rate_dps").unwrap_or(&[]);
+    applied.iter().any(|r| !r.is_nan() && *r != 0.0)
+}
+
+/// Rows below which whole numbers may be chance (convention).
+const LEAST_COUNTED: usize = 20;
+
+/// Whole numbers that are mostly smaller than this, deg/s, may be rates that were rounded to 1 deg/s (convention).
+const LEAST_COUNT: f64 = 100.0;
+
+/// Whole numbers of hundreds and more, none with a fraction: an output that nobody has scaled. With an applied rate the scale is
+/// judged by that.
+fn counts(c: &Column<'_>) -> Option<Warning> {
+    let sizes: Vec<f64> = c.sorted.iter().map(|v| v.abs()).collect();
+    let is_whole = c.sorted.iter().all(|v| v.fract() == 0.0);
+    let moves = c.max() > c.min();
+    let is_large = stats::median(&sizes) >= LEAST_COUNT;
+    if !(is_whole && moves && is_large && sizes.len() >= LEAST_COUNTED)
+        || c.record.is_of_log()
+        || has_applied_rate(c.record)
+    {
+        return None;
+    }
+    c.warn(
+        "rate_in_counts",
+        format!(
+            "{} has whole numbers only, from {} to {}. It looks like raw counts and not like deg/s. Multiply raw counts by the gyro's \
+             scale (deg/s per LSB) first. If it is mdeg/s, say so: {}",
+            c.name,
+            c.min(),
+            c.max(),
+            c.record.unit_in_design(c.name, "mdps")
+        ),
+    )
 }
 
 /// Drive resonances lie between 1 and 200 kHz.

@@ -52,7 +52,7 @@ fn a_remedy_never_contradicts_the_columns_name() {
 fn each_mistake_has_its_warning() {
     // (column, values, warning)
     type Case = (&'static str, fn(f64) -> f64, Option<&'static str>);
-    let cases: [Case; 35] = [
+    let cases: [Case; 39] = [
         ("phase_rad", |k| -90.0 + k * 0.1, Some("phase_in_degrees")),
         ("phase_rad", |k| -2.0 + k * 0.13, Some("phase_in_degrees")),
         ("phase_rad", |k| -1.6 + k * 0.002, None),
@@ -89,6 +89,23 @@ fn each_mistake_has_its_warning() {
         ("rate_out_dps", |k| 30_000.0 + k, Some("rate_out_of_range")),
         ("rate_out_dps", |k| 1900.0 + k, Some("rate_in_millidegrees")),
         ("rate_out_dps", |k| 19.0 + wiggle(k), None),
+        (
+            "rate_out_dps",
+            |k| 213.0 + (k * 1.7).sin().round(),
+            Some("rate_in_counts"),
+        ),
+        (
+            "rate_out_dps",
+            |k| -213.0 + (k * 1.7).sin().round(),
+            Some("rate_in_counts"),
+        ),
+        // Rounded to half a deg/s, and to 1 deg/s at a usual bias.
+        (
+            "rate_out_dps",
+            |k| 213.0 + 0.5 * (k * 1.7).sin().round(),
+            None,
+        ),
+        ("rate_out_dps", |k| 13.0 + (k * 1.7).sin().round(), None),
         (
             "rate_out_dps",
             |k| 0.005 + 1e-3 * wiggle(k),

@@ -31,6 +31,19 @@ impl Warning {
         }
     }
 
+    /// Adds the remarks of a fit to those of its record. A thermometer that never moves is told by both: the fit's remark, which
+    /// says what follows, stays.
+    pub fn add_of_fit(all: &mut Vec<Warning>, of_fit: impl IntoIterator<Item = Warning>) {
+        for warning in of_fit {
+            let is_same =
+                |old: &Warning| old.code == "frozen_channel" && old.column == warning.column;
+            if warning.code == "thermometer_constant" {
+                all.retain(|old| !is_same(old));
+            }
+            all.push(warning);
+        }
+    }
+
     /// A remark on the record or the fit as a whole.
     pub fn general(code: &'static str, message: impl Into<String>) -> Self {
         Warning {
@@ -38,5 +51,22 @@ impl Warning {
             column: None,
             message: message.into(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_constant_thermometer_is_told_once() {
+        let frozen = |column| Warning::on("frozen_channel", column, "stands");
+        let mut all = vec![frozen("die_degc"), frozen("agc")];
+        let constant = Warning::on("thermometer_constant", "die_degc", "never moves");
+        Warning::add_of_fit(&mut all, [constant.clone()]);
+        assert_eq!(all, [frozen("agc"), constant]);
+        let other = Warning::on("one_direction", "agc", "heated alone");
+        Warning::add_of_fit(&mut all, [other]);
+        assert_eq!(all.len(), 3);
     }
 }

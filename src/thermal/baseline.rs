@@ -118,10 +118,19 @@ impl BaselineFit {
 
     /// The largest [`BaselineFit::std_dps`] over the range, deg/s, on 101 points.
     pub fn std_max_dps(&self) -> f64 {
-        (0..=100)
-            .map(|k| self.centre + self.half_span * (f64::from(k) / 50.0 - 1.0))
-            .map(|t| self.std_dps(t))
-            .fold(0.0, f64::max)
+        self.std_dps(self.least_certain())
+    }
+
+    /// Where it is: the first of the 101 readings of the thermometer with it.
+    pub fn least_certain(&self) -> f64 {
+        let readings =
+            (0..=100).map(|k| self.centre + self.half_span * (f64::from(k) / 50.0 - 1.0));
+        let start = (self.centre - self.half_span, f64::NEG_INFINITY);
+        let larger = |best: (f64, f64), t: f64| match self.std_dps(t) {
+            std if std > best.1 => (t, std),
+            _ => best,
+        };
+        readings.fold(start, larger).0
     }
 
     /// The coefficients, lowest first, deg/s, in p = (T - `offset`) / `scale`: what fixed-point

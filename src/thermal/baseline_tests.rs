@@ -214,6 +214,9 @@ fn all_forms_of_the_polynomial_agree() {
     let slope = (f.bias_dps(17_480.01) - f.bias_dps(17_479.99)) / 0.02;
     assert!((slope - f.slope_dps(17_480.0)).abs() < 1e-6);
     assert!(f.std_dps(17_500.0) <= f.std_max_dps() && f.std_max_dps() < f.std_dps(17_550.0));
+    let at = f.least_certain();
+    assert!((at - f.centre).abs() <= (1.0 + 1e-9) * f.half_span, "{at}");
+    assert_eq!(f.std_dps(at), f.std_max_dps());
 }
 
 #[test]

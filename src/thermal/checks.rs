@@ -77,7 +77,7 @@ fn span(c: &Checked<'_>) -> Option<Warning> {
             &fit.thermometer,
             format!(
                 "{} is {} {unit} in every row, so that no dependence on temperature can be fitted: the firmware subtracts a constant. \
-                 Record over a range of temperatures",
+                 Check that its sensor is not frozen, and record over a range of temperatures",
                 fit.thermometer,
                 g(low)
             ),

@@ -123,7 +123,7 @@ pub fn close(
     let record: &ThermalRecord = &taken.intake.record;
     let refuse = |why: String| refused(record, why);
     let mut warnings = taken.intake.warnings.clone();
-    warnings.extend(course(record, design));
+    Warning::add_of_fit(&mut warnings, course(record, design));
     warnings.extend(no_judges(&taken.intake.split));
     let whole = taken.intake.whole();
     let (closure, before, after, accidents, firmware) = {

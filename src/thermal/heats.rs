@@ -80,4 +80,15 @@ impl Channels {
             (_, k) => (self.heat(k), self.heat(k), self.kelvin_per_u),
         }
     }
+
+    /// The temperature at which the readings of [`Channels::history`] are 0, degC.
+    pub fn history_zero_degc(&self, which: usize) -> f64 {
+        match &self.die {
+            Some(die) if which >= self.heats() => {
+                self.column(die.name).map_or(f64::NAN, |c| scaled(c).1)
+            }
+            // A phase's tangent has its ends where the phase has them, and is linear in the temperature between them.
+            _ => self.middle_degc,
+        }
+    }
 }

@@ -110,6 +110,7 @@ fn what_lags_with_a_curve_has_a_gain_and_a_curvature_and_one_time_constant() {
         let due = (late[1] + 2.0 * late[2] * u) / 35.0;
         is(step, "gain_dps_per_k", due, 0.05);
         is(step, "curvature_dps_per_k2", late[2] / 35f64.powi(2), 0.05);
+        is(step, "reference_degc", closed.channels.middle_degc, 0.01);
         let left = closed.closure.after.heldout_rms;
         assert!(left < 0.011, "{late:?}: {left}");
     }
@@ -123,7 +124,9 @@ fn what_lags_in_proportion_has_no_curvature() {
         is(step, "tau_s", TAU_S, 0.05);
         is(step, "gain_dps_per_k", gain_dps / 35.0, 0.05);
         assert!(
-            !step.parameters.contains_key("curvature_dps_per_k2"),
+            !["curvature_dps_per_k2", "reference_degc"]
+                .iter()
+                .any(|name| step.parameters.contains_key(*name)),
             "{step:?}"
         );
         assert!(firmware_over_float(&closed) < 1.02);

@@ -45,6 +45,21 @@ impl Candidate for Covariate {
         format!("covariate:{}", self.name)
     }
 
+    fn physics(&self) -> String {
+        format!(
+            "something that the record's column {} measures moves the bias, by a smooth function",
+            self.name
+        )
+    }
+
+    fn equation(&self) -> String {
+        let name = &self.name;
+        format!(
+            "f({name}), a natural cubic spline of one to seven degrees of freedom in the record's column {name}; at once or after a \
+             first-order delay"
+        )
+    }
+
     fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing> {
         super::moving(c, &self.name)?;
         Ok(vec![self.name.clone()])

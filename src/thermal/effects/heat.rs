@@ -28,7 +28,7 @@ const THERMAL_LAG: Sheet = Sheet {
     id: "thermal_lag",
     physics: "part of the bias (electronics, package) follows a temperature that lags the \
               structure's: a loop between heating and cooling that closes in dwells",
-    equation: "gain (T - T_l), or gain (T - T_l) + curvature (T^2 - T_l^2) with T from the middle of its range; T_l lags T: \
+    equation: "gain (T - T_l), or gain (T - T_l) + curvature (T^2 - T_l^2) with T and T_l counted from reference_degc; T_l lags T: \
                tau dT_l/dt = T - T_l, T_l as T or free at the first row and after gaps",
     parameters: &[
         Parameter {
@@ -177,6 +177,9 @@ impl Candidate for ThermalLag {
         .collect();
         if Lagging::of(c, &e.point) == Lagging::Curved {
             out.extend([gain("curvature_dps_per_k2", e, 1, per_k * per_k)]);
+            // What gain and curvature are counted from: the zero of the scaled temperature, which is given and not estimated.
+            let zero_degc = c.history_zero_degc(e.point.form % c.histories());
+            out.extend([entry("reference_degc", zero_degc, 0.0)]);
         }
         out
     }
