@@ -9,7 +9,7 @@ use gyrogen::design::{Design, reader};
 use gyrogen::record::ThermalRecord;
 use gyrogen::statistics::blocks::Role;
 use gyrogen::thermal::close::{Closed, close};
-use gyrogen::thermal::search::{Effort, Method};
+use gyrogen::thermal::search::Effort;
 use std::path::Path;
 
 /// Seed of all records here.
@@ -53,19 +53,15 @@ fn steered(closed: &Closed) -> String {
     )
 }
 
-fn closed(record: &ThermalRecord, design: &Design, method: Method) -> Closed {
-    let effort = Effort {
-        method,
-        ..Effort::default()
-    };
-    close(record, Vec::new(), design, "test", effort).expect("an answer")
+fn closed(record: &ThermalRecord, design: &Design) -> Closed {
+    close(record, Vec::new(), design, "test", Effort::default()).expect("an answer")
 }
 
 /// Noise a thousand times the output's spread, or nothing, in the place of the output of rows that judge.
-fn nothing_is_steered(scenario: &Scenario, method: Method) -> Closed {
+fn nothing_is_steered(scenario: &Scenario) -> Closed {
     let design = reader::read(None).expect("the default");
     let record = record(scenario, &design);
-    let before = closed(&record, &design, method);
+    let before = closed(&record, &design);
     let judging = before.split.rows(Role::Judge);
     assert!(judging.contains(&true));
     let told = steered(&before);
@@ -77,7 +73,7 @@ fn nothing_is_steered(scenario: &Scenario, method: Method) -> Closed {
         let output = other.columns.get_mut("rate_out_dps").expect("an output");
         let rows = output.iter_mut().zip(&judging).filter(|(_, judge)| **judge);
         rows.for_each(|(out, _)| *out = made());
-        let after = closed(&other, &design, method);
+        let after = closed(&other, &design);
         assert_eq!(steered(&after), told, "{scenario:?}");
         // It is there that the difference shows.
         let [was, is] = [&before, &after].map(|c| c.closure.after.heldout_rms);
@@ -108,21 +104,11 @@ fn scenarios() -> Vec<Scenario> {
 #[test]
 fn judge_rows_steer_nothing() {
     let all = scenarios();
-    let found: Vec<Closed> = all
-        .iter()
-        .map(|s| nothing_is_steered(s, Method::Stepwise))
-        .collect();
+    let found: Vec<Closed> = all.iter().map(nothing_is_steered).collect();
     let named = found.iter().filter(|c| !c.closure.steps.is_empty()).count();
     let rated = found
         .iter()
         .filter(|c| c.channels.moving("rate_dps").is_some())
         .count();
     assert!(named >= 5 && rated >= 3, "{named} {rated}");
-}
-
-#[test]
-fn judge_rows_steer_no_search_by_evidence() {
-    for scenario in [&scenarios()[0], &scenarios()[3], &scenarios()[6]] {
-        nothing_is_steered(scenario, Method::Evidence);
-    }
 }

@@ -22,7 +22,7 @@ use crate::thermal::close;
 use crate::thermal::close::Closed;
 use crate::thermal::firmware::emitted;
 use crate::thermal::firmware::emitted::{Emitted, Told};
-use crate::thermal::search::{Effort, Method};
+use crate::thermal::search::Effort;
 use crate::timing;
 use std::path::{Path, PathBuf};
 
@@ -59,9 +59,6 @@ pub struct Arguments {
     /// Take a temperature correction off again that an autopilot had applied, where its log has the coefficients.
     #[arg(long, conflicts_with = "capture")]
     pub(super) undo_correction: bool,
-    /// Which search names the causes of a thermal record: for comparisons of the two.
-    #[arg(long, value_enum, hide = true, default_value = "stepwise")]
-    search: Naming,
     #[command(flatten)]
     design: super::common::DesignFile,
     /// Folder for the results; made if it does not exist. If left out, gyrogen-close; a self-test then
@@ -76,13 +73,6 @@ pub struct Arguments {
     pub(super) format: OutputFormat,
     #[command(flatten)]
     pub(super) test: super::self_test::Options,
-}
-
-/// Searches to choose from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Naming {
-    Stepwise,
-    Evidence,
 }
 
 /// Where results go.
@@ -153,13 +143,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
             warnings,
             &design,
             &recorded.command,
-            Effort {
-                method: match arguments.search {
-                    Naming::Stepwise => Method::Stepwise,
-                    Naming::Evidence => Method::Evidence,
-                },
-                ..Effort::default()
-            },
+            Effort::default(),
         )?;
         if arguments.format == OutputFormat::Text {
             say!("rows: {}", record.rows_understood(&closed.closure.warnings));

@@ -7,9 +7,8 @@ mod remarks;
 use super::baseline;
 use super::channels::Channels;
 use super::effects::{Candidate, user};
-use super::evidence::posterior;
 use super::intake::{Intake, refused};
-use super::search::{Effort, Found, Method, Model, Search};
+use super::search::{Effort, Found, Model, Search};
 use crate::correction::Correction;
 use crate::design::Design;
 use crate::error::Result;
@@ -135,11 +134,7 @@ pub fn close(
             )));
         }
         let unusable = |e: crate::statistics::Unusable| refuse(e.to_string());
-        let found = match effort.method {
-            Method::Stepwise => search.run(),
-            Method::Evidence => posterior::answer(&search),
-        };
-        let found = found.map_err(unusable)?;
+        let found = search.run().map_err(unusable)?;
         let before = search.model(&[]).map_err(unusable)?;
         let after = search.model(&found.terms).map_err(unusable)?;
         let accidents = accidents(&search, &whole, [&before, &after]);
@@ -285,22 +280,6 @@ impl Told<'_> {
         })
     }
 
-    /// How often a step is chosen again in halves of the record: against what is judged beside the other steps, or, of the search by
-    /// evidence, beside none.
-    fn selection_frequency(
-        &self,
-        k: usize,
-    ) -> std::result::Result<f64, crate::statistics::Unusable> {
-        let search = self.search;
-        if search.effort.method == Method::Stepwise || self.after.terms[k].evident {
-            return search.selected_beside(self.after, k, &[]);
-        }
-        let mut others = self.after.terms.clone();
-        others.remove(k);
-        let without = search.model(&others)?;
-        Ok(search.selection_frequency(self.after, k, &without, self.found.first.iter()))
-    }
-
     /// The steps in their order, each with the error of itself and those before it.
     fn steps(&self) -> std::result::Result<Vec<Step>, crate::statistics::Unusable> {
         let terms = &self.found.terms;
@@ -322,7 +301,7 @@ impl Told<'_> {
                 parameter_std: reported.iter().map(|(n, v)| (n.clone(), v.1)).collect(),
                 heldout_rms: model.heldout_rms,
                 p_value: term.p_value.clamp(1e-300, 1.0),
-                selection_frequency: self.selection_frequency(k)?,
+                selection_frequency: self.search.selected_beside(self.after, k, &[])?,
                 indistinguishable_from: term.rivals.clone(),
                 separating_experiment: (!term.rivals.is_empty())
                     .then(|| term.candidate.sheet().experiment.to_owned()),

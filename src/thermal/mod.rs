@@ -17,7 +17,6 @@ pub mod checks;
 pub mod close;
 mod declared_bias;
 pub mod effects;
-pub mod evidence;
 pub mod firmware;
 mod heats;
 mod holes;

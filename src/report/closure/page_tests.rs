@@ -3,14 +3,13 @@
 use super::*;
 use crate::design::reader;
 use crate::thermal::close::close;
-use crate::thermal::search::{Effort, Method};
+use crate::thermal::search::Effort;
 use crate::thermal::synthetic::{Random, record, triangle};
 
 const EFFORT: Effort = Effort {
     rows: 400,
     surrogates: 40,
     steps: 2,
-    method: Method::Stepwise,
 };
 
 /// Two heatings with a parabola, 0.02 deg/s of noise, and `gain` times the supply, which steps.

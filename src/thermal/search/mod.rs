@@ -65,16 +65,6 @@ use rounds::Known;
 use std::cell::RefCell;
 use std::sync::Arc;
 
-/// Which search names the causes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Method {
-    /// The passes of this module.
-    #[default]
-    Stepwise,
-    /// The set of the greatest evidence ([`super::evidence`]), for comparison.
-    Evidence,
-}
-
 /// How hard to search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effort {
@@ -84,8 +74,6 @@ pub struct Effort {
     pub surrogates: usize,
     /// Most named steps.
     pub steps: usize,
-    /// How.
-    pub method: Method,
 }
 
 impl Default for Effort {
@@ -94,7 +82,6 @@ impl Default for Effort {
             rows: 700,
             surrogates: 100,
             steps: 5,
-            method: Method::Stepwise,
         }
     }
 }
