@@ -14,6 +14,7 @@ mod check;
 mod close;
 mod closing;
 mod controls;
+mod earlier;
 mod emit;
 mod equiv;
 mod init;

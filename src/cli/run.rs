@@ -104,7 +104,9 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         &outcome.summary.design_sha256,
         &recorded.command,
     )?;
+    let note = super::earlier::note(&arguments.out, "summary.json", &json);
     results.finish()?;
+    note.iter().for_each(|note| talk!("{note}"));
     match arguments.format {
         OutputFormat::Json => super::terminal::give(&json),
         OutputFormat::Text => print(&outcome, &arguments.out),
