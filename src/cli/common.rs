@@ -165,9 +165,13 @@ pub(super) fn bundle(
     force: bool,
 ) -> Result<()> {
     let replaced = replace::collect(files, folder, results, force)?;
-    if !replaced.in_the_way.is_empty() {
-        let files = replace::listed(&replaced.in_the_way);
-        talk!("edited files were replaced, others left: {files}");
+    for (what, names) in [
+        ("replaced, as asked for", &replaced.lost),
+        ("left beside the bundle", &replaced.beside),
+    ] {
+        if !names.is_empty() {
+            talk!("{what}: {}", replace::listed(names));
+        }
     }
     if replaced.gone > 0 {
         let count = replaced.gone;

@@ -9,6 +9,7 @@ use crate::design::{Compensation, Design};
 use crate::emit::bundle::Part;
 use crate::emit::views::Language;
 use crate::error::{InputError, Result};
+use crate::firmware::another::Whose;
 use crate::firmware::correction::Origin;
 use crate::firmware::files::EmittedFile;
 use crate::firmware::{conversion, correction, files, manifest, product, replace};
@@ -29,7 +30,8 @@ pub struct Arguments {
     /// Folder for the bundle; made if it does not exist.
     #[arg(long, value_name = "DIR", default_value = "gyrogen-emit")]
     out: PathBuf,
-    /// Overwrite a bundle's files that were edited; files that are none of a bundle's stay.
+    /// Replace a bundle of another design or language, or one whose files were edited; files that are none of a bundle's
+    /// stay.
     #[arg(long)]
     force: bool,
     /// How the result is printed: in words on stderr, or the bundle's manifest on stdout.
@@ -48,13 +50,19 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         None => Part::Chain,
     });
     let mut results = Results::claim(&arguments.out, &[manifest::NAME], &recorded.inputs)?;
+    let coming = Whose::of(&design, arguments.lang, &recorded.command);
+    let earlier = Whose::in_folder(&arguments.out)?;
     if !arguments.force {
         replace::refuse(&[], &arguments.out)?;
-        replace::refuse_another(&arguments.out, &recorded.command)?;
+        if let Some(earlier) = &earlier {
+            earlier.refuse(&coming, &arguments.out)?;
+        }
     }
     let bundle = emitted(&design, part, arguments.lang, &recorded.command)?;
     super::common::bundle(&bundle, "", &mut results, arguments.force)?;
     results.finish()?;
+    let note = earlier.and_then(|earlier| earlier.replaced_by(&coming));
+    note.iter().for_each(|note| talk!("{note}"));
     if arguments.format == OutputFormat::Json {
         let manifest = bundle.iter().find(|f| f.path == manifest::NAME);
         terminal::give(manifest.map_or("", |f| &f.text));

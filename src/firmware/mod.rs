@@ -4,6 +4,7 @@
 //! [`correction`] the step of a correction, [`conversion`] what makes its words of the chain's rows, [`product`] these three together, [`approximation`] what `gyrogen approx` found; [`manifest`] says what is in a bundle, [`calibrated`] where it holds,
 //! [`vectors`] and [`tested`] how it is compared; [`replace`] puts it in the place of an older one, of whose [`folder`] only plain files are read.
 
+pub mod another;
 pub mod approximation;
 pub mod calibrated;
 pub mod conversion;
@@ -12,6 +13,7 @@ mod emitted;
 mod example;
 pub mod files;
 pub mod folder;
+mod found;
 pub mod function;
 pub mod manifest;
 mod outside;

@@ -54,6 +54,14 @@ pub fn prefix_of(name: &str, part: &str) -> String {
     }
 }
 
+/// The design's name that the prefix of a bundle of this part was made of.
+pub fn name_of<'a>(prefix: &'a str, part: &str) -> &'a str {
+    match PARTS.contains(&part) {
+        true => prefix.strip_suffix(&prefix_of("", part)).unwrap_or(prefix),
+        false => prefix,
+    }
+}
+
 /// The sources that a product has beside those of its parts.
 pub fn of_product(prefix: &str, language: Language) -> Vec<String> {
     let own: &[&str] = match language {
@@ -73,6 +81,17 @@ mod tests {
     use super::*;
     use crate::emit::bundle::Part;
     use crate::firmware::{files, manifest};
+
+    #[test]
+    fn a_designs_name_is_read_back_from_the_prefix() {
+        for part in PARTS {
+            assert_eq!(name_of(&prefix_of("my_gyro", part), part), "my_gyro");
+        }
+        // These have the name as it is.
+        for (name, part) in [("my_tables", "tables"), ("my_gyro", "all")] {
+            assert_eq!(name_of(name, part), name);
+        }
+    }
 
     /// What `verify` holds a bundle against is what is emitted.
     #[test]

@@ -2,156 +2,43 @@
 //! not touched unless that is asked for.
 
 use super::emitted::EmittedFile;
-use super::folder::{Folder, is_plain};
-use super::manifest::{self, Manifest};
-use crate::digest::sha256;
+use super::found::Found;
 use crate::error::{InputError, Result};
 use crate::output::Results;
 use std::path::Path;
 
-/// What `verify` writes into a bundle's folder.
-const VERIFIED: [&str; 2] = ["verify.json", crate::timing::NAME];
-/// What a build leaves there.
-const BUILT: &str = "Cargo.lock";
 /// Files that a message names.
 const NAMED: usize = 8;
-
-/// What stands in a folder that a bundle goes into.
-#[derive(Debug, Default, PartialEq, Eq)]
-struct Found {
-    /// Files of the bundle that is there.
-    old: Vec<String>,
-    /// Those of them that are not as they were written.
-    edited: Vec<String>,
-    /// What `verify` wrote.
-    verified: Vec<String>,
-    /// Files that are none of the bundle's.
-    foreign: Vec<String>,
-}
-
-impl Found {
-    fn in_folder(path: &Path) -> Result<Self> {
-        let mut found = Found::default();
-        if path.symlink_metadata().is_err() {
-            return Ok(found);
-        }
-        let folder = Folder::open(path)?;
-        let text = folder.read_text(manifest::NAME).unwrap_or_default();
-        // Of an older schema as well.
-        let value: serde_json::Value = serde_json::from_str(&text).unwrap_or_default();
-        let files = value["files"].as_array().cloned().unwrap_or_default();
-        for file in &files {
-            let (Some(name), Some(due)) = (file["path"].as_str(), file["sha256"].as_str()) else {
-                continue;
-            };
-            if !is_plain(name) || !folder.holds(name) {
-                continue;
-            }
-            found.old.push(name.to_owned());
-            let bytes = folder.read(name);
-            if bytes.map_or(true, |b| sha256(&b) != due) {
-                found.edited.push(name.to_owned());
-            }
-        }
-        if !files.is_empty() {
-            found.old.push(manifest::NAME.to_owned());
-            let whole: Option<Manifest> = serde_json::from_str(&text).ok();
-            if whole.is_some_and(|m| m.seal != m.sealed()) {
-                found.edited.push(manifest::NAME.to_owned());
-            }
-        }
-        let others = folder.files()?.into_iter();
-        // A product's parts are bundles in folders of their own.
-        let is = |path: &str, name: &str| path.rsplit('/').next() == Some(name);
-        let others = others.filter(|f| !found.old.contains(f) && !is(f, BUILT));
-        let (verified, foreign) = others.partition(|f| VERIFIED.iter().any(|name| is(f, name)));
-        (found.verified, found.foreign) = (verified, foreign);
-        Ok(found)
-    }
-
-    /// What somebody would lose or find beside the new bundle.
-    fn in_the_way(&self, files: &[EmittedFile]) -> Vec<String> {
-        let edited = self.edited.iter().map(|name| format!("{name} (edited)"));
-        // Where there is no bundle yet, only what would be overwritten.
-        let is_new = |name: &String| files.iter().any(|f| f.path == *name);
-        let foreign = self
-            .foreign
-            .iter()
-            .filter(|name| !self.old.is_empty() || is_new(name));
-        edited
-            .chain(foreign.map(|name| format!("{name:?} (not of the bundle)")))
-            .collect()
-    }
-}
 
 /// Refuses a folder with files that writing the bundle would overwrite or leave beside it: to be asked before work
 /// begins (then without files), and before writing.
 ///
 /// # Errors
-/// Edited files of a bundle, and files that are none of it.
+/// Edited files of a bundle, files that are none of it, and a bundle whose manifest is damaged.
 pub fn refuse(files: &[EmittedFile], folder: &Path) -> Result<()> {
-    let in_the_way = Found::in_folder(folder)?.in_the_way(files);
+    let found = Found::in_folder(folder)?;
+    if let Some(error) = found.damaged(folder) {
+        return Err(error);
+    }
+    let in_the_way = [found.lost(files), found.beside(files)].concat();
     if in_the_way.is_empty() {
         return Ok(());
     }
     let what = "files here were edited, or are none of the bundle";
     Err(InputError::new(format!("{what}: {}. Nothing was written", listed(&in_the_way)))
         .in_file(folder)
-        .help("name another folder, or `--force`: it overwrites edited files and leaves what is not of the bundle")
+        .help("name another folder with --out, or `--force`: it overwrites edited files and those that have the name of a new one, and \
+               leaves the others")
         .into())
-}
-
-/// Refuses a folder with the firmware of another design than that of `command`, which goes there.
-///
-/// # Errors
-/// Such a folder. A design is known by its file's name, which an edit leaves.
-pub fn refuse_another(folder: &Path, command: &str) -> Result<()> {
-    if folder.symlink_metadata().is_err() {
-        return Ok(());
-    }
-    let text = Folder::open(folder)?
-        .read_text(manifest::NAME)
-        .unwrap_or_default();
-    let value: serde_json::Value = serde_json::from_str(&text).unwrap_or_default();
-    let Some(before) = value["command"].as_str() else {
-        return Ok(());
-    };
-    let old = design_of(before);
-    if old.is_some() && old == design_of(command) {
-        return Ok(());
-    }
-    Err(InputError::new(format!(
-        "this folder holds the firmware that another command made: `{before}`. Nothing was written"
-    ))
-    .in_file(folder)
-    .help("name another folder with --out, or remove this one; `--force` replaces it. Firmware of the same design file is replaced without being asked")
-    .into())
-}
-
-/// The name of the design file that a recorded command emits firmware of, empty for the embedded default; `None` for a
-/// command without a design.
-fn design_of(command: &str) -> Option<&str> {
-    let mut words = command.splitn(3, ' ').skip(1);
-    let (verb, rest) = (words.next().unwrap_or(""), words.next().unwrap_or(""));
-    let given = match (rest.split_once("--design"), rest.split_once("-- ")) {
-        _ if !rest.starts_with("--") => rest,
-        (Some((_, name)), _) | (None, Some((_, name))) => name.trim_start_matches([' ', '=']),
-        (None, None) => "",
-    };
-    match verb {
-        // A name with blanks is quoted, and may be cut here: in both commands alike.
-        "emit" => given.split(" --").next(),
-        // They write the design that their firmware is of.
-        "run" | "close" => Some("design.toml"),
-        _ => None,
-    }
 }
 
 /// What a bundle took the place of.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Replaced {
-    /// What was in the way, where that was forced.
-    pub in_the_way: Vec<String>,
+    /// What is lost, where that was forced.
+    pub lost: Vec<String>,
+    /// What is none of the bundle's and stays beside it, where that was forced.
+    pub beside: Vec<String>,
     /// Files of the bundle that was there which the new one does not have.
     pub gone: usize,
 }
@@ -166,7 +53,11 @@ pub fn collect(
     results: &mut Results,
     forced: bool,
 ) -> Result<Replaced> {
-    let path = results.folder().join(folder);
+    let path = match folder {
+        // Joined, it would end in a `/` that nobody wrote.
+        "" => results.folder().to_path_buf(),
+        below => results.folder().join(below),
+    };
     if !forced {
         refuse(files, &path)?;
     }
@@ -200,7 +91,8 @@ pub fn collect(
         }
     }
     Ok(Replaced {
-        in_the_way: found.in_the_way(files),
+        lost: found.lost(files),
+        beside: found.beside(files),
         gone: gone.len(),
     })
 }
@@ -222,6 +114,8 @@ pub fn listed(names: &[String]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::digest::sha256;
+    use crate::firmware::{manifest, paths};
 
     fn bundle(names: &[&str]) -> Vec<EmittedFile> {
         let file = |path: &str, text: String| EmittedFile {
@@ -247,11 +141,11 @@ mod tests {
         files
     }
 
-    fn write(files: &[EmittedFile], folder: &Path, forced: bool) -> Result<Vec<String>> {
+    fn write(files: &[EmittedFile], folder: &Path, forced: bool) -> Result<Replaced> {
         let mut results = Results::claim(folder, &[], &[])?;
         let replaced = collect(files, "", &mut results, forced)?;
         results.finish()?;
-        Ok(replaced.in_the_way)
+        Ok(replaced)
     }
 
     #[test]
@@ -278,50 +172,20 @@ mod tests {
             refused.contains("a.c (edited)") && refused.contains("notes.txt"),
             "{refused}"
         );
+        let place = format!("{}: error: ", folder.display());
+        assert!(refused.starts_with(&place), "{refused}");
         assert_eq!(
             std::fs::read_to_string(folder.join("a.c")).expect("read"),
             "mine"
         );
-        let named = write(&bundle(&["a.c"]), &folder, true).expect("forced");
-        assert_eq!(named.len(), 2);
+        let replaced = write(&bundle(&["a.c"]), &folder, true).expect("forced");
+        assert_eq!(replaced.lost, ["a.c (edited)"]);
+        assert_eq!(replaced.beside, ["\"notes.txt\" (not of the bundle)"]);
         assert!(folder.join("notes.txt").exists() && !folder.join("b.c").exists());
         assert_ne!(
             std::fs::read_to_string(folder.join("a.c")).expect("read"),
             "mine"
         );
-    }
-
-    #[test]
-    fn the_firmware_of_another_design_stays() {
-        let made = tempfile::tempdir().expect("a folder");
-        let says = |old: &str, new: &str| {
-            let text = format!("{{\"command\": \"gyrogen {old}\"}}");
-            std::fs::write(made.path().join(manifest::NAME), text).expect("written");
-            refuse_another(made.path(), &format!("gyrogen {new}"))
-        };
-        for (old, new) in [
-            ("emit a.toml --lang c", "emit a.toml --lang rust"),
-            ("emit a.toml --lang c", "emit --lang c --design a.toml"),
-            ("emit --lang c --design a.toml", "emit a.toml --lang c"),
-            ("emit --lang c -- -a.toml", "emit --lang rust -- -a.toml"),
-            ("emit --lang c", "emit --lang c --part tables"),
-            ("run a.toml --record r.csv", "emit design.toml --lang c"),
-            ("close --record r.csv", "emit design.toml --lang c"),
-        ] {
-            says(old, new).unwrap_or_else(|e| panic!("{old}, {new}: {e}"));
-        }
-        for (old, new) in [
-            ("emit a.toml --lang c", "emit b.toml --lang c"),
-            ("emit --lang c", "emit b.toml --lang c"),
-            ("emit a.toml --lang c", "emit --lang c"),
-            // Its firmware has the fit, which is in its design.toml alone.
-            ("run a.toml --record r.csv", "emit a.toml --lang c"),
-            ("approx --function x^2 --degree 2", "emit --lang c"),
-        ] {
-            let refused = says(old, new).expect_err(old).to_string();
-            assert!(refused.contains(old), "{refused}");
-        }
-        refuse_another(&made.path().join("none"), "gyrogen emit").expect("nothing is there");
     }
 
     #[test]
@@ -331,5 +195,116 @@ mod tests {
         refuse(&bundle(&["a.c"]), made.path()).expect("beside them");
         std::fs::write(made.path().join("a.c"), "mine").expect("written");
         refuse(&bundle(&["a.c"]), made.path()).expect_err("it would be overwritten");
+    }
+
+    /// As [`bundle`], of sources that say what wrote them, with checksums of them and of a file of vectors.
+    fn generated(names: &[&str]) -> Vec<EmittedFile> {
+        let mut files = bundle(names);
+        files.pop();
+        for file in &mut files {
+            file.text = format!(
+                "/* {} */\n{}",
+                manifest::banner("0", "gyrogen emit"),
+                file.text
+            );
+        }
+        files.push(EmittedFile {
+            path: "vectors/a.csv".into(),
+            text: "1\n".into(),
+        });
+        files.push(crate::firmware::files::sums(&files));
+        let entry = |f: &EmittedFile| serde_json::json!({ "path": f.path, "sha256": sha256(f.text.as_bytes()) });
+        let entries: Vec<serde_json::Value> = files.iter().map(entry).collect();
+        files.push(EmittedFile {
+            path: manifest::NAME.into(),
+            text: serde_json::json!({ "files": entries }).to_string(),
+        });
+        files
+    }
+
+    fn there(folder: &Path) -> Vec<String> {
+        let folder = crate::firmware::folder::Folder::open(folder).expect("a folder");
+        folder.files().expect("files")
+    }
+
+    #[test]
+    fn a_damaged_manifest_is_said_and_forced_replaces_what_was_generated() {
+        for (damaged, why) in [
+            ("{\"files\": [", "manifest.json:1:1"),
+            ("{}", "it lists no files"),
+            ("", "EOF"),
+        ] {
+            let made = tempfile::tempdir().expect("a folder");
+            let folder = made.path().join("c");
+            write(&generated(&["a.c", "b.c"]), &folder, false).expect("written");
+            std::fs::write(folder.join(manifest::NAME), damaged).expect("written");
+            std::fs::write(folder.join("b.c"), manifest::banner("0", "mine")).expect("written");
+            std::fs::write(folder.join("notes.txt"), "mine").expect("written");
+            // A copy that was put by.
+            std::fs::copy(folder.join("a.c"), folder.join("old_a.c")).expect("copied");
+            let refused = refuse(&[], &folder).expect_err("refused").to_string();
+            assert!(
+                refused.contains("is damaged (") && refused.contains(why),
+                "{refused}"
+            );
+            assert!(
+                refused.contains("--force") && refused.contains("--out"),
+                "{refused}"
+            );
+            let replaced = write(&generated(&["src/c.rs"]), &folder, true).expect("forced");
+            assert_eq!(replaced.lost, ["manifest.json (damaged)", "b.c (edited)"]);
+            assert_eq!(
+                replaced.beside,
+                [
+                    "\"notes.txt\" (not of the bundle)",
+                    "\"old_a.c\" (not of the bundle)"
+                ]
+            );
+            let left = [
+                paths::SUMS,
+                manifest::NAME,
+                "notes.txt",
+                "old_a.c",
+                "src/c.rs",
+                "vectors/a.csv",
+            ];
+            assert_eq!(there(&folder), left, "{damaged:?}");
+        }
+    }
+
+    #[test]
+    fn without_checksums_a_generated_file_may_be_edited() {
+        let made = tempfile::tempdir().expect("a folder");
+        let folder = made.path().join("c");
+        write(&generated(&["a.c"]), &folder, false).expect("written");
+        std::fs::write(folder.join(manifest::NAME), "{}").expect("written");
+        std::fs::remove_file(folder.join(paths::SUMS)).expect("removed");
+        let replaced = write(&generated(&["b.c"]), &folder, true).expect("forced");
+        let lost = &replaced.lost;
+        assert!(lost.contains(&"a.c (may be edited)".to_owned()), "{lost:?}");
+        assert!(!folder.join("a.c").exists());
+    }
+
+    #[test]
+    fn a_manifest_of_the_users_own_is_no_damaged_bundle() {
+        let made = tempfile::tempdir().expect("a folder");
+        let at = made.path();
+        std::fs::write(at.join(manifest::NAME), "{\"name\": \"page\"}").expect("written");
+        std::fs::write(at.join("a.csv"), "mine").expect("written");
+        let sums = format!("{}  a.csv\n", sha256(b"mine"));
+        std::fs::write(at.join(paths::SUMS), sums).expect("written");
+        let below = at.join("c");
+        write(&generated(&["a.c"]), &below, false).expect("a bundle below it");
+        let refused = refuse(&bundle(&["b.c"]), at)
+            .expect_err("refused")
+            .to_string();
+        assert!(!refused.contains("damaged"), "{refused}");
+        assert!(
+            refused.contains("\"manifest.json\" (not of the bundle)"),
+            "{refused}"
+        );
+        write(&bundle(&["b.c"]), at, true).expect("forced");
+        let left = |name: &str| at.join(name).exists();
+        assert!(left("a.csv") && left(paths::SUMS) && left("c/a.c"));
     }
 }

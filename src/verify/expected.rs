@@ -392,7 +392,8 @@ fn banners(manifest: &Manifest, folder: &Folder, problems: &mut Vec<String>) {
         let Ok(text) = folder.read_text(&file.path) else {
             continue;
         };
-        if !text.lines().take(3).any(|line| line.contains(&banner)) {
+        let mut head = text.lines().take(manifest::HEAD_LINES);
+        if !head.any(|line| line.contains(&banner)) {
             problems.push(format!(
                 "{} does not say that it comes from the manifest's command and design",
                 file.path
