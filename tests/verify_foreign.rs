@@ -1,5 +1,5 @@
 //! `gyrogen verify` knows what a bundle must hold, takes nothing on trust that comes with it, and waits for no
-//! program without end. Regeneration: what somebody edited is not lost.
+//! program without end.
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -274,6 +274,51 @@ fn a_changed_file_is_named_also_where_it_does_not_compile() {
         "files differ from the manifest: tested_correction.c",
     );
     refused(&at, 1, "the changed files do not compile");
+    // That alone is said of the build, and where the result is.
+    let output = gyrogen(&["verify", "c"], at.parent().expect("a parent"));
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(
+        said.contains("self-test: not run: the changed files do not compile\n"),
+        "{said}"
+    );
+    assert!(!said.contains("nothing was built"), "{said}");
+    let result = Path::new("c").join("verify.json");
+    assert!(
+        said.ends_with(&format!("wrote {}\n", result.display())),
+        "{said}"
+    );
+    assert!(at.join("verify.json").is_file());
+}
+
+/// Somebody who names a file of a bundle is told the folder.
+#[test]
+fn a_file_of_a_bundle_is_no_bundle_and_its_folder_is_named() {
+    let (folder, at) = bundle();
+    std::fs::write(folder.path().join("alone.c"), "").expect("written");
+    for (file, help) in [
+        ("c/manifest.json", "did you mean the folder c?"),
+        (
+            "c/test/tested_correction_harness.c",
+            "did you mean the folder c?",
+        ),
+        ("alone.c", "give the folder of sources"),
+    ] {
+        let output = gyrogen(&["verify", file], folder.path());
+        let said = said(&output);
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(
+            said.contains("this is a file, and `verify` takes"),
+            "{said}"
+        );
+        assert!(
+            said.contains(help) && !said.contains("no bundle is here"),
+            "{said}"
+        );
+    }
+    let output = gyrogen(&["verify", "tested_correction.c"], &at);
+    let said = said(&output);
+    assert!(said.contains("did you mean the folder .?"), "{said}");
+    assert!(!at.join("verify.json").exists());
 }
 
 #[test]
@@ -306,7 +351,8 @@ fn a_bundle_that_is_cut_off_or_lacks_a_file_is_told_to_be_written_again() {
     let (folder, at) = bundle();
     let manifest = at.join("manifest.json");
     let text = std::fs::read_to_string(&manifest).expect("a manifest");
-    let remedy = "the command that made it: `gyrogen run`, `close`, `emit` or `approx`";
+    let remedy =
+        "the command that made it: `gyrogen run`, `close`, `emit` or `approx`, with `--force`";
     std::fs::write(&manifest, &text[..text.len() / 2]).expect("written");
     let output = gyrogen(&["verify", "c"], folder.path());
     assert_eq!(output.status.code(), Some(2), "{}", said(&output));
@@ -431,48 +477,4 @@ fn a_harness_that_hangs_or_floods_is_ended() {
         assert_eq!(output.status.code(), Some(1), "{}", said(&output));
         assert!(started.elapsed() < Duration::from_secs(60));
     }
-}
-
-#[test]
-fn an_edited_bundle_is_not_overwritten_and_an_unedited_one_leaves_nothing() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let here = folder.path();
-    std::fs::write(here.join("design.toml"), DESIGN).expect("written");
-    std::fs::write(here.join("other.toml"), DESIGN.replace("tested", "other")).expect("written");
-    let emit = |design: &str, more: &[&str]| {
-        gyrogen(
-            &[&["emit", design, "--lang", "c", "--out", "c"], more].concat(),
-            here,
-        )
-    };
-    assert!(emit("design.toml", &[]).status.success());
-    // Firmware of another design is not replaced without being asked, that of an edited one is.
-    let refused = emit("other.toml", &[]);
-    assert_eq!(refused.status.code(), Some(2));
-    assert!(
-        said(&refused).contains("`gyrogen emit design.toml --lang c`")
-            && said(&refused).contains("name another folder with --out"),
-        "{}",
-        said(&refused)
-    );
-    assert!(here.join("c/tested_correction.c").exists());
-    std::fs::rename(here.join("other.toml"), here.join("design.toml")).expect("edited");
-    assert!(emit("design.toml", &[]).status.success());
-    assert!(
-        here.join("c/other_correction.c").exists() && !here.join("c/tested_correction.c").exists()
-    );
-    std::fs::write(here.join("c/other_correction.c"), "mine").expect("written");
-    let refused = emit("design.toml", &[]);
-    assert_eq!(refused.status.code(), Some(2));
-    assert!(
-        said(&refused).contains("other_correction.c (edited)"),
-        "{}",
-        said(&refused)
-    );
-    let forced = emit("design.toml", &["--force"]);
-    assert!(
-        forced.status.success() && said(&forced).contains("other_correction.c (edited)"),
-        "{}",
-        said(&forced)
-    );
 }

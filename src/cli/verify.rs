@@ -14,6 +14,9 @@ use crate::verify::bundle::{self, Against, Verification};
 use crate::verify::target::Target;
 use std::path::{Path, PathBuf};
 
+/// What is written.
+const RESULT: &str = "verify.json";
+
 /// Build a firmware bundle anew from its own files alone, run its self-test and its test vectors. This compiles and
 /// runs the bundle's code: do not verify a bundle that you would not build.
 #[derive(Debug, clap::Args)]
@@ -64,7 +67,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         design: arguments.design.clone(),
     };
     let folder = arguments.out.as_ref().unwrap_or(&arguments.bundle);
-    let planned = ["verify.json", timing::NAME];
+    let planned = [RESULT, timing::NAME];
     for name in planned {
         refuse_link(&folder.join(name))?;
     }
@@ -78,12 +81,12 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     )?;
     watch.stage("writing");
     let json = super::json(&verification);
-    results.write("verify.json", json.as_bytes())?;
+    results.write(RESULT, json.as_bytes())?;
     watch.write(&mut results, &verification.design_sha256, &recorded.command)?;
     results.finish()?;
     match arguments.format {
         OutputFormat::Json => super::terminal::give(&json),
-        OutputFormat::Text => print(&verification),
+        OutputFormat::Text => print(&verification, folder),
     }
     if verification.holds {
         return Ok(());
@@ -130,42 +133,72 @@ fn of_design(path: &Path, manifest: &Manifest) -> Result<Vec<EmittedFile>> {
     super::emit::emitted(&design, part, language, &manifest.command)
 }
 
-/// Refuses what holds no manifest, and names the bundles that stand below it.
+/// Refuses what holds no manifest, and names the bundles that stand below it, or the one that a file is of.
 fn refuse_no_bundle(folder: &Path) -> Result<()> {
     // A link or a pipe of that name is for the reader to refuse.
     if folder.join(manifest::NAME).symlink_metadata().is_ok() {
         return Ok(());
     }
-    let below = ["c", "rust", "firmware/c", "firmware/rust"].map(|name| folder.join(name));
-    let bundles = below.iter().filter(|b| b.join(manifest::NAME).is_file());
-    let named: Vec<String> = bundles.map(|b| b.display().to_string()).collect();
+    let (what, bundles) = match folder.is_file() {
+        true => (
+            "this is a file, and `verify` takes the folder of a bundle".to_owned(),
+            bundle_of(folder).into_iter().collect(),
+        ),
+        false => (
+            format!("no bundle is here: there is no {}", manifest::NAME),
+            bundles_below(folder),
+        ),
+    };
+    let named: Vec<String> = bundles.iter().map(|b| b.display().to_string()).collect();
     let help = match named.is_empty() {
         true => {
             "give the folder of sources that `emit`, `run`, `close` or `approx` wrote".to_owned()
         }
-        false => format!("did you mean {}?", named.join(" or ")),
+        false => format!("did you mean the folder {}?", named.join(" or ")),
     };
-    let what = format!("no bundle is here: there is no {}", manifest::NAME);
     Err(InputError::new(what).in_file(folder).help(help).into())
 }
 
-fn print(v: &Verification) {
+/// The bundles in the folders of results that lie below a folder.
+fn bundles_below(folder: &Path) -> Vec<PathBuf> {
+    let below = ["c", "rust", "firmware/c", "firmware/rust"].map(|name| folder.join(name));
+    let is_bundle = |at: &PathBuf| at.join(manifest::NAME).is_file();
+    below.into_iter().filter(is_bundle).collect()
+}
+
+/// The folder of the bundle that a file lies in: the nearest one above it with a manifest.
+fn bundle_of(file: &Path) -> Option<PathBuf> {
+    /// A bundle's files lie at most so deep in it, as `src/bin/harness.rs`.
+    const DEPTH: usize = 3;
+    let above = file.ancestors().skip(1).take(DEPTH);
+    let named = above.map(|at| match at == Path::new("") {
+        true => Path::new("."),
+        false => at,
+    });
+    let mut bundles = named.filter(|at| at.join(manifest::NAME).is_file());
+    bundles.next().map(Path::to_path_buf)
+}
+
+/// Says what was found, and where the result is that `folder` has.
+fn print(v: &Verification, folder: &Path) {
     if !v.functions.is_empty() {
         super::terminal::show(&super::comparison_table(&v.functions));
     }
-    let is_whole = v.changed_files.is_empty() && v.problems.is_empty();
-    let selftest = match v.selftest {
-        Some(true) => "pass",
-        Some(false) => "FAIL",
-        None if v.is_another => "not run: nothing was built",
-        None if !is_whole => {
-            "not run: the files are not those of the bundle, and nothing was built"
+    let selftest = match (v.selftest, v.not_built) {
+        (Some(true), _) => "pass".to_owned(),
+        (Some(false), _) => "FAIL".to_owned(),
+        (None, Some(why)) => format!("not run: {why}"),
+        (None, None) => {
+            "none in a bundle of tables alone; its files were compared with the manifest".to_owned()
         }
-        None => "none in a bundle of tables alone; its files were compared with the manifest",
     };
     say!("self-test: {selftest}");
-    say!("toolchain: {}", v.toolchain);
+    // Where nothing was built, that was said.
+    if v.not_built.is_none() {
+        say!("toolchain: {}", v.toolchain);
+    }
     say!("digest: {}", v.digest);
+    say!("wrote {}", folder.join(RESULT).display());
 }
 
 fn reasons(v: &Verification) -> Vec<String> {

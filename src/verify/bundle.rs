@@ -41,6 +41,9 @@ pub struct Verification {
     /// All files are those of the manifest, and the bundle is not the one whose digest or design was given.
     #[serde(skip)]
     pub is_another: bool,
+    /// The code was not built, and why: as the rest of "not run: ...".
+    #[serde(skip)]
+    pub not_built: Option<&'static str>,
     /// The built-in start-up check passed; null for a bundle of tables alone, which has none.
     pub selftest: Option<bool>,
     /// Over all vectors.
@@ -117,23 +120,27 @@ pub fn verify(
     };
     let mut toolchain_name = String::from("none: the part `tables` has nothing to run");
     let mut selftest = None;
-    if !problems.is_empty() {
+    let mut not_built = None;
+    let is_product = manifest.part == expected::PRODUCT;
+    if !problems.is_empty() || (is_product && !changed_files.is_empty()) {
         // What is not what it must be is not run.
+        not_built = Some(match is_another {
+            true => "nothing was built",
+            false => "the files are not those of the bundle, and nothing was built",
+        });
         toolchain_name = String::from("none: nothing was built");
-    } else if manifest.part == expected::PRODUCT {
-        if changed_files.is_empty() {
-            let product = product::Product {
-                language,
-                manifest: &manifest,
-                folder: &folder,
-                path,
-                target,
-            };
-            let found = product.verified(command)?;
-            (toolchain_name, selftest) = (found.toolchain, Some(found.selftest));
-            problems.extend(found.problems);
-            run.functions = found.functions;
-        }
+    } else if is_product {
+        let product = product::Product {
+            language,
+            manifest: &manifest,
+            folder: &folder,
+            path,
+            target,
+        };
+        let found = product.verified(command)?;
+        (toolchain_name, selftest) = (found.toolchain, Some(found.selftest));
+        problems.extend(found.problems);
+        run.functions = found.functions;
     } else if manifest.part != "tables" {
         // Built from copies: no name of the folder's reaches a compiler.
         let made = TemporaryFolder::of_the_system()
@@ -164,8 +171,10 @@ pub fn verify(
             }
             // Which file was changed says more than what a compiler thinks of it.
             Err(Error::Check(_)) if !changed_files.is_empty() => {
-                toolchain_name = String::from("none: the changed files do not compile");
-                problems.push("the changed files do not compile".to_owned());
+                let why = "the changed files do not compile";
+                not_built = Some(why);
+                toolchain_name = format!("none: {why}");
+                problems.push(why.to_owned());
             }
             Err(error) => return Err(error),
         }
@@ -191,6 +200,7 @@ pub fn verify(
         toolchain: toolchain_name,
         changed_files,
         is_another,
+        not_built,
         problems,
         selftest,
         vectors,
@@ -206,7 +216,9 @@ fn read_manifest(folder: &Folder, path: &Path) -> Result<(Manifest, String)> {
         InputError::new(format!("this is no manifest of a bundle: {e}"))
             .in_file(&named)
             .at(e.line().max(1), e.column().max(1))
-            .help(AGAIN)
+            .help(format!(
+                "{AGAIN}, with `--force` where it refuses the damaged manifest"
+            ))
     })?;
     if let Some(why) = expected::unusable(&manifest) {
         return Err(
