@@ -306,6 +306,69 @@ fn the_readmes_example_compiles_and_runs() {
     }
 }
 
+/// A bias of 16 bits goes into a narrower parameter: the README has the cast that a strict compiler asks for.
+#[test]
+fn bias_and_rate_called_by_hand_compile_as_the_readme_says() {
+    let coefficients = "coefficients_raw = [114923930, 800391448, 1415954326]";
+    let small = DEFAULT.replacen(
+        coefficients,
+        "coefficients_raw = [1149239, 80039, 14159]",
+        1,
+    );
+    let design = reader::parse(&small, None).expect("a design");
+    let emitted = files::emit(&design, Part::Compensation, Language::C, "test").expect("a bundle");
+    assert!(text(&emitted, "gyro.h").contains("gyro_rate(int32_t raw_rate, int16_t bias)"));
+    let call = "gyro_rate(raw_rate, (int16_t)gyro_bias(thermometer))";
+    let readme = text(&emitted, "README.md");
+    assert!(readme.contains(&format!("write `{call}`")), "{readme}");
+    let folder = tempfile::tempdir().expect("a folder");
+    files::write(&emitted, folder.path()).expect("written");
+    let main = format!(
+        "#include \"gyro.h\"\nint main(void)\n{{\n    const int32_t thermometer = 5;\n    const int32_t raw_rate = 7;\n    \
+         return ({call} == gyro_compensate(thermometer, raw_rate).rate) ? 0 : 1;\n}}\n"
+    );
+    std::fs::write(folder.path().join("main.c"), main).expect("written");
+    let mut arguments: Vec<&str> = STRICT.to_vec();
+    let sources = ["main.c", "gyro.c", "gyro_tables.c", "-o", "run"];
+    arguments.extend(sources);
+    compile(folder.path(), &arguments);
+    let ran = Command::new(folder.path().join("run")).status();
+    assert!(ran.expect("it runs").success());
+    // Where the types agree there is nothing to cast.
+    let (_, whole) = chain(DEFAULT);
+    assert!(!text(&whole, "README.md").contains("The cast loses nothing"));
+}
+
+/// The README has no empty section, and says of each function what an input outside its range comes to.
+#[test]
+fn the_readme_says_what_there_is() {
+    let design = reader::parse(DEFAULT, None).expect("a design");
+    let of_part = |part| files::emit(&design, part, Language::C, "test").expect("a bundle");
+    let (whole, compensation) = (of_part(Part::Chain), of_part(Part::Compensation));
+    let (whole, compensation) = (text(&whole, "README.md"), text(&compensation, "README.md"));
+    assert!(whole.contains("\n## Memory\n") && whole.contains("; every entry of the tables."));
+    assert!(!compensation.contains("## Memory") && !compensation.contains("of the tables"));
+    let clamped = "an input outside its range is clamped to it";
+    assert_eq!(
+        compensation.matches(clamped).count(),
+        3,
+        "bias, rate, compensate"
+    );
+    let wrong = "an input outside its range is not clamped";
+    let (_, integrate) = whole.split_once("- `integrate`\n").expect("the function");
+    let (integrate, _) = integrate.split_once("\n\n").expect("its end");
+    assert!(integrate.contains(wrong), "{integrate}");
+    for readme in [whole, compensation] {
+        assert!(!readme.contains("nothing is promised"));
+        let (_, checked) = readme
+            .split_once("\n## What was checked")
+            .expect("the section");
+        assert!(!checked.contains(";\n"), "{checked}");
+        let prefix = "Every name begins with `gyro_`";
+        assert_eq!(readme.matches(prefix).count(), 1);
+    }
+}
+
 /// GCC takes the sum of an unsigned word and of a short parameter's bits for one of signed words.
 #[test]
 fn a_short_product_in_a_sum_of_32_bits_compiles_without_a_warning() {

@@ -1,10 +1,10 @@
 //! What the templates show: strings only, made from the bundle.
 
 use super::bundle::{Bundle, StateType};
-use super::machine::{Type, Width};
+use super::machine::{Lowered, Type, Width};
 use super::{c, rust};
 use crate::numeric::arithmetic::Port;
-use crate::numeric::trace::ir::{Interval, SlotKind};
+use crate::numeric::trace::ir::{Function, Interval, SlotKind};
 use crate::text::{self, Place, constant};
 
 /// A language to print.
@@ -90,6 +90,8 @@ pub struct FunctionView {
     pub name: String,
     /// Domain, range, meaning.
     pub notes: Vec<String>,
+    /// What comes of a word outside an input's range; empty where the types hold no such word.
+    pub outside: &'static str,
     /// Prototype without `;`.
     pub declaration: String,
     /// Definition.
@@ -381,6 +383,7 @@ fn function(bundle: &Bundle, k: usize, language: Language) -> FunctionView {
     FunctionView {
         name: function.name.clone(),
         notes,
+        outside: outside(function, lowered),
         declaration: c::signature(bundle, k),
         definition: match language {
             Language::C => c::definition(bundle, k),
@@ -414,6 +417,20 @@ fn input(range: Interval, ty: String, language: Language) -> InputView {
             low: rust::constant(range.low, Type::Signed(Width::W64)),
             span: format!("{span}_u64"),
         },
+    }
+}
+
+/// What comes of a word that an input's type holds and its range does not.
+fn outside(function: &Function, lowered: &Lowered) -> &'static str {
+    let mut inputs = function.inputs.iter().zip(&lowered.inputs);
+    let holds_more = inputs
+        .any(|((_, range), ty)| matches!(ty, Type::Signed(width) if width.interval() != *range));
+    match (holds_more, lowered.guarded) {
+        (false, _) => "",
+        (true, true) => "an input outside its range is clamped to it",
+        (true, false) => {
+            "an input outside its range is not clamped: what comes of it is wrong, and no operation overflows"
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::emit::bundle::Bundle;
 use crate::emit::c;
 use crate::emit::machine::{Type, Width};
-use crate::emit::views::Language;
+use crate::emit::views::{FunctionView, Language};
 use crate::numeric::arithmetic::{Port, Scale};
 use crate::text::{Place, constant, shown};
 
@@ -27,6 +27,51 @@ pub struct ExampleView {
     pub results: Vec<(String, String)>,
     /// What the result stands for.
     pub found: String,
+}
+
+/// The call of `rate` with what `bias` gives, which is a wider word than `rate` takes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ByHand {
+    /// What `rate` takes.
+    pub parameter: String,
+    /// What `bias` gives.
+    pub result: String,
+    /// The call, with a cast.
+    pub call: String,
+}
+
+impl ByHand {
+    /// Of the two functions; `None` where the types are the same, or the bias is not all that is given.
+    pub(super) fn of(
+        prefix: &str,
+        language: Language,
+        bias: &FunctionView,
+        rate: &FunctionView,
+    ) -> Option<Self> {
+        let (parameter, result) = (rate.inputs.last()?.ty.clone(), bias.result.clone());
+        // A bias that comes with a flag is a part of a structure.
+        if parameter == result || bias.outputs.len() != 1 {
+            return None;
+        }
+        let fault = |f: &FunctionView, to: &'static str| if f.faults { to } else { "" };
+        let call = match language {
+            Language::C => format!(
+                "{prefix}_rate(raw_rate, ({parameter}){prefix}_bias(thermometer{}){})",
+                fault(bias, ", &fault"),
+                fault(rate, ", &fault"),
+            ),
+            Language::Rust => format!(
+                "{prefix}::rate(raw_rate, {prefix}::bias(thermometer{}) as {parameter}{})",
+                fault(bias, ", &mut fault"),
+                fault(rate, ", &mut fault"),
+            ),
+        };
+        Some(ByHand {
+            parameter,
+            result,
+            call,
+        })
+    }
 }
 
 /// A call of the last function, each of whose inputs lies at five eighths of its range (a flag is set); `result` is the type

@@ -1,6 +1,6 @@
 //! Everything that the templates of a bundle see.
 
-use super::example::{ExampleView, example};
+use super::example::{ByHand, ExampleView, example};
 use super::tested::{self, TestView, Tested};
 use super::vectors::{self, Checked};
 use crate::design::Design;
@@ -191,6 +191,13 @@ impl View {
                 .functions
                 .last()
                 .is_some_and(|f| f.name == "compensate")
+    }
+
+    /// The call of `rate` with the result of `bias`, where that is cast to a narrower parameter.
+    pub(super) fn by_hand(&self) -> Option<ByHand> {
+        let named = |name: &str| self.functions.iter().find(|f| f.name == name);
+        let (bias, rate) = (named("bias")?, named("rate")?);
+        ByHand::of(&self.p, self.language, bias, rate)
     }
 
     pub(super) fn is_c(&self) -> bool {
