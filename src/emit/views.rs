@@ -428,9 +428,7 @@ fn outside(function: &Function, lowered: &Lowered) -> &'static str {
     match (holds_more, lowered.guarded) {
         (false, _) => "",
         (true, true) => "an input outside its range is clamped to it",
-        (true, false) => {
-            "an input outside its range is not clamped: what comes of it is wrong, and no operation overflows"
-        }
+        (true, false) => "an input outside its range is not clamped: its result may be wrong",
     }
 }
 

@@ -80,7 +80,8 @@ impl Whose {
 
     /// What is lost where `coming` has taken this bundle's place; `None` where it is made of the same design.
     pub fn replaced_by(&self, coming: &Whose) -> Option<String> {
-        if self.sha256 == coming.sha256 && self.language == coming.language {
+        let is_same_text = self.is_of_the_design_of(coming) && self.sha256 == coming.sha256;
+        if is_same_text && self.language == coming.language {
             return None;
         }
         let sha256: String = self.sha256.chars().take(SHOWN_DIGITS).collect();
@@ -208,6 +209,9 @@ mod tests {
             ..old.clone()
         };
         says(&old, &new).expect("an edited design");
+        // The fit of `run` is not in the text that it was given.
+        let fitted = whose("run a.toml --record r.csv");
+        assert!(fitted.replaced_by(&whose("emit a.toml --lang c")).is_some());
         let note = old.replaced_by(&new).expect("a note");
         assert!(
             note.contains("`gyrogen emit design.toml --lang c`"),
