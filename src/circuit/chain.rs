@@ -307,25 +307,52 @@ impl<const N: usize> Chain<N> {
         slow: &mut SlowState<A::Word>,
     ) -> Row<A::Word> {
         let channels = self.decimated(ar, fast);
+        let blocks = RowBlocks {
+            nco: &self.nco,
+            cordic: &self.cordic,
+            compensation: self.compensation.as_ref(),
+            in_range: self.in_range.as_ref(),
+            by_tuning_word: self.by_tuning_word,
+            phase_loop: self.phase_loop.as_ref(),
+            amplitude_loop: self.amplitude_loop.as_ref(),
+        };
+        blocks.row(ar, channels, &mut fast.oscillator, slow)
+    }
+}
+
+/// What works on the channels of a decimated sample. It is the same for every number of stages, so that it is compiled once.
+struct RowBlocks<'a> {
+    nco: &'a Oscillator,
+    cordic: &'a Vectoring,
+    compensation: Option<&'a (Bias, Rate)>,
+    in_range: Option<&'a InRange>,
+    by_tuning_word: bool,
+    phase_loop: Option<&'a PhaseLoop>,
+    amplitude_loop: Option<&'a AmplitudeLoop>,
+}
+
+impl RowBlocks<'_> {
+    fn row<A: Arithmetic>(
+        &self,
+        ar: &A,
+        channels: [A::Word; 4],
+        oscillator: &mut OscillatorState<A::Residue>,
+        slow: &mut SlowState<A::Word>,
+    ) -> Row<A::Word> {
         let [drive_i, drive_q, sense_i, _] = channels;
-        let [phase, magnitude] = ar.call(&self.cordic, "", &mut (), [drive_i, drive_q]);
+        let [phase, magnitude] = ar.call(self.cordic, "", &mut (), [drive_i, drive_q]);
         let thermometer = if self.compensation.is_some() && self.by_tuning_word {
-            ar.call(&Detuning(&self.nco), "nco", &mut fast.oscillator, [])
+            ar.call(&Detuning(self.nco), "nco", oscillator, [])
         } else {
             [phase]
         };
-        let blocks = (self.compensation.as_ref(), self.in_range.as_ref());
+        let blocks = (self.compensation, self.in_range);
         let (compensation, in_range) = compensated(ar, blocks, sense_i, thermometer);
-        if let (Some(block), Some(state)) = (&self.phase_loop, &mut slow.phase_loop) {
+        if let (Some(block), Some(state)) = (self.phase_loop, &mut slow.phase_loop) {
             let [correction] = ar.call(block, "phase_loop", state, [phase]);
-            let [] = ar.call(
-                &Retune(&self.nco),
-                "nco",
-                &mut fast.oscillator,
-                [correction],
-            );
+            let [] = ar.call(&Retune(self.nco), "nco", oscillator, [correction]);
         }
-        let gain = match (&self.amplitude_loop, &mut slow.amplitude_loop) {
+        let gain = match (self.amplitude_loop, &mut slow.amplitude_loop) {
             (Some(block), Some(state)) => {
                 let [gain] = ar.call(block, "amplitude_loop", state, [magnitude]);
                 Some(gain)

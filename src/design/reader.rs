@@ -185,13 +185,15 @@ fn syntax(doc: &Doc, e: &toml::de::Error) -> Error {
 /// What to do about a value in brackets that is open at a mistake.
 fn open_bracket(text: &str, offset: usize) -> Option<String> {
     let before = text.get(..offset)?;
-    let equals = before.rfind('=')?;
-    let value = before[equals + 1..].trim_start();
-    let close = match value.chars().next()? {
-        '[' => ']',
-        '{' => '}',
-        _ => return None,
-    };
+    let (equals, close) = before.rmatch_indices('=').find_map(|(at, _)| {
+        let value = before[at + 1..].trim_start();
+        let close = match value.chars().next()? {
+            '[' => ']',
+            '{' => '}',
+            _ => return None,
+        };
+        Some((at, close))
+    })?;
     let line = before[..equals].matches('\n').count() + 1;
     let key = before[..equals].lines().last().unwrap_or("").trim();
     Some(match text[offset..].trim().is_empty() {

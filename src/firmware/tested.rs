@@ -6,8 +6,9 @@ use crate::emit::machine::{Lowered, Type, Typed, Width, residue_type, word_type}
 use crate::emit::views::{Language, word_64};
 use crate::emit::{c, rust};
 use crate::numeric::trace::ir::{Interval, SlotKind};
-use crate::vectors::interpreter::{Interpreter, StateWord};
+use crate::vectors::interpreter::Interpreter;
 use crate::vectors::model::Model;
+use crate::vectors::state::StateWord;
 
 /// A function as self-test and harness call it.
 #[derive(Debug, Clone)]

@@ -133,8 +133,8 @@ fn every_unusable_csv_is_refused_with_line_and_column() {
     for (text, line, column, says, before) in [
         (format!("{h}1,\n"), 2, 3, "cell of sense_code is empty", 0),
         (format!("{h}1,2\n ,2\n"), 3, 1, "drive_code is empty", 1),
-        (format!("{h}1,2\n3,nan\n"), 3, 3, "sense_code `nan`", 1),
-        (format!("{h}1,2\n3,  NaN \n"), 3, 5, "`NaN` is no", 1),
+        (format!("{h}1,2\n3,nan\n"), 3, 3, "sense_code is `nan`", 1),
+        (format!("{h}1,2\n3,  NaN \n"), 3, 5, "is `NaN`: the instrument", 1),
         (format!("{h}1.0,2\n"), 2, 1, "`1.0` is no integer", 0),
         (format!("{h}+1,2\n"), 2, 1, "`+1`", 0),
         (format!("{h}1,-\n"), 2, 3, "`-` is no", 0),

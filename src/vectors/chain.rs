@@ -1,7 +1,8 @@
 //! The bit-accurate chain one sample at a time, with all that the emitted chain puts out and remembers:
 //! the columns of `replay`, the bias that stands behind the rate, and the state.
 
-use super::interpreter::{Interpreter, StateWord};
+use super::interpreter::Interpreter;
+use super::state::StateWord;
 use crate::circuit::chain::{Chain, FastState, SlowState};
 use crate::circuit::decimator::Decimate;
 use crate::circuit::engine;

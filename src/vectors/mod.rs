@@ -10,5 +10,6 @@ pub mod interpreter;
 pub mod model;
 mod repair;
 pub mod search;
+pub mod state;
 pub mod stimulus;
 mod telling;

@@ -1,8 +1,9 @@
 //! The bit-accurate model of each emitted function, as something that can be called: without a state the block
 //! itself in [`Fixed`] arithmetic; with one the recorded program, its state going in and coming out as words.
 
-use super::interpreter::{Interpreter, StateWord};
+use super::interpreter::Interpreter;
 use super::repair::Repair;
+use super::state::StateWord;
 use crate::circuit::chain::Chain;
 use crate::circuit::compensate::Compensate;
 use crate::circuit::compensation::{Bias, Evaluation, Rate};

@@ -330,15 +330,13 @@ impl Search<'_> {
             words = moved(&words, k, (off as f64 / most).round() as i128);
         }
         let other = (steepest + 1) % words.len();
-        for d in -NEAR..=NEAR {
-            for e in -NEAR..=NEAR {
-                let near = moved(&moved(&words, steepest, d), other, e);
-                if self.value(&near, node) == goal && self.is_allowed(&near) {
-                    return Some(near);
-                }
-            }
-        }
-        None
+        (-NEAR..=NEAR).find_map(|d| {
+            let row = moved(&words, steepest, d);
+            let value = |e: i128| self.value(&moved(&row, other, e), node);
+            let hits = (first_at(&value, goal)?..=NEAR).take_while(|e| value(*e) == goal);
+            let mut hits = hits.map(|e| moved(&row, other, e));
+            hits.find(|near| self.is_allowed(near))
+        })
     }
 
     /// Every entry of a sine table, once through each node that reads it.
@@ -384,6 +382,27 @@ fn half_step(table: &SineTable) -> i128 {
     }
 }
 
+/// The first of -[`NEAR`] ..= [`NEAR`] at which a monotone function has come to the goal.
+fn first_at(value: &dyn Fn(i128) -> i128, goal: i128) -> Option<i128> {
+    let (mut low, mut high) = (-NEAR, NEAR);
+    let rises = value(low) <= value(high);
+    let is_past = |e: i128| match rises {
+        true => value(e) >= goal,
+        false => value(e) <= goal,
+    };
+    if !is_past(high) {
+        return None;
+    }
+    while low < high {
+        let middle = (low + high).div_euclid(2);
+        match is_past(middle) {
+            true => high = middle,
+            false => low = middle + 1,
+        }
+    }
+    Some(high)
+}
+
 /// The steps of a word that bring a value with this slope to the target modulo 2^bits: the shortest, and those of a period
 /// more and less; none where no step does.
 fn steps_to(target: i128, value: i128, slope: i128, bits: u32) -> Vec<i128> {
@@ -423,6 +442,14 @@ fn inverse(odd: i128) -> i128 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_monotone_function_is_found_at_its_first_goal() {
+        assert_eq!(first_at(&|e| e / 3, 2), Some(6));
+        assert_eq!(first_at(&|e| -e, 40), Some(-40));
+        assert_eq!(first_at(&|e| 2 * e, 1), Some(1));
+        assert_eq!(first_at(&|e| e, 41), None);
+    }
 
     #[test]
     fn an_inverse_gives_one() {
