@@ -26,7 +26,8 @@ typedef struct {
 
 {% endfor %}{% for f in v.functions %}{% if !f.internal %}/* {{ f.name }}
 {% for line in f.notes %} *   {{ line }}
-{% endfor %} */
+{% endfor %}{% if !f.outside.is_empty() %} *   {{ f.outside }}
+{% endif %} */
 {{ f.declaration }};
 
 {% endif %}{% endfor %}{% if v.chain %}/* The chain with its sample counter. */

@@ -51,7 +51,8 @@ fn check_{{ c }}(a: {{ c }}, low: {{ c }}, high: {{ c }}, number: u32, fault: &m
 ///
 /// ```text
 {% for line in f.notes %}/// {{ line }}
-{% endfor %}/// ```
+{% endfor %}{% if !f.outside.is_empty() %}/// {{ f.outside }}
+{% endif %}/// ```
 {{ f.definition }}
 {% endfor %}{% if v.chain %}/// The chain with its sample counter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
