@@ -20,8 +20,8 @@ const CHUNK_BYTES: u64 = 1 << 20;
 /// A path that cannot be opened; a folder; a device, which has no end.
 pub fn open(path: &Path, what: &str) -> Result<File> {
     let failed = |e: &io::Error| io_error(path, &format!("read the {what}"), e);
-    let file = File::open(path).map_err(|e| match (in_other_letters(path), failed(&e)) {
-        (Some(other), Error::Input(e)) if !path.exists() => {
+    let file = File::open(path).map_err(|e| match (similar(path), failed(&e)) {
+        (Some(other), Error::Input(e)) if !path.exists() && !other.is_dir() => {
             e.help(format!("did you mean {}?", other.display())).into()
         }
         (_, error) => error,
@@ -46,16 +46,27 @@ pub fn open(path: &Path, what: &str) -> Result<File> {
     Ok(file)
 }
 
-/// The file in the same folder whose name differs in capitals alone.
-fn in_other_letters(path: &Path) -> Option<PathBuf> {
+/// What lies in the same folder under nearly that name: one that differs in capitals alone, else in few letters.
+pub fn similar(path: &Path) -> Option<PathBuf> {
     let folder = match path.parent()? {
         here if here == Path::new("") => Path::new("."),
         folder => folder,
     };
-    let mut entries = std::fs::read_dir(folder).ok()?.flatten();
-    let name = path.file_name()?;
-    let other = entries.find(|e| e.file_name().eq_ignore_ascii_case(name))?;
-    Some(path.with_file_name(other.file_name()))
+    let name = path.file_name()?.to_str()?;
+    let entries = std::fs::read_dir(folder).ok()?.flatten();
+    let mut names: Vec<String> = entries
+        .filter_map(|e| e.file_name().into_string().ok())
+        .filter(|other| !other.starts_with('.'))
+        .collect();
+    // The order of a folder's entries is nobody's.
+    names.sort();
+    let known: Vec<&str> = names.iter().map(String::as_str).collect();
+    // A name of a letter or two is near to any other.
+    let is_short = name.split('.').next().is_none_or(|stem| stem.len() < 3);
+    let near = || crate::nearest::nearest(name, &known).filter(|_| !is_short);
+    let in_capitals = known.iter().find(|other| other.eq_ignore_ascii_case(name));
+    let other = in_capitals.copied().or_else(near)?;
+    Some(path.with_file_name(other))
 }
 
 /// All bytes of a text, or as many as it takes to see that it is none (a byte 0, or what is not UTF-8).
@@ -139,6 +150,17 @@ mod tests {
         let error = text_bytes(Endless(b"1,2\n", 0), Path::new("x"), "design", 1 << 22);
         let error = error.unwrap_err().to_string();
         assert!(error.contains("larger than 4 MiB"), "{error}");
+    }
+
+    #[test]
+    fn a_name_with_a_letter_too_many_is_shown_right() {
+        let made = tempfile::tempdir().expect("a folder");
+        let at = made.path();
+        std::fs::write(at.join("run.csv"), "").expect("written");
+        for name in ["runn.csv", "Run.CSV"] {
+            assert_eq!(similar(&at.join(name)), Some(at.join("run.csv")), "{name}");
+        }
+        assert_eq!(similar(&at.join("elsewhere.csv")), None);
     }
 
     #[cfg(unix)]

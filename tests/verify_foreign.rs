@@ -284,8 +284,19 @@ fn a_changed_file_is_named_also_where_it_does_not_compile() {
     assert!(!said.contains("nothing was built"), "{said}");
     let result = Path::new("c").join("verify.json");
     assert!(
-        said.ends_with(&format!("wrote {}\n", result.display())),
+        said.contains(&format!("wrote {}\n", result.display())),
         "{said}"
+    );
+    let last = said.lines().last().unwrap_or("");
+    assert!(
+        last.starts_with("verdict: does not hold: files differ from the manifest"),
+        "{said}"
+    );
+    // No file of somebody's own is there to be moved.
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        !told.contains("files of your own") && told.contains("`gyrogen emit"),
+        "{told}"
     );
     assert!(at.join("verify.json").is_file());
 }

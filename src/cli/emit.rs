@@ -9,7 +9,7 @@ use crate::design::{Compensation, Design};
 use crate::emit::bundle::Part;
 use crate::emit::views::Language;
 use crate::error::{InputError, Result};
-use crate::firmware::another::Whose;
+use crate::firmware::another::{self, Whose};
 use crate::firmware::correction::Origin;
 use crate::firmware::files::EmittedFile;
 use crate::firmware::{conversion, correction, files, manifest, product, replace};
@@ -49,6 +49,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         Some(_) => Part::Correction,
         None => Part::Chain,
     });
+    another::refuse_inside(&arguments.out)?;
     let mut results = Results::claim(&arguments.out, &[manifest::NAME], &recorded.inputs)?;
     let coming = Whose::of(&design, arguments.lang, &recorded.command);
     let earlier = Whose::in_folder(&arguments.out)?;
@@ -115,6 +116,9 @@ fn remarks(design: &Design, part: Part, asked: bool) -> Vec<String> {
         _ => {}
     }
     let has_bias = compensates || part == Part::All;
+    if part == Part::Chain && design.compensation.is_none() {
+        remarks.push(lacks_compensation(&design.source.text));
+    }
     let unfitted = |c: &&Compensation| has_bias && c.fitted.is_none();
     if design.compensation.as_ref().filter(unfitted).is_some() {
         let whose = match design.compensation_is_own {
@@ -127,6 +131,19 @@ fn remarks(design: &Design, part: Part, asked: bool) -> Vec<String> {
         ));
     }
     remarks
+}
+
+/// The warning that a firmware gives raw rates alone, for a design with this text: a copy that was cut is one that still reads.
+fn lacks_compensation(text: &str) -> String {
+    let cut = match text.ends_with(['\n', '\r']) || text.is_empty() {
+        true => "",
+        false => {
+            ", and the file ends without the end of a line: if a copy was cut short, copy it again"
+        }
+    };
+    format!(
+        "warning: this design has no [compensation]: the firmware gives no compensated rate{cut}"
+    )
 }
 
 /// The warning that a firmware has not what the design's `[correction]` corrects.
@@ -160,4 +177,17 @@ fn correction(design: &Design, language: Language, command: &str) -> Result<Vec<
         command,
     };
     correction::emit(&planned.compile()?, &origin, language)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::lacks_compensation;
+
+    #[test]
+    fn a_design_that_was_cut_is_told_from_one_without_compensation() {
+        let whole = lacks_compensation("name = \"a\"\n");
+        assert!(whole.ends_with("no compensated rate"), "{whole}");
+        let cut = lacks_compensation("name = \"a\"");
+        assert!(cut.contains("copy it again"), "{cut}");
+    }
 }

@@ -27,6 +27,7 @@ mod shell;
 mod simulate;
 mod stages;
 mod study;
+mod unknown;
 mod values;
 mod verify;
 
@@ -126,7 +127,7 @@ fn with_advice(mut error: clap::Error) -> clap::Error {
         _ => String::new(),
     };
     match error.kind() {
-        ErrorKind::UnknownArgument => of_unknown_argument(error),
+        ErrorKind::UnknownArgument => unknown::with_advice(error),
         ErrorKind::InvalidSubcommand if error.get(ContextKind::SuggestedSubcommand).is_none() => {
             // `help WORD` asks for no similar word by itself.
             let word = text(&error, ContextKind::InvalidSubcommand);
@@ -210,33 +211,6 @@ fn of_missing(missing: &str) -> &'static str {
         return "give the measured record with `--record FILE`; `close` takes a capture of ADC codes with `--capture FILE` in its place";
     }
     "add it; `--help` behind the command says what it is"
-}
-
-/// Says where a second file belongs: one file alone, the design, has no option.
-fn of_unknown_argument(mut error: clap::Error) -> clap::Error {
-    use clap::error::{ContextKind, ContextValue};
-    let argument = match error.get(ContextKind::InvalidArg) {
-        Some(ContextValue::String(argument)) => argument.clone(),
-        _ => return error,
-    };
-    let advice = match argument.as_str() {
-        "--record" => "records are taken by `run` and `close`",
-        "--capture" => "captures are taken by `replay`, `equiv` and `close`",
-        "--lang" => {
-            "`close` and `approx` always write both C and Rust, without an option; `run`, `equiv` and `emit` take `--lang`"
-        }
-        // A similar option, if there is one, is named beside this.
-        option if option.starts_with('-') => "",
-        _ => {
-            "a record is given with --record FILE, a capture with --capture FILE, a folder for results with --out DIR; the \
-             design is the one file without an option"
-        }
-    };
-    error.remove(ContextKind::Suggested);
-    match advice.is_empty() {
-        true => error,
-        false => with_tip(error, advice),
-    }
 }
 
 /// Runs a subcommand; `recorded` is what its files say of how they were made.

@@ -91,7 +91,9 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     if verification.holds {
         return Ok(());
     }
-    Err(Error::Check(reasons(&verification).join("; ")))
+    let said = reasons(&verification).into_iter();
+    let said: Vec<String> = said.chain(remedy(&verification)).collect();
+    Err(Error::Check(said.join("; ")))
 }
 
 /// A result in a bundle's folder, which may be anybody's, replaces a plain file or nothing.
@@ -139,6 +141,9 @@ fn refuse_no_bundle(folder: &Path) -> Result<()> {
     if folder.join(manifest::NAME).symlink_metadata().is_ok() {
         return Ok(());
     }
+    if matches!(folder.try_exists(), Ok(false)) {
+        return Err(no_such_folder(folder).into());
+    }
     let (what, bundles) = match folder.is_file() {
         true => (
             "this is a file, and `verify` takes the folder of a bundle".to_owned(),
@@ -157,6 +162,18 @@ fn refuse_no_bundle(folder: &Path) -> Result<()> {
         false => format!("did you mean the folder {}?", named.join(" or ")),
     };
     Err(InputError::new(what).in_file(folder).help(help).into())
+}
+
+/// The error for a folder that is not there.
+fn no_such_folder(folder: &Path) -> InputError {
+    let help = match crate::input::similar(folder).filter(|other| other.is_dir()) {
+        Some(other) => format!("did you mean {}?", other.display()),
+        None => "check the path: `verify` takes the folder of sources that `emit`, `run`, `close` or `approx` wrote"
+            .to_owned(),
+    };
+    InputError::new("this folder does not exist")
+        .in_file(folder)
+        .help(help)
 }
 
 /// The bundles in the folders of results that lie below a folder.
@@ -199,8 +216,18 @@ fn print(v: &Verification, folder: &Path) {
     }
     say!("digest: {}", v.digest);
     say!("wrote {}", folder.join(RESULT).display());
+    say!("verdict: {}", verdict(v));
 }
 
+/// Whether the bundle holds, and why it does not.
+fn verdict(v: &Verification) -> String {
+    match v.holds {
+        true => "holds".to_owned(),
+        false => format!("does not hold: {}", reasons(v).join("; ")),
+    }
+}
+
+/// What was found wrong.
 fn reasons(v: &Verification) -> Vec<String> {
     let mut reasons = Vec::new();
     for f in v.functions.iter().filter(|f| f.mismatches > 0) {
@@ -218,18 +245,27 @@ fn reasons(v: &Verification) -> Vec<String> {
         reasons.push(format!("files differ from the manifest: {files}"));
     }
     reasons.extend(v.problems.iter().cloned());
+    reasons
+}
+
+/// What to do about what was found; `None` where the code itself differs.
+fn remedy(v: &Verification) -> Option<String> {
     if v.is_another {
-        reasons.push(
+        return Some(
             "the files are those of the manifest: give the digest or the design of this very bundle, or write it again from that \
              design"
                 .to_owned(),
         );
-    } else if !v.changed_files.is_empty() || !v.problems.is_empty() {
-        reasons.push(
-            "move files of your own out of the folder; where the bundle's files changed, write it again with the command that made \
-             it (`--force` replaces edited ones)"
-                .to_owned(),
-        );
     }
-    reasons
+    if v.changed_files.is_empty() && v.problems.is_empty() {
+        return None;
+    }
+    let foreign = match v.has_foreign {
+        true => "move files of your own out of the folder; where the bundle's files changed, ",
+        false => "",
+    };
+    Some(format!(
+        "{foreign}write the bundle again with the command that made it, `{}`, and its --out (`--force` replaces edited files)",
+        v.made_by
+    ))
 }

@@ -154,6 +154,10 @@ pub(super) fn remedy(path: &str, known: &[&str], unknown: &str) -> String {
     if let [key] = known.iter().filter(begins).collect::<Vec<_>>()[..] {
         return format!("did you mean {}?", spelled(key));
     }
+    // Many tables have an `id` or a `name`: those of an array of tables are not moved elsewhere.
+    if let Some(array) = array_title(path) {
+        return own_keys(&array, known);
+    }
     let known_table = KEYS.iter().find_map(|(table, keys)| {
         let found = keys.iter().find(|(key, _)| *key == plain)?;
         (*table != path && known.iter().all(|k| *k != plain)).then_some((*table, found.0))
@@ -174,12 +178,25 @@ pub(super) fn remedy(path: &str, known: &[&str], unknown: &str) -> String {
             "delete it: the effects that a device can be given here are {}",
             one_of(known.iter().copied())
         ),
-        None => format!(
-            "delete it, or use one of the keys of {}: {}",
-            title(path),
-            one_of(known.iter().copied())
-        ),
+        None => own_keys(&title(path), known),
     }
+}
+
+/// The keys that a table has.
+fn own_keys(title: &str, known: &[&str]) -> String {
+    format!(
+        "delete it, or use one of the keys of {title}: {}",
+        one_of(known.iter().copied())
+    )
+}
+
+/// What a table in an array, as `effects[0]`, is called: `[[effects]]`; `None` for any other table.
+fn array_title(path: &str) -> Option<String> {
+    let (array, rest) = path.split_once('[')?;
+    Some(match rest.contains('.') {
+        true => title(path),
+        false => format!("`[[{array}]]`"),
+    })
 }
 
 /// A key with another unit than the one it has, or with none.
@@ -253,6 +270,11 @@ mod tests {
         assert!(remedy("circuit", &circuit, "phase_bits").contains("`[circuit.nco]`"));
         assert!(remedy("", &names(""), "nco").contains("`[circuit.nco]`"));
         assert!(remedy("", &names(""), "zzzzzzzz").contains("delete it"));
+        let said = remedy("effects[0]", &["id", "expression"], "name");
+        assert!(
+            said.contains("`[[effects]]`: `id` or `expression`"),
+            "{said}"
+        );
         let thermal = names("thermal_run");
         assert!(remedy("thermal_run", &thermal, "start_k").contains("subtract 273.15"));
     }

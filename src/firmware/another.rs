@@ -9,7 +9,7 @@ use crate::design::Design;
 use crate::emit::views::Language;
 use crate::error::{InputError, Result};
 use crate::text::{Place, shown};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Digits of a design's SHA-256 that a message shows.
 const SHOWN_DIGITS: usize = 12;
@@ -111,6 +111,47 @@ impl std::fmt::Display for Whose {
             "that of `{command}` (design name `{name}`, in {language})"
         )
     }
+}
+
+/// Refuses a folder that lies in that of a bundle and is none of the bundle's own parts: the bundle would have foreign sources.
+///
+/// # Errors
+/// A folder in a bundle.
+pub fn refuse_inside(folder: &Path) -> Result<()> {
+    let Some(bundle) = bundle_above(folder) else {
+        return Ok(());
+    };
+    let here = std::env::current_dir().and_then(|at| at.canonicalize());
+    let named = here
+        .ok()
+        .and_then(|here| bundle.strip_prefix(here).ok())
+        .filter(|named| !named.as_os_str().is_empty())
+        .unwrap_or(&bundle);
+    let what = format!(
+        "this folder lies in the bundle {}, which would hold files that are not its own. Nothing was written",
+        named.display()
+    );
+    Err(InputError::new(what)
+        .in_file(folder)
+        .help("name a folder outside of that bundle with --out")
+        .into())
+}
+
+/// The bundle that a folder lies in, of which it is no part.
+fn bundle_above(folder: &Path) -> Option<PathBuf> {
+    let absolute = std::path::absolute(folder).ok()?;
+    // A folder that is to be made lies in the first one above it that is there.
+    let mut there = absolute
+        .ancestors()
+        .filter_map(|at| Some((at.canonicalize().ok()?, absolute.strip_prefix(at).ok()?)));
+    let (existing, missing) = there.next()?;
+    let whole = existing.join(missing);
+    let is_bundle = |at: &Path| matches!(Whose::in_folder(at), Ok(Some(_)));
+    let mut above = existing.ancestors().filter(|at| *at != whole);
+    let bundle = above.find(|at| is_bundle(at))?;
+    let below = whole.strip_prefix(bundle).ok()?;
+    let is_part = paths::PARTS.iter().any(|part| below.starts_with(part));
+    (!is_part).then(|| bundle.to_path_buf())
 }
 
 /// The name of the design file that a recorded command emits firmware of, empty for the embedded default; `None` for a
@@ -239,5 +280,28 @@ mod tests {
         std::fs::write(at.join(manifest::NAME), manifest.to_string()).expect("written");
         let found = Whose::in_folder(at).expect("a manifest");
         assert_eq!(found, Some(whose("emit a.toml --lang c")));
+    }
+
+    #[test]
+    fn a_folder_in_a_bundle_is_refused_and_a_part_of_it_is_not() {
+        let made = tempfile::tempdir().expect("a folder");
+        let two = made.path().join("two");
+        std::fs::create_dir(&two).expect("a folder");
+        let manifest = serde_json::json!({ "command": "gyrogen emit a.toml --lang c" });
+        std::fs::write(two.join(manifest::NAME), manifest.to_string()).expect("written");
+        let refused = refuse_inside(&two.join("rust")).expect_err("refused");
+        let said = refused.to_string();
+        assert!(
+            said.contains("lies in the bundle") && said.contains("--out"),
+            "{said}"
+        );
+        for folder in [
+            &two,
+            &two.join("chain"),
+            &made.path().join("three"),
+            &two.join("../three"),
+        ] {
+            refuse_inside(folder).expect("outside, or the bundle's own");
+        }
     }
 }

@@ -26,7 +26,8 @@ pub(super) fn check(record: &ThermalRecord, warnings: &mut Vec<Warning>) {
             "phase_rad" => phase(&column),
             "rate_out_dps" => rate(&column)
                 .or_else(|| at_rest(&column))
-                .or_else(|| counts(&column)),
+                .or_else(|| counts(&column))
+                .or_else(|| not_given(&column)),
             "rate_dps" | "quad_dps" => rate(&column),
             "freq_hz" => frequency(&column),
             "agc" => gain(&column),
@@ -273,6 +274,31 @@ fn counts(c: &Column<'_>) -> Option<Warning> {
             c.min(),
             c.max(),
             c.record.unit_in_design(c.name, "mdps")
+        ),
+    )
+}
+
+/// Smaller outputs may be bias, deg/s (convention): a zero-rate offset is some tens of deg/s at most.
+const LEAST_TURNING_DPS: f64 = 30.0;
+
+/// A bias so large moves with the temperature by more than this part of it; a constant rate does not (convention).
+const STEADY_PART: f64 = 0.5;
+
+/// A steady output that is large for a bias, in a record that does not say how the gyro was turned.
+fn not_given(c: &Column<'_>) -> Option<Warning> {
+    let middle = c.median().abs();
+    let span = c.quantile(0.95) - c.quantile(0.05);
+    let looks_turned = middle >= LEAST_TURNING_DPS && span <= STEADY_PART * middle;
+    let is_given = c.record.column("rate_dps").is_some();
+    if !looks_turned || is_given || c.record.is_of_log() {
+        return None;
+    }
+    c.warn(
+        "rate_not_given",
+        format!(
+            "no rate_dps: the gyro is taken to be at rest, and all of its output, {:.1} deg/s (median), for bias. If it was turned, \
+             give the applied rate as rate_dps",
+            c.median()
         ),
     )
 }

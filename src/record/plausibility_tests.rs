@@ -103,7 +103,7 @@ fn each_mistake_has_its_warning() {
         (
             "rate_out_dps",
             |k| 213.0 + 0.5 * (k * 1.7).sin().round(),
-            None,
+            Some("rate_not_given"),
         ),
         ("rate_out_dps", |k| 13.0 + (k * 1.7).sin().round(), None),
         (
@@ -170,6 +170,21 @@ fn each_mistake_has_its_warning() {
         let expected: Vec<&str> = expected.into_iter().collect();
         assert_eq!(found, expected, "{name} {} .. {}", value(0.0), value(39.0));
     }
+}
+
+#[test]
+fn a_steady_large_output_without_a_rate_is_doubted() {
+    let turned = |k: f64| format!("{k},{}", 150.5 + wiggle(k));
+    assert_eq!(codes("time_s,rate_out_dps", turned), ["rate_not_given"]);
+    let back = |k: f64| format!("{k},{}", -31.0 + wiggle(k));
+    assert_eq!(codes("time_s,rate_out_dps", back), ["rate_not_given"]);
+    // A bias of a bare gyro, which moves with its temperature.
+    let drifts = |k: f64| format!("{k},{}", 40.0 + 1.5 * k + wiggle(k));
+    assert!(codes("time_s,rate_out_dps", drifts).is_empty());
+    // At rest by the record's own word.
+    let rests = |k: f64| format!("{k},{},0", 150.5 + wiggle(k));
+    let found = codes("time_s,rate_out_dps,rate_dps", rests);
+    assert!(!found.contains(&"rate_not_given"), "{found:?}");
 }
 
 #[test]

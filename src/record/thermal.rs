@@ -201,7 +201,15 @@ fn is_of_channels(header: &str, mapping: &RecordMapping) -> bool {
         let mut names = lower.split([',', '\t']);
         names.any(|n| n.trim_matches([' ', '"']).starts_with(word))
     };
-    mapping.columns.is_empty()
+    // A design's names for a record's columns are none of a capture's.
+    let is_mapped = |name: &str| {
+        mapping
+            .columns
+            .values()
+            .any(|c| c.eq_ignore_ascii_case(name))
+    };
+    let mut names = lower.split([',', '\t']);
+    !names.any(|n| is_mapped(n.trim_matches([' ', '"', '\r'])))
         && begins("drive")
         && begins("sense")
         && !OF_RECORDS.iter().any(|word| lower.contains(word))

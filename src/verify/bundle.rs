@@ -41,6 +41,12 @@ pub struct Verification {
     /// All files are those of the manifest, and the bundle is not the one whose digest or design was given.
     #[serde(skip)]
     pub is_another: bool,
+    /// There are sources in the folder that are none of the bundle's.
+    #[serde(skip)]
+    pub has_foreign: bool,
+    /// The command that made the bundle, as its manifest has it.
+    #[serde(skip)]
+    pub made_by: String,
     /// The code was not built, and why: as the rest of "not run: ...".
     #[serde(skip)]
     pub not_built: Option<&'static str>,
@@ -101,6 +107,7 @@ pub fn verify(
     }
     let mut problems = expected::problems(&manifest, &folder)?;
     let own = problems.len();
+    let has_foreign = problems.iter().any(|p| expected::is_of_foreign(p));
     if let Some(due) = &against.digest
         && !due.eq_ignore_ascii_case(&digest)
     {
@@ -200,6 +207,8 @@ pub fn verify(
         toolchain: toolchain_name,
         changed_files,
         is_another,
+        has_foreign,
+        made_by: manifest.command,
         not_built,
         problems,
         selftest,

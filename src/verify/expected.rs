@@ -118,6 +118,14 @@ fn vectors(manifest: &Manifest) -> Vec<String> {
         .collect()
 }
 
+/// What is said of a source that is none of the bundle's.
+const NOT_LISTED: &str = "is a source that the manifest does not list";
+
+/// True for a problem that is a file of somebody's own.
+pub(super) fn is_of_foreign(problem: &str) -> bool {
+    problem.ends_with(NOT_LISTED)
+}
+
 /// What is missing, what is too much, what does not go together.
 ///
 /// # Errors
@@ -153,9 +161,7 @@ pub(super) fn problems(manifest: &Manifest, folder: &Folder) -> Result<Vec<Strin
         let is_source = ending.is_some_and(|e| SOURCES.contains(&e.as_str()))
             || ["Makefile", "makefile", "GNUmakefile", "CMakeLists.txt"].contains(&name);
         if is_source && !listed.contains(&path.as_str()) {
-            problems.push(format!(
-                "{path:?} is a source that the manifest does not list"
-            ));
+            problems.push(format!("{path:?} {NOT_LISTED}"));
         }
     }
     entries(manifest, &mut problems);
