@@ -211,7 +211,8 @@ fn a_simulated_run_and_its_own_record_say_why_their_orders_differ() {
     let own = of(&["run", "--out", "own"]);
     let again = of(&["run", "--record", "own/record.csv", "--out", "again"]);
     assert!(
-        own.contains(": order 2,") && own.contains("by held-out error it would be order 3"),
+        own.contains(": order 2,")
+            && own.contains("within one standard error of the least would be order 3 ("),
         "{own}"
     );
     assert!(

@@ -92,7 +92,8 @@ fn what_check_approx_and_emit_write_fits_and_damage_does_not() {
         (&replayed["samples"], &replayed["rows"]),
         (&json!(1), &json!(0))
     );
-    assert_eq!(replayed["warnings"].as_array().map(Vec::len), Some(1));
+    // The default's coefficients are of another gyro, and the capture is too short for a row.
+    assert_eq!(replayed["warnings"].as_array().map(Vec::len), Some(2));
     let emit = [
         "emit",
         "--lang",

@@ -142,19 +142,20 @@ fn covariates(c: &Closure) {
     }
 }
 
-/// Which rows the held-out figures are of, and why `run` has others: a line each.
+/// What the rows served for, and why `run` has other held-out figures: a line each.
 fn held_out(said: Option<&Said>) -> String {
     let Some(Said { roles, .. }) = said else {
         return "held out: a part of the capture that no fit used".to_owned();
     };
-    let [judge, choose] = roles.map(|share| format!("{:.0} %", 100.0 * share));
+    let [judge, choose] = roles.map(|share| (100.0 * share).round());
+    let fit = 100.0 - judge - choose;
     let which = match roles[0] > 0.0 {
         true => format!(
-            "held out: {judge} of the rows, used neither for a fit nor for a choice. Another {choose} chose among the causes."
+            "rows: {fit} % for fitting, {choose} % for the choice of causes, {judge} % held out for the error."
         ),
         false => format!(
-            "held out: {choose} of the rows, used for no fit. They chose among the causes, as the record is too short to keep others \
-             for the error alone."
+            "rows: {fit} % for fitting, {choose} % for the choice of causes. The held-out error is of these {choose} % too, as the \
+             record is too short to keep others for it alone."
         ),
     };
     format!(
@@ -209,13 +210,14 @@ mod tests {
         };
         let both = said(0.06, 0.2);
         assert!(
-            both.starts_with("held out: 6 % of the rows, used neither"),
+            both.starts_with(
+                "rows: 74 % for fitting, 20 % for the choice of causes, 6 % held out for the error.\n"
+            ),
             "{both}"
         );
-        assert!(both.contains("Another 20 % chose"), "{both}");
         let one = said(0.0, 0.2);
         assert!(
-            one.starts_with("held out: 20 % of the rows, used for no fit"),
+            one.starts_with("rows: 80 % for fitting, 20 % for the choice of causes. The held-out"),
             "{one}"
         );
         for text in [both, one] {

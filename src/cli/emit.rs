@@ -103,6 +103,19 @@ fn part_name(part: Part) -> String {
     format!("{part:?}").to_lowercase()
 }
 
+/// Whose the compensation's coefficients are where no record was fitted, and what fits them; ends in a design file.
+pub(super) fn unfitted(design: &Design) -> Option<String> {
+    let is_unfitted = |c: &&Compensation| c.fitted.is_none();
+    design.compensation.as_ref().filter(is_unfitted)?;
+    let whose = match design.compensation_is_own {
+        true => "those that the design states",
+        false => "the embedded default's, published for its simulated gyro",
+    };
+    Some(format!(
+        "the coefficients of [compensation] are {whose}, not fitted to a record: `gyrogen run` fits them and writes a design.toml"
+    ))
+}
+
 /// What somebody who ships the part has to know of it: what was chosen, what it lacks, what was not fitted.
 fn remarks(design: &Design, part: Part, asked: bool) -> Vec<String> {
     let mut remarks = Vec::new();
@@ -119,16 +132,8 @@ fn remarks(design: &Design, part: Part, asked: bool) -> Vec<String> {
     if part == Part::Chain && design.compensation.is_none() {
         remarks.push(lacks_compensation(&design.source.text));
     }
-    let unfitted = |c: &&Compensation| has_bias && c.fitted.is_none();
-    if design.compensation.as_ref().filter(unfitted).is_some() {
-        let whose = match design.compensation_is_own {
-            true => "those that the design states",
-            false => "the embedded default's, published for its simulated gyro",
-        };
-        remarks.push(format!(
-            "warning: the coefficients of [compensation] are {whose}, not fitted to a record: `gyrogen run` fits them and \
-             writes a design.toml to emit from"
-        ));
+    if let Some(said) = unfitted(design).filter(|_| has_bias) {
+        remarks.push(format!("warning: {said} to emit from"));
     }
     remarks
 }

@@ -95,6 +95,10 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let mut warnings = warn_of_mismatches(&design, &capture);
 
     let columns = engine::columns(&design);
+    if let Some(said) = foreign_bias(&design, &columns) {
+        talk!("warning: {said}");
+        warnings.push(said);
+    }
     let mut header = vec!["index"];
     header.extend(&columns);
     let written = match kind {
@@ -150,6 +154,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         rate(samples, busy),
         rate(samples, started.elapsed()),
     );
+    talk!("{}", units(&design, kind, &columns));
     if arguments.format == OutputFormat::Json {
         let replayed = Replayed {
             schema: "gyrogen.replay/1",
@@ -168,6 +173,52 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         super::terminal::give(&super::json(&replayed));
     }
     Ok(())
+}
+
+/// Said where the rows have a rate that is compensated by the embedded default's coefficients.
+fn foreign_bias(design: &Design, columns: &[&str]) -> Option<String> {
+    let is_foreign = columns.contains(&"rate") && !design.compensation_is_own;
+    let said = super::emit::unfitted(design).filter(|_| is_foreign)?;
+    Some(format!(
+        "{said}. The column rate is compensated for that gyro alone"
+    ))
+}
+
+/// What the numbers in the rows' columns are.
+fn units(design: &Design, kind: ArithmeticKind, columns: &[&str]) -> String {
+    let circuit = &design.circuit;
+    let scaled = |bits: u32, unit: &str| match kind {
+        ArithmeticKind::Fixed => format!("raw * 2^-{bits} {unit}"),
+        ArithmeticKind::Float => unit.to_owned(),
+    };
+    let front = scaled(
+        circuit.decimator.output.format.fraction_bits,
+        "of full scale",
+    );
+    let mut said = vec![format!("drive, sense and magnitude: {front}")];
+    let mut add = |name: &str, bits: u32, unit: &str| {
+        if columns.contains(&name) {
+            said.push(format!("{name}: {}", scaled(bits, unit)));
+        }
+    };
+    add("phase", circuit.cordic.angle_bits, "turn");
+    if let Some(c) = &design.compensation {
+        add("rate", c.output.format.fraction_bits, "deg/s");
+    }
+    if let Some(l) = &circuit.amplitude_loop {
+        add("gain", l.gain_bits - 1, "of full gain");
+    }
+    if columns.contains(&"tuning_word") {
+        let bits = circuit.nco.phase_bits;
+        said.push(match kind {
+            ArithmeticKind::Fixed => format!(
+                "tuning_word: raw * {} * 2^-{bits} Hz",
+                circuit.sample_rate_hz
+            ),
+            ArithmeticKind::Float => "tuning_word: Hz".to_owned(),
+        });
+    }
+    said.join("; ")
 }
 
 /// How long a channel stands at one code.

@@ -131,6 +131,10 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
         say!("rows: {rows}");
     }
     super::terminal::show(&super::comparison_table(&s.equivalence.functions));
+    say!(
+        "words compared: all that a call gives, so its results, the state that it keeps and its fault number; of the chain the words \
+         of its rows, of a table its entries."
+    );
     let mut table = super::terminal::table(&[
         "rate output at rest",
         "drift of bin means, deg/s",

@@ -27,7 +27,7 @@ pub struct Budget {
     pub lines: Vec<Line>,
     /// Sum of the bounds, deg/s: how far the firmware may be from the fitted polynomial.
     pub bound_dps: f64,
-    /// The held-out rms, deg/s, which contains what the noise of the fit adds.
+    /// The held-out rms, deg/s, which contains what the uncertainty of the fitted curve adds.
     pub estimate_dps: f64,
 }
 
@@ -59,7 +59,7 @@ pub fn budget(design: &Design, fit: &BaselineFit, certainty: &Certainty) -> Budg
     };
     let lines = vec![
         line(
-            "calibration: noise of the fit",
+            "calibration: uncertainty of the fitted curve",
             fit.std_max_dps(),
             "estimate",
         ),

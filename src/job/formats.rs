@@ -148,12 +148,14 @@ pub fn fill(design: &mut Design, fit: &BaselineFit, record: &ThermalRecord) -> R
     ));
     said.push(match is_wide {
         true => format!(
-            "output {output}: it holds {gyros} deg/s, taken for the gyro's full scale, since a record at rest does not say how \
-             fast the gyro turns (set thermal_run.sense_full_scale_dps to yours); its LSB is at most a 64th of the noise floor"
+            "output {output}: {}, so that an assumed full scale of {gyros} deg/s fits, since a record at rest does not say how \
+             fast the gyro turns (set thermal_run.sense_full_scale_dps to yours); its LSB is at most a 64th of the noise floor",
+            reach(output)
         ),
         false => format!(
-            "output {output}: it holds four times the largest rate, {greatest:.4} deg/s, and its LSB is at most a 64th of \
-             the noise floor"
+            "output {output}: {}, so that four times the largest rate, 4 * {greatest:.4} deg/s, fits; its LSB is at most a 64th \
+             of the noise floor",
+            reach(output)
         ),
     });
     design.compensation = Some(compensation);

@@ -82,8 +82,9 @@ impl Scene<'_> {
         svg.add(&frame);
         let title = "Rate output without compensation against the thermometer";
         svg.figure(title, format!(
-                "Applied rate subtracted{}. Sigma is what noise leaves of the curve's position, at most \
-                 {} deg/s; it is not the scatter of a single reading.{}",
+                "Applied rate subtracted{}. Sigma is the uncertainty of the fitted curve, at most {} deg/s. It follows from \
+                 the fit's residuals and from how they hang together in time, so it counts what the curve cannot follow as \
+                 well as noise. It is not the scatter of a single reading.{}",
                 self.span_degc(),
                 significant(fit.std_max_dps(), 2),
                 self.crowded
@@ -95,11 +96,7 @@ impl Scene<'_> {
         let y = rate_axis("residual", self.residual_interval());
         let mut svg = Svg::new(width);
         let mut legend = self.paths_legend();
-        legend.push((
-            "heldout",
-            Swatch::Area,
-            "± held-out rms of the fit".to_owned(),
-        ));
+        legend.push(heldout_entry());
         legend.extend(self.outside_entry());
         svg.legend(legend);
         let mut frame = svg.frame(330.0, y.room(), self.thermometer.clone(), y);
@@ -111,13 +108,15 @@ impl Scene<'_> {
         self.paths(&mut frame, |p| p.thermometer, 1.0);
         svg.add(&frame);
         let title = "Residual after compensation against the thermometer";
-        svg.figure(title, format!(
-                "Four paths of the same readings. Where C (+) and Rust (×) lie inside the circle of the \
-                 fixed-point model they agree with it; the float line joins readings in order of time. \
-                 Band: held-out rms {} deg/s.{}",
+        svg.figure(
+            title,
+            format!(
+                "{} Band: held-out rms {} deg/s.{}",
+                self.paths_sentence(),
                 significant(heldout, 3),
                 self.crowded
-            ))
+            ),
+        )
     }
 
     fn over_time(&self, width: f64) -> Figure {
@@ -137,6 +136,7 @@ impl Scene<'_> {
         let mut svg = Svg::new(width);
         let mut legend = vec![("before", Swatch::Line, "not compensated".to_owned())];
         legend.extend(self.paths_legend());
+        legend.push(heldout_entry());
         if !blocks.is_empty() {
             let text = "held-out blocks, every other one shaded".to_owned();
             legend.push(("block", Swatch::Area, text));
@@ -156,6 +156,8 @@ impl Scene<'_> {
             let raw: Vec<_> = raw.collect();
             upper.line("before", &raw);
             upper.markers("before-dot", Shape::Circle, 0.4 * self.radius, &raw);
+            // The points of the line once more.
+            upper.drawn.pop();
         } else {
             upper.cloud("before", raw);
         }
@@ -261,6 +263,12 @@ impl Scene<'_> {
             significant(largest, 3)
         )
     }
+}
+
+/// The held-out band in a legend.
+fn heldout_entry() -> (&'static str, Swatch, String) {
+    let text = "± held-out rms of the fit".to_owned();
+    ("heldout", Swatch::Area, text)
 }
 
 fn rate_axis(quantity: &str, interval: Interval) -> Axis {

@@ -150,15 +150,34 @@ impl<'a> Scene<'a> {
             true => name.to_owned(),
             false => format!("{name}, where it differs from fixed"),
         };
-        let mut out = vec![
-            ("fixed", Swatch::Marker(Shape::Circle), "fixed".to_owned()),
-            ("c", Swatch::Marker(Shape::Plus), words("emitted C")),
-            ("rust", Swatch::Marker(Shape::Cross), words("emitted Rust")),
-        ];
+        let mut out = vec![("fixed", Swatch::Marker(Shape::Circle), "fixed".to_owned())];
         if self.has_markers {
             out.insert(0, ("float", Swatch::Line, "float".to_owned()));
         }
+        if self.has_markers || self.shown.points.iter().any(|p| p.differs()) {
+            out.extend([
+                ("c", Swatch::Marker(Shape::Plus), words("emitted C")),
+                ("rust", Swatch::Marker(Shape::Cross), words("emitted Rust")),
+            ]);
+        }
         out
+    }
+
+    /// How to read what [`Scene::paths`] draws.
+    pub fn paths_sentence(&self) -> String {
+        if self.has_markers {
+            return "Four paths of the same readings. Where C (+) and Rust (×) lie inside the circle of the fixed-point model they \
+                    agree with it; the float line joins readings in order of time."
+                .to_owned();
+        }
+        let apart = self.shown.points.iter().filter(|p| p.differs()).count();
+        let where_they_do = match apart {
+            0 => "nowhere here".to_owned(),
+            n => format!("{n} readings here"),
+        };
+        format!(
+            "The readings as the fixed-point model compensates them. C (+) and Rust (×) are drawn only where they differ from it: {where_they_do}."
+        )
     }
 
     /// From when to when each held-out block lasts, s; the border is halfway between readings.

@@ -90,7 +90,7 @@ impl Svg {
             y: y.interval,
             x_ticks,
             y_ticks,
-            axes: format!("{}; {}", y.labelled(0), x.labelled(0)),
+            axes: both_axes(&y, &x),
             is_log: [false; 2],
             rows: None,
             marks: String::new(),
@@ -150,6 +150,13 @@ impl Svg {
         );
         Figure::new(title, caption.into(), svg, self.legend, self.series)
     }
+}
+
+/// Both axes in words; the vertical one alone where the horizontal one is labelled at a frame below.
+fn both_axes(y: &Axis, x: &Axis) -> String {
+    let labels = [y.labelled(0), x.labelled(0)];
+    let said: Vec<String> = labels.into_iter().filter(|l| !l.is_empty()).collect();
+    said.join("; ")
 }
 
 #[cfg(test)]

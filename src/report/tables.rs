@@ -38,7 +38,7 @@ pub fn fit(shown: &Shown) -> Vec<[String; 2]> {
         ),
         line("largest held-out error", dps(f.heldout_max_abs_dps)),
         line("noise floor of the output, rms", dps(f.noise_floor_rms_dps)),
-        line("largest sigma of the curve", dps(f.std_max_dps())),
+        line("largest sigma of the fitted curve", dps(f.std_max_dps())),
         line(
             "rows fitted",
             format!(
@@ -52,7 +52,8 @@ pub fn fit(shown: &Shown) -> Vec<[String; 2]> {
         lines.push(line(
             "heating against cooling",
             format!(
-                "they differ by {} rms at the same reading; noise alone would make them differ by {} rms: {}",
+                "they differ by {} rms at the same reading; by chance, residuals of the fit's size and memory would make them \
+                 differ by {} rms: {}",
                 dps(l.rms_dps),
                 dps(l.noise_dps),
                 if l.significant {

@@ -256,8 +256,8 @@ fn extrapolation(c: &Checked<'_>) -> Option<Warning> {
 fn loop_warning(c: &Checked<'_>) -> Option<Warning> {
     let l = c.sweep_loop?;
     let seen = format!(
-        "at the same reading of {} the error differs by {} deg/s rms between rising and falling sweeps; slow noise alone \
-         would make a difference of {} deg/s rms ({} places compared)",
+        "at the same reading of {} the error differs by {} deg/s rms between rising and falling sweeps; by chance, \
+         residuals of the fit's size and memory would make a difference of {} deg/s rms ({} places compared)",
         c.fit.thermometer,
         g(l.rms_dps),
         g(l.noise_dps),

@@ -1,4 +1,4 @@
-//! The polynomial's order: as asked for, or by held-out error.
+//! The polynomial's order: as asked for, or the lowest whose held-out error is within one standard error of the least.
 
 use crate::design::FitOrder;
 use crate::statistics::folds;
@@ -107,12 +107,17 @@ pub fn choose(sample: &Sample, wanted: FitOrder, most: usize, blocks: &[Range<us
         && (t.heldout_clean_rms_dps > limit || order > best_order)
         && order != smallest
     {
+        let by_rule = results
+            .get(smallest)
+            .map_or(best_rms, |r| r.0.heldout_clean_rms_dps);
+        let given = t.heldout_clean_rms_dps;
+        let least = match smallest == best_order {
+            true => "which is the least".to_owned(),
+            false => format!("the least is {best_rms:.4} by order {best_order}"),
+        };
         reason.push_str(&format!(
-            "; by held-out error it would be order {smallest} ({:.4} deg/s rms against {:.4})",
-            results
-                .get(smallest)
-                .map_or(best_rms, |r| r.0.heldout_clean_rms_dps),
-            t.heldout_clean_rms_dps
+            "; the lowest order whose held-out error is within one standard error of the least would be order {smallest} \
+             ({by_rule:.4} deg/s rms against {given:.4}; {least})"
         ));
     }
     let heldout = chosen.map_or_else(HeldOut::nothing, |(_, h)| h.clone());

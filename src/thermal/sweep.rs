@@ -67,7 +67,7 @@ pub struct Loop {
     /// Root mean square, over the thermometer's bins that both directions visit, of the
     /// difference between their mean residuals, deg/s.
     pub rms_dps: f64,
-    /// What noise alone would be expected to give, deg/s.
+    /// What chance would be expected to give, with residuals of the size and memory that the fit and the loop leave, deg/s.
     pub noise_dps: f64,
     /// How many bins were compared.
     pub bins: usize,

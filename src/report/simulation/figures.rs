@@ -9,6 +9,8 @@ use crate::cosim::readings::Taken;
 use crate::plant::Device;
 use crate::simulation::outcome::Outcome;
 
+/// What the equations and figures are of.
+const PAPER: &str = "Chen et al. (2004)";
 /// Points of a curve.
 const CURVE: u32 = 160;
 
@@ -74,11 +76,17 @@ fn ramps(frame: &mut Frame, taken: &[Taken], at: impl Fn(&Taken) -> (f64, f64)) 
     }
 }
 
-fn ramps_legend() -> Vec<(&'static str, Swatch, String)> {
-    vec![
-        ("heating", Swatch::Marker(Shape::Up), "heating".to_owned()),
-        ("cooling", Swatch::Marker(Shape::Down), "cooling".to_owned()),
-    ]
+/// The ramps that were run.
+fn ramps_legend(taken: &[Taken]) -> Vec<(&'static str, Swatch, String)> {
+    let ran = |heating: bool| taken.iter().any(|t| t.reading.heating == heating);
+    let all = [
+        ("heating", Shape::Up, true),
+        ("cooling", Shape::Down, false),
+    ];
+    all.into_iter()
+        .filter(|(_, _, heating)| ran(*heating))
+        .map(|(class, shape, _)| (class, Swatch::Marker(shape), class.to_owned()))
+        .collect()
 }
 
 /// Fig. 1: amplitude and phase of the drive mode against temperature.
@@ -118,10 +126,10 @@ fn drive_mode(outcome: &Outcome, tracking: bool, width: f64) -> Figure {
     );
     let left = room(&[&y1, &y2]);
     let mut svg = Svg::new(width);
-    let mut legend = ramps_legend();
+    let mut legend = ramps_legend(taken);
     legend.extend([
-        ("fit", Swatch::Line, "eq. 6 and 7".to_owned()),
-        ("bound", Swatch::Line, "eq. 8, linear".to_owned()),
+        ("fit", Swatch::Line, format!("{PAPER}, eq. 6 and 7")),
+        ("bound", Swatch::Line, format!("{PAPER}, eq. 8, linear")),
     ]);
     svg.legend(legend);
     let mut top = svg.frame(200.0, left, unlabelled(&x), y1);
@@ -141,9 +149,13 @@ fn drive_mode(outcome: &Outcome, tracking: bool, width: f64) -> Figure {
     } else {
         ""
     };
+    let held = if has_loop {
+        "; the amplitude is 1 over the drive gain that holds it"
+    } else {
+        ""
+    };
     svg.figure(title, format!(
-            "The paper's fig. 1. Markers: the bit-accurate circuit in closed loop, the electronics' phase taken off; \
-             the amplitude is 1 over the drive gain that holds it.{tail}"
+            "{PAPER}, fig. 1. Markers: the bit-accurate circuit in closed loop, the electronics' phase taken off{held}.{tail}"
         ))
 }
 
@@ -172,7 +184,7 @@ fn against_temperature(outcome: &Outcome, tracking: bool, width: f64) -> Figure 
     let left = room(&[&y1, &y2, &y3]);
     let place = |t: &Taken, value: f64| (t.moment.temperatures.chamber_degc, value);
     let mut svg = Svg::new(width);
-    svg.legend(ramps_legend());
+    svg.legend(ramps_legend(taken));
     if !factors.is_empty() {
         let mut frame = svg.frame(170.0, left, unlabelled(&x), y1);
         frame.level("zero", 0.0);
@@ -192,11 +204,17 @@ fn against_temperature(outcome: &Outcome, tracking: bool, width: f64) -> Figure 
     let mut frame = svg.frame(170.0, left, x.clone(), y3);
     ramps(&mut frame, taken, |t| place(t, thermometer(t)));
     svg.add(&frame);
-    let title = format!("Scale factor, bias and {name} against temperature, both ramps");
-    svg.figure(title, format!(
-            "The paper's fig. 2, by the bit-accurate circuit. The scale factor is from {} deg/s both ways.",
+    let caption = format!("{PAPER}, fig. 2, by the bit-accurate circuit.");
+    if factors.is_empty() {
+        return svg.figure(format!("Bias and {name} against temperature"), caption);
+    }
+    svg.figure(
+        format!("Scale factor, bias and {name} against temperature, both ramps"),
+        format!(
+            "{caption} The scale factor is from {} deg/s both ways.",
             significant(outcome.parts.design.thermal_run.scale_rate_dps, 3)
-        ))
+        ),
+    )
 }
 
 fn thermometer_name(tracking: bool) -> (&'static str, &'static str) {
@@ -233,7 +251,7 @@ fn bias_against_thermometer(outcome: &Outcome, tracking: bool, width: f64) -> Fi
     );
     let left = room(&[&y1, &y2]);
     let mut svg = Svg::new(width);
-    let mut legend = ramps_legend();
+    let mut legend = ramps_legend(taken);
     if let Some(fit) = fit {
         let text = format!("fitted polynomial, order {}", fit.order);
         legend.push(("fit", Swatch::Line, text));
@@ -254,10 +272,15 @@ fn bias_against_thermometer(outcome: &Outcome, tracking: bool, width: f64) -> Fi
         ramps(&mut frame, after, |t| (thermometer(t), t.fixed.rate_dps));
         svg.add(&frame);
     }
-    let title = format!("Bias against {name}, and what the compensation leaves");
-    svg.figure(title, "The paper's fig. 3. Below: the compensated rate of the bit-accurate chain, with the fit's coefficients in \
-                  their formats."
-            .to_owned())
+    if after.is_empty() {
+        return svg.figure(format!("Bias against {name}"), format!("{PAPER}, fig. 3."));
+    }
+    svg.figure(
+        format!("Bias against {name}, and what the compensation leaves"),
+        format!(
+            "{PAPER}, fig. 3. Below: the compensated rate of the bit-accurate chain, with the fit's coefficients in their formats."
+        ),
+    )
 }
 
 /// Power-on: amplitude, phase and, with a phase loop, frequency over time.

@@ -23,6 +23,8 @@ struct Page {
     figures: Vec<Figure>,
     /// Loop, temperature, output (measured, predicted), error (measured, predicted, bound), mean.
     loops: Vec<[String; 8]>,
+    /// What the facts are of.
+    facts_are: &'static str,
     /// Name, value.
     facts: Vec<[String; 2]>,
     /// Code, column, message.
@@ -40,10 +42,15 @@ pub fn html(outcome: &Outcome) -> Result<String> {
         name: outcome.parts.design.name.clone(),
         headline: headline(outcome),
         finding: format!(
-            "{} readings, {}; float and fixed differ by at most {} deg/s before compensation.",
+            "{} readings, {}; float and fixed differ by at most {} deg/s{}.",
             s.readings,
             s.mode.replace('_', " "),
-            significant(s.float_fixed.rate_out_dps, 2)
+            significant(s.float_fixed.rate_out_dps, 2),
+            if s.after.is_some() {
+                " before compensation"
+            } else {
+                ""
+            }
         ),
         drift: drift(outcome),
         paper: s
@@ -64,6 +71,12 @@ pub fn html(outcome: &Outcome) -> Result<String> {
             .collect(),
         figures: figures::all(outcome),
         loops: loops(outcome),
+        facts_are: match (s.fit.is_some(), s.lock.is_some()) {
+            (true, true) => "Fit, lock and power-on",
+            (true, false) => "Fit and power-on",
+            (false, true) => "Lock and power-on",
+            (false, false) => "Power-on",
+        },
         facts: facts(outcome),
         warnings: s
             .warnings
@@ -113,9 +126,13 @@ fn drift(outcome: &Outcome) -> Vec<[String; 4]> {
         ]
     };
     let before = &s.before;
+    let [float, fixed_point] = match &s.after {
+        Some(_) => ["before compensation, float", "before compensation, fixed"],
+        None => ["not compensated, float", "not compensated, fixed"],
+    };
     let mut rows = vec![
-        row("before compensation, float", before.float, before.float),
-        row("before compensation, fixed", before.fixed, before.fixed),
+        row(float, before.float, before.float),
+        row(fixed_point, before.fixed, before.fixed),
     ];
     if let Some(after) = &s.after {
         rows.push(row("after, float", after.float, before.float));

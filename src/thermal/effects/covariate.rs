@@ -87,10 +87,16 @@ impl Candidate for Covariate {
 
     fn obstacle(&self, _c: &Channels, _point: &Point) -> Option<String> {
         let name = &self.name;
-        Some(format!(
+        let mut said = format!(
             "firmware does not see {name} by itself; if it does in your gyro, give the curve as an [[effects]] formula in \
              {name} with compensable = true"
-        ))
+        );
+        if name.ends_with("_dps") {
+            said += &format!(
+                "; if {name} is another axis's rate, it is no cause of bias: leave that column out of the record unless it is meant"
+            );
+        }
+        Some(said)
     }
 
     fn spacing(&self, _c: &Channels, point: &Point) -> Vec<f64> {
