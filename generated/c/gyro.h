@@ -88,12 +88,14 @@ gyro_nco_out_t gyro_nco(gyro_oscillator_t *s);
  *   in  carrier: -32767 .. 32767; NCO output, Q1.15
  *   out product: -4194176 .. 4194176; code * carrier, Q2.22 half_up saturate
  *   error: one rounding to the output's LSB (half an LSB if to nearest), nothing else
+ *   an input outside its range is not clamped: its result may be wrong
  */
 int32_t gyro_demodulate(int16_t code, int16_t carrier);
 
 /* integrate
  *   in  product: -4194176 .. 4194176; demodulated, Q2.22
  *   error: none, exact modulo 2^width
+ *   an input outside its range is not clamped: its result may be wrong
  */
 void gyro_integrate(gyro_cic_t *s, int32_t product);
 
@@ -109,6 +111,7 @@ int32_t gyro_decimate(gyro_cic_t *s);
  *   out phase: -8388608 .. 8388607; phase in units of 2^-24 turn
  *   out magnitude: 0 .. 5931461; magnitude in units of 2^-22
  *   error: residual angle at most atan(2^-(n-1)), and half a unit for each of n table angles
+ *   an input outside its range is clamped to it
  */
 gyro_cordic_out_t gyro_cordic(int32_t in_phase, int32_t quadrature);
 
@@ -116,6 +119,7 @@ gyro_cordic_out_t gyro_cordic(int32_t in_phase, int32_t quadrature);
  *   in  thermometer: -8388608 .. 8388607 (-0.5 .. 0.4999999 turn); phase in units of 2^-24 turn
  *   out bias: -8208678 .. 8388607 (-2004.072 .. 2048 deg/s); bias = raw * 2^-12 deg/s; word format Q12.12 half_up saturate
  *   error: each step one rounding to the accumulator's LSB
+ *   an input outside its range is clamped to it
  */
 int32_t gyro_bias(int32_t thermometer);
 
@@ -124,12 +128,14 @@ int32_t gyro_bias(int32_t thermometer);
  *   in  bias: -8208678 .. 8388607 (-2004.072 .. 2048 deg/s); bias = raw * 2^-12 deg/s; word format Q12.12 half_up saturate
  *   out rate: -8388608 .. 8388607 (-2048 .. 2048 deg/s); compensated rate = raw * 2^-12 deg/s; word format Q12.12 half_up saturate
  *   error: one rounding of the input to the output's LSB; the difference is exact
+ *   an input outside its range is clamped to it
  */
 int32_t gyro_rate(int32_t raw_rate, int32_t bias);
 
 /* amplitude_loop
  *   in  magnitude: 0 .. 5931461; units of 2^-22
  *   out gain: 0 .. 32767; drive gain in units of 2^-15
+ *   an input outside its range is clamped to it
  */
 int32_t gyro_amplitude_loop(gyro_amplitude_loop_t *s, int32_t magnitude);
 

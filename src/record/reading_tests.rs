@@ -272,3 +272,18 @@ proptest! {
         let _ = try_parse(&bytes, &RecordMapping::default());
     }
 }
+
+#[test]
+fn a_capture_is_told_as_one_also_where_the_design_names_a_records_columns() {
+    let text = format!("drive,sense\n{}", "12,-7\n".repeat(20));
+    let names = mapping(&[("rate_out_dps", "gyro"), ("die_degc", "temp_degC")]);
+    let refused = try_parse(text.as_bytes(), &names).unwrap_err().to_string();
+    assert!(
+        refused.contains("this is a capture of ADC codes"),
+        "{refused}"
+    );
+    // Somebody's names for a record's columns.
+    let own = mapping(&[("rate_out_dps", "sense"), ("die_degc", "drive")]);
+    let read = try_parse(text.as_bytes(), &own);
+    assert!(read.is_err_and(|e| !e.to_string().contains("capture of ADC codes")));
+}

@@ -572,6 +572,7 @@ pub fn nco(s: &mut Oscillator) -> NcoOut {
 /// in  carrier: -32767 .. 32767; NCO output, Q1.15
 /// out product: -4194176 .. 4194176; code * carrier, Q2.22 half_up saturate
 /// error: one rounding to the output's LSB (half an LSB if to nearest), nothing else
+/// an input outside its range is not clamped: its result may be wrong
 /// ```
 #[must_use]
 pub fn demodulate(code: i16, carrier: i16) -> i32 {
@@ -586,6 +587,7 @@ pub fn demodulate(code: i16, carrier: i16) -> i32 {
 /// ```text
 /// in  product: -4194176 .. 4194176; demodulated, Q2.22
 /// error: none, exact modulo 2^width
+/// an input outside its range is not clamped: its result may be wrong
 /// ```
 pub fn integrate(s: &mut Cic, product: i32) {
     let integrator_0: u64 = s.integrator[0];
@@ -650,6 +652,7 @@ pub fn decimate(s: &mut Cic) -> i32 {
 /// out phase: -8388608 .. 8388607; phase in units of 2^-24 turn
 /// out magnitude: 0 .. 5931461; magnitude in units of 2^-22
 /// error: residual angle at most atan(2^-(n-1)), and half a unit for each of n table angles
+/// an input outside its range is clamped to it
 /// ```
 #[must_use]
 pub fn cordic(in_phase: i32, quadrature: i32) -> CordicOut {
@@ -704,6 +707,7 @@ pub fn cordic(in_phase: i32, quadrature: i32) -> CordicOut {
 /// in  thermometer: -8388608 .. 8388607 (-0.5 .. 0.4999999 turn); phase in units of 2^-24 turn
 /// out bias: -8208678 .. 8388607 (-2004.072 .. 2048 deg/s); bias = raw * 2^-12 deg/s; word format Q12.12 half_up saturate
 /// error: each step one rounding to the accumulator's LSB
+/// an input outside its range is clamped to it
 /// ```
 #[must_use]
 pub fn bias(thermometer: i32) -> i32 {
@@ -729,6 +733,7 @@ pub fn bias(thermometer: i32) -> i32 {
 /// in  bias: -8208678 .. 8388607 (-2004.072 .. 2048 deg/s); bias = raw * 2^-12 deg/s; word format Q12.12 half_up saturate
 /// out rate: -8388608 .. 8388607 (-2048 .. 2048 deg/s); compensated rate = raw * 2^-12 deg/s; word format Q12.12 half_up saturate
 /// error: one rounding of the input to the output's LSB; the difference is exact
+/// an input outside its range is clamped to it
 /// ```
 #[must_use]
 pub fn rate(raw_rate: i32, bias: i32) -> i32 {
@@ -745,6 +750,7 @@ pub fn rate(raw_rate: i32, bias: i32) -> i32 {
 /// ```text
 /// in  magnitude: 0 .. 5931461; units of 2^-22
 /// out gain: 0 .. 32767; drive gain in units of 2^-15
+/// an input outside its range is clamped to it
 /// ```
 pub fn amplitude_loop(s: &mut AmplitudeLoop, magnitude: i32) -> i32 {
     let integrator: i32 = s.integrator; // 0 .. 134213632
