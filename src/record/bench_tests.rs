@@ -226,7 +226,7 @@ fn a_row_that_is_none_is_refused_with_its_place() {
     let good = "drive,sense\n0.001,0.002\n0.003,0.004\n0.005,0.006\n";
     for (row, line, column, message) in [
         ("0.001,", 5, 7, "the cell of sense_code is empty"),
-        ("0.001,inf", 5, 7, "no finite number"),
+        ("0.001,inf", 5, 7, "overloaded here"),
         ("x,0.001", 5, 1, "no finite number"),
         ("1,2,3", 5, 5, "3 cells, the table 2"),
         ("40,0.001", 5, 1, "40 (code 40000) is outside"),

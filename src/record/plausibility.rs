@@ -279,7 +279,7 @@ fn counts(c: &Column<'_>) -> Option<Warning> {
 }
 
 /// Smaller outputs may be bias, deg/s (convention): a zero-rate offset is some tens of deg/s at most.
-const LEAST_TURNING_DPS: f64 = 30.0;
+const LEAST_TURNING_DPS: f64 = 100.0;
 
 /// A bias so large moves with the temperature by more than this part of it; a constant rate does not (convention).
 const STEADY_PART: f64 = 0.5;

@@ -176,10 +176,10 @@ fn each_mistake_has_its_warning() {
 fn a_steady_large_output_without_a_rate_is_doubted() {
     let turned = |k: f64| format!("{k},{}", 150.5 + wiggle(k));
     assert_eq!(codes("time_s,rate_out_dps", turned), ["rate_not_given"]);
-    let back = |k: f64| format!("{k},{}", -31.0 + wiggle(k));
+    let back = |k: f64| format!("{k},{}", -101.0 + wiggle(k));
     assert_eq!(codes("time_s,rate_out_dps", back), ["rate_not_given"]);
     // A bias of a bare gyro, which moves with its temperature.
-    let drifts = |k: f64| format!("{k},{}", 40.0 + 1.5 * k + wiggle(k));
+    let drifts = |k: f64| format!("{k},{}", 140.0 + 3.0 * k + wiggle(k));
     assert!(codes("time_s,rate_out_dps", drifts).is_empty());
     // At rest by the record's own word.
     let rests = |k: f64| format!("{k},{},0", 150.5 + wiggle(k));

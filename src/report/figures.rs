@@ -83,7 +83,7 @@ impl Scene<'_> {
         let title = "Rate output without compensation against the thermometer";
         svg.figure(title, format!(
                 "Applied rate subtracted{}. Sigma is the uncertainty of the fitted curve, at most {} deg/s. It follows from \
-                 the fit's residuals and from how they hang together in time, so it counts what the curve cannot follow as \
+                 the fit's residuals and from their correlation in time, so it counts what the curve cannot follow as \
                  well as noise. It is not the scatter of a single reading.{}",
                 self.span_degc(),
                 significant(fit.std_max_dps(), 2),
