@@ -166,7 +166,7 @@ fn what_was_mended_stays() {
 
 #[test]
 fn single_effects_are_named() {
-    let cases = seeds(1000, 66).filter_map(single);
+    let cases = seeds(1000, 44).filter_map(single);
     let (marks, _) = run(cases.collect());
     assert!(marks.len() > 40, "{}", marks.len());
     let first = share(&marks, |m| m.first);
@@ -182,7 +182,7 @@ fn single_effects_are_named() {
 
 #[test]
 fn clean_captures_name_nothing() {
-    let cases = seeds(5000, 60).filter_map(clean);
+    let cases = seeds(5000, 40).filter_map(clean);
     let (marks, _) = run(cases.collect());
     let wrong = marks.iter().filter(|m| m.extra > 0).count();
     println!("{} clean: {wrong} named something", marks.len());
@@ -192,7 +192,7 @@ fn clean_captures_name_nothing() {
 
 #[test]
 fn pairs_are_named_in_full() {
-    let cases = seeds(9000, 40).filter_map(pair);
+    let cases = seeds(9000, 27).filter_map(pair);
     let (marks, _) = run(cases.collect());
     let first = share(&marks, |m| m.first);
     let all = share(&marks, |m| m.all);

@@ -18,9 +18,9 @@ const ORIGIN: Origin = Origin {
 #[test]
 fn emitted_c_and_rust_are_the_model_bit_for_bit_on_random_plans() {
     let mut bent = 0;
-    for seed in 0..10u64 {
-        // No input, one and so on up to eight, and relays.
-        let plan = plan(1000 + seed, seed as usize % 9, true);
+    for seed in [0, 1, 3, 5, 8u64] {
+        // As many inputs, and relays.
+        let plan = plan(1000 + seed, seed as usize, true);
         bent += usize::from(bends(&plan));
         let correction = Correction::auto(&plan).unwrap();
         let firmware =
@@ -70,7 +70,7 @@ fn a_bundle_verifies_from_its_files_and_damage_to_a_constant_shows() {
         let mut unseen = Vec::new();
         let count = multipliers(&file.text, language).len();
         // Both languages print the same program; compiling Rust takes longer.
-        let every = if language == Language::C { 1 } else { 6 };
+        let every = if language == Language::C { 2 } else { 12 };
         let ks = (0..count).step_by(every);
         for (k, share) in ks.flat_map(|k| [(k, 256), (k, i64::MAX)]) {
             let (what, damaged) = damage(&file.text, language, k, share);
