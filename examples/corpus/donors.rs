@@ -1,8 +1,8 @@
 //! Series of real sensors at rest, and what their noise is like: read at run time, never kept.
 
 use crate::blind::dice::seed_of;
-use crate::blind::rng::Rng;
 use crate::blind::sensor::SensorNoise;
+use crate::rng::Rng;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 

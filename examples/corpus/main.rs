@@ -9,15 +9,19 @@
 //!
 //! `score` runs `BINARY close OPTION ...` on every record of a split (`tune`, `validate` or `locked`); `compare` tests the
 //! difference in names by McNemar's exact test and prints the paired ratio of errors; `write` puts a split's records into a folder,
-//! the truth beside them. The records are those of `tests/blind`; a third has noise like that of the series in the folder
+//! the truth beside them. The records are those of `tests/all/blind`; a third has noise like that of the series in the folder
 //! `GYROGEN_SERIES` (../shared/data), or, without it, of a stated family. `GYROGEN_CORPUS_ONLY=TEXT` keeps records with it in
 //! their names. `docs/closure-corpus.md` says what is in the corpus and how builds did.
 
-#[path = "../../tests/blind/mod.rs"]
+#[allow(dead_code)] // A part of it is used.
+#[path = "../../tests/all/blind/mod.rs"]
 mod blind;
 mod compare;
 mod donors;
 mod plan;
+#[allow(dead_code)]
+#[path = "../../tests/all/rng.rs"]
+mod rng;
 mod run;
 mod sheet;
 

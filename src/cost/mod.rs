@@ -7,7 +7,7 @@
 //! [`price`] makes one number of it.
 //!
 //! What the model predicts is the number of instructions that the emitted C executes for a row at GCC's `-O2`,
-//! the calls of `push` included; `tests/cost_model.rs` counts them under emulation. Cycles are those instructions
+//! the calls of `push` included; `tests/all/cost_model.rs` counts them under emulation. Cycles are those instructions
 //! with the cycles of their class: no wait states of a flash memory, no cache.
 
 pub mod fabric;

@@ -2,7 +2,7 @@
 //!
 //! They are those that GCC 12 makes of the emitted C at `-O2`, read from its assembly for small pieces
 //! of code; `push` and the shifts by a loop's index were set anew, after counts of whole designs under emulation had
-//! shown them off (`tests/cost_model.rs`: both of its lists were looked at, so neither is held out). They are counts of instructions; cycles are instructions times the cycles of their class, from
+//! shown them off (`tests/all/cost_model.rs`: both of its lists were looked at, so neither is held out). They are counts of instructions; cycles are instructions times the cycles of their class, from
 //! the manufacturers' tables (Cortex-M0 and M4 technical reference manuals, Ibex's documentation).
 
 use super::Target;

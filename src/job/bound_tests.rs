@@ -165,7 +165,7 @@ fn every_alternative_survives_its_text() {
     assert_eq!(seen.len(), 4, "{seen:?}");
 }
 
-/// An entry that is off by more than the bound allows is seen; one LSB is `verify`'s affair (`tests/bias_bound.rs`).
+/// An entry that is off by more than the bound allows is seen; one LSB is `verify`'s affair (`tests/all/bias_bound.rs`).
 #[test]
 fn damage_of_a_stored_form_shows() {
     let fit = flat();

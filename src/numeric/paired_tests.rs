@@ -199,7 +199,7 @@ fn design(decimator: (u32, u32, u32), address_bits: u32, word: i64) -> Design {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
-    /// Whole chains against both engines. (`tests/equivalence.rs` does it with designs that vary in everything.)
+    /// Whole chains against both engines. (`tests/all/equivalence.rs` does it with designs that vary in everything.)
     #[test]
     fn a_chain_has_both_engines_rows(
         decimator in (1u32..=6, 2u32..40, 1u32..=2),

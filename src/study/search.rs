@@ -45,7 +45,7 @@ impl Effort {
 /// So much farther behind the front the search looks in each step when nothing nearer is left (convention).
 const WIDER: f64 = 1.3;
 
-/// As far as it looks (convention; found to be enough on the spaces of `tests/study_spaces.rs`).
+/// As far as it looks (convention; found to be enough on the spaces of `tests/all/study_spaces.rs`).
 const WIDEST: f64 = 8.0;
 
 /// Points with a larger merit than this, and than the given design's, are of no use to anybody.

@@ -1,0 +1,7 @@
+//! What several parts use.
+
+pub mod closing;
+pub mod command;
+pub mod compiler;
+pub mod design;
+pub mod logs;
