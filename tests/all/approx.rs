@@ -2,17 +2,11 @@
 
 mod evaluator;
 
+use crate::common::command::gyrogen_here;
+use crate::common::dice::Dice;
 use evaluator::{Evaluator, checksum};
 use serde_json::Value;
 use std::path::Path;
-use std::process::{Command, Output};
-
-fn gyrogen(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_gyrogen"))
-        .args(arguments)
-        .output()
-        .unwrap()
-}
 
 /// Runs `approx` into `folder` and gives its JSON.
 fn approx(folder: &Path, arguments: &[&str]) -> Value {
@@ -24,7 +18,7 @@ fn approx(folder: &Path, arguments: &[&str]) -> Value {
         folder.to_str().unwrap(),
     ];
     all.extend(arguments);
-    let output = gyrogen(&all);
+    let output = gyrogen_here(&all);
     let told = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{arguments:?}: {told}");
     let json: Value = serde_json::from_slice(&output.stdout).unwrap();
@@ -103,38 +97,25 @@ const CASES: [Case; 8] = [
     ("1/(1+x^2)", "-0.9,0.2", |x| 1.0 / (1.0 + x * x)),
 ];
 
-/// Numerical Recipes' generator: the cases are the same on every machine.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, n: u64) -> u64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) % n
-    }
-}
-
 #[test]
 fn random_polynomials_are_what_the_manual_says_and_within_their_bounds() {
-    let mut random = Random(7);
+    let mut dice = Dice(7);
     let mut ratios = Vec::new();
     for k in 0..18 {
-        let (function, domain, f) = CASES[random.below(CASES.len() as u64) as usize];
+        let (function, domain, f) = CASES[dice.below(CASES.len() as u64) as usize];
         let folder = tempfile::tempdir().unwrap();
-        let bits = 8 + random.below(9);
-        let fine = 9 + random.below(10);
-        let own = 8 + random.below(10);
-        let degree = (1 + random.below(7)).to_string();
+        let bits = 8 + dice.below(9);
+        let fine = 9 + dice.below(10);
+        let own = 8 + dice.below(10);
+        let degree = (1 + dice.below(7)).to_string();
         let domain = format!("--domain={domain}");
         let formats = [
             format!("Q1.{bits}"),
             format!("Q2.{fine}"),
             format!("Q7.{own}"),
         ];
-        let inner = format!("Q8.{}", 10 + random.below(16));
-        let kind = ["all", "odd", "even"][random.below(3) as usize];
+        let inner = format!("Q8.{}", 10 + dice.below(16));
+        let kind = ["all", "odd", "even"][dice.below(3) as usize];
         let kind = if function.starts_with("sin") && domain.contains('-') {
             kind
         } else {
@@ -155,7 +136,7 @@ fn random_polynomials_are_what_the_manual_says_and_within_their_bounds() {
             "--monomials",
             kind,
         ];
-        if random.below(2) == 0 {
+        if dice.below(2) == 0 {
             arguments.extend(["--intermediate", &inner]);
         }
         let json = approx(folder.path(), &arguments);
@@ -170,26 +151,26 @@ fn random_polynomials_are_what_the_manual_says_and_within_their_bounds() {
 
 #[test]
 fn formats_of_their_own_and_estrins_scheme_are_what_the_manual_says() {
-    let mut random = Random(29);
+    let mut dice = Dice(29);
     let mut ratios = Vec::new();
     for k in 0..15 {
-        let (function, domain, f) = CASES[random.below(CASES.len() as u64) as usize];
+        let (function, domain, f) = CASES[dice.below(CASES.len() as u64) as usize];
         let folder = tempfile::tempdir().unwrap();
         let kind = match function {
             "sin(pi*x/2)" => "odd",
             "cos(x)" => "even",
             _ => "all",
         };
-        let degree = 2 + random.below(9);
+        let degree = 2 + dice.below(9);
         let count = match kind {
             "all" => degree + 1,
             "odd" => degree.div_ceil(2),
             _ => degree / 2 + 1,
         };
         let formats: Vec<String> = (0..count)
-            .map(|_| format!("Q7.{}", 6 + random.below(14)))
+            .map(|_| format!("Q7.{}", 6 + dice.below(14)))
             .collect();
-        let list = match random.below(4) {
+        let list = match dice.below(4) {
             0 => formats[0].clone(),
             _ => formats.join(","),
         };
@@ -198,14 +179,14 @@ fn formats_of_their_own_and_estrins_scheme_are_what_the_manual_says() {
             format!("--function={function}"),
             format!("--domain={domain}"),
             format!("--degree={degree}"),
-            format!("--input=Q1.{}", 7 + random.below(9)),
-            format!("--output=Q2.{}", 9 + random.below(10)),
+            format!("--input=Q1.{}", 7 + dice.below(9)),
+            format!("--output=Q2.{}", 9 + dice.below(10)),
             format!("--coefficients={list}"),
             format!("--monomials={kind}"),
             format!("--evaluation={scheme}"),
-            format!("--intermediate=Q9.{}", 8 + random.below(16)),
+            format!("--intermediate=Q9.{}", 8 + dice.below(16)),
         ];
-        let given = arguments.len() - usize::from(random.below(2) == 0);
+        let given = arguments.len() - usize::from(dice.below(2) == 0);
         let arguments: Vec<&str> = arguments[..given].iter().map(String::as_str).collect();
         let json = approx(folder.path(), &arguments);
         assert_eq!(json["evaluation"], scheme);
@@ -241,7 +222,7 @@ fn distribution(what: &str, mut ratios: Vec<f64>) {
 /// Both bundles hold when they are rebuilt from their own files.
 fn verified(folder: &Path) {
     for language in ["c", "rust"] {
-        let output = gyrogen(&["verify", folder.join(language).to_str().unwrap()]);
+        let output = gyrogen_here(&["verify", folder.join(language).to_str().unwrap()]);
         let told = String::from_utf8_lossy(&output.stderr);
         assert!(output.status.success(), "{language}: {told}");
     }
@@ -249,7 +230,7 @@ fn verified(folder: &Path) {
 
 #[test]
 fn tables_and_segments_are_what_the_manual_says_and_within_their_bounds() {
-    let mut random = Random(3);
+    let mut dice = Dice(3);
     let mut ratios = Vec::new();
     for (form, degree) in [
         ("table", Some("0")),
@@ -264,15 +245,15 @@ fn tables_and_segments_are_what_the_manual_says_and_within_their_bounds() {
         ("auto", None),
     ] {
         for _ in 0..2 {
-            let (function, domain, f) = CASES[random.below(CASES.len() as u64) as usize];
+            let (function, domain, f) = CASES[dice.below(CASES.len() as u64) as usize];
             let folder = tempfile::tempdir().unwrap();
-            let input = format!("Q1.{}", 9 + random.below(6));
-            let fine = 9 + random.below(5);
+            let input = format!("Q1.{}", 9 + dice.below(6));
+            let fine = 9 + dice.below(5);
             let output = format!("Q2.{fine}");
             let domain = format!("--domain={domain}");
             // A plain table cannot do better than the input's own steps.
             let lsb = f64::powi(2.0, -(fine.min(8) as i32));
-            let bound = (lsb * (1.0 + random.below(40) as f64 / 10.0)).to_string();
+            let bound = (lsb * (1.0 + dice.below(40) as f64 / 10.0)).to_string();
             let mut arguments = vec![
                 "--function",
                 function,
@@ -397,7 +378,7 @@ fn damage_of_one_lsb_is_caught() {
             let sum = |text: &str| gyrogen::digest::sha256(text.as_bytes());
             let damaged = std::fs::read_to_string(&path).unwrap();
             std::fs::write(&manifest, before.replace(&sum(&text), &sum(&damaged))).unwrap();
-            let output = gyrogen(&["verify", folder.path().join("c").to_str().unwrap()]);
+            let output = gyrogen_here(&["verify", folder.path().join("c").to_str().unwrap()]);
             assert_eq!(
                 output.status.code(),
                 Some(1),

@@ -1,13 +1,6 @@
 //! What `gyrogen approx` cannot use is refused with the reason, and nothing is written.
 
-use std::process::{Command, Output};
-
-fn gyrogen(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_gyrogen"))
-        .args(arguments)
-        .output()
-        .unwrap()
-}
+use crate::common::command::gyrogen_here;
 
 #[test]
 fn what_cannot_be_used_is_refused_with_the_reason() {
@@ -206,7 +199,7 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
         let out = folder.path().join("made");
         let mut all = vec!["approx", "--out", out.to_str().unwrap()];
         all.extend(&arguments);
-        let output = gyrogen(&all);
+        let output = gyrogen_here(&all);
         let told = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {told}");
         for word in expected {

@@ -1,5 +1,6 @@
 //! The proved bound against the greatest error that is met, over random requests of every kind.
 
+use crate::common::dice::Dice;
 use gyrogen::approx::form::polynomial::{Monomials, Scheme};
 use gyrogen::design::target::Target;
 use gyrogen::numeric::format::Format;
@@ -22,78 +23,66 @@ const FUNCTIONS: [(&str, &str, &str); 14] = [
     ("0.3+0.2*sin(9*x)", "-pi/4", "0.5"),
 ];
 
-/// Numerical Recipes' generator: the cases are the same on every machine.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, n: u64) -> u32 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        ((self.0 >> 33) % n) as u32
-    }
-
-    fn request(&mut self) -> Request {
-        let (function, low, high) = FUNCTIONS[self.below(FUNCTIONS.len() as u64) as usize];
-        let output = Format::q(2, 7 + self.below(10));
-        let form = [
-            Asked::Polynomial,
-            Asked::Polynomial,
-            Asked::Table,
-            Asked::Piecewise,
-        ][self.below(4) as usize];
-        let polynomial = form == Asked::Polynomial;
-        let loose = 1.0 + f64::from(self.below(64)) / 4.0;
-        let own = 8 + self.below(10);
-        let symmetric = function.starts_with("sin") || function.starts_with("cos");
-        let kind = match self.below(3) {
-            0 if function.starts_with("sin") => Monomials::Odd,
-            0 if symmetric => Monomials::Even,
-            _ => Monomials::All,
-        };
-        let narrow = self.below(3) == 0;
-        let degree = 1 + self.below(6) as usize;
-        // A third with fraction bits of their own.
-        let coefficients = match self.below(3) {
-            0 => {
-                let own = kind.exponents(degree).into_iter();
-                own.map(|_| Format::q(9, 8 + self.below(10))).collect()
-            }
-            _ => vec![Format::q(9, own)],
-        };
-        let evaluation = match self.below(3) {
-            0 if polynomial => Scheme::Estrin,
-            _ => Scheme::Horner,
-        };
-        Request {
-            function: function.into(),
-            parameters: Default::default(),
-            domain: [low.into(), high.into()],
-            degree: polynomial.then_some(degree),
-            monomials: Some(kind),
-            input: Format::q(1, 6 + self.below(9)),
-            output,
-            coefficients: if polynomial { coefficients } else { Vec::new() },
-            evaluation,
-            intermediate: (polynomial && narrow).then(|| Format::q(9, own + self.below(6))),
-            form,
-            bound: (!polynomial).then(|| output.lsb() * loose),
-            weight: Weight::Absolute,
-            exhaustive: false,
-            target: Target::default(),
-            name: "approx".into(),
+fn request(dice: &mut Dice) -> Request {
+    let mut below = |n: u64| dice.below(n) as u32;
+    let (function, low, high) = FUNCTIONS[below(FUNCTIONS.len() as u64) as usize];
+    let output = Format::q(2, 7 + below(10));
+    let form = [
+        Asked::Polynomial,
+        Asked::Polynomial,
+        Asked::Table,
+        Asked::Piecewise,
+    ][below(4) as usize];
+    let polynomial = form == Asked::Polynomial;
+    let loose = 1.0 + f64::from(below(64)) / 4.0;
+    let own = 8 + below(10);
+    let symmetric = function.starts_with("sin") || function.starts_with("cos");
+    let kind = match below(3) {
+        0 if function.starts_with("sin") => Monomials::Odd,
+        0 if symmetric => Monomials::Even,
+        _ => Monomials::All,
+    };
+    let narrow = below(3) == 0;
+    let degree = 1 + below(6) as usize;
+    // A third with fraction bits of their own.
+    let coefficients = match below(3) {
+        0 => {
+            let own = kind.exponents(degree).into_iter();
+            own.map(|_| Format::q(9, 8 + below(10))).collect()
         }
+        _ => vec![Format::q(9, own)],
+    };
+    let evaluation = match below(3) {
+        0 if polynomial => Scheme::Estrin,
+        _ => Scheme::Horner,
+    };
+    Request {
+        function: function.into(),
+        parameters: Default::default(),
+        domain: [low.into(), high.into()],
+        degree: polynomial.then_some(degree),
+        monomials: Some(kind),
+        input: Format::q(1, 6 + below(9)),
+        output,
+        coefficients: if polynomial { coefficients } else { Vec::new() },
+        evaluation,
+        intermediate: (polynomial && narrow).then(|| Format::q(9, own + below(6))),
+        form,
+        bound: (!polynomial).then(|| output.lsb() * loose),
+        weight: Weight::Absolute,
+        exhaustive: false,
+        target: Target::default(),
+        name: "approx".into(),
     }
 }
 
 #[test]
 fn the_bound_is_never_below_the_greatest_error_and_rarely_far_above() {
-    let mut random = Random(11);
+    let mut dice = Dice(11);
     let mut ratios: Vec<(f64, String)> = Vec::new();
     let (mut refused, mut narrow) = (0, 0);
     while ratios.len() < 200 {
-        let request = random.request();
+        let request = request(&mut dice);
         let Ok(made) = approximate(&request, "", 2, &|_, _| ()) else {
             // A bound or a degree that these codes and formats cannot keep.
             refused += 1;

@@ -10,7 +10,8 @@ use std::path::Path;
 /// The search of thermal causes: its method is being replaced, and its circle goes with it.
 const EXCEPTION: &str = "thermal/search/";
 
-fn sources() -> Vec<(String, String)> {
+/// The files below a folder of the package, with their texts.
+fn sources(folder: &str) -> Vec<(String, String)> {
     fn walk(folder: &Path, below: &str, found: &mut Vec<(String, String)>) {
         let mut entries: Vec<_> = std::fs::read_dir(folder)
             .unwrap()
@@ -28,7 +29,7 @@ fn sources() -> Vec<(String, String)> {
     }
     let mut found = Vec::new();
     walk(
-        &Path::new(env!("CARGO_MANIFEST_DIR")).join("src"),
+        &Path::new(env!("CARGO_MANIFEST_DIR")).join(folder),
         "",
         &mut found,
     );
@@ -47,7 +48,7 @@ fn order() -> Vec<String> {
 
 #[test]
 fn imports_go_one_way_between_rooms() {
-    let (sources, order) = (sources(), order());
+    let (sources, order) = (sources("src"), order());
     let built = sources
         .iter()
         .filter(|(path, _)| !path.ends_with("_tests.rs"));
@@ -63,18 +64,34 @@ fn imports_go_one_way_between_rooms() {
 
 #[test]
 fn circles_inside_a_room_are_small() {
-    let wrong = rooms::circles(&imports(&sources()), EXCEPTION);
+    let wrong = rooms::circles(&imports(&sources("src")), EXCEPTION);
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
 #[test]
 fn the_command_line_is_parsed_in_its_room_alone() {
-    let elsewhere: Vec<String> = sources()
+    let elsewhere: Vec<String> = sources("src")
         .into_iter()
         .filter(|(path, text)| !path.starts_with("cli/") && text.contains("clap::"))
         .map(|(path, _)| path)
         .collect();
     assert_eq!(elsewhere, [""; 0]);
+}
+
+#[test]
+fn who_judges_shares_no_code_with_what_is_judged() {
+    for folder in ["oracle", "blind", "blind_capture"] {
+        let sources = sources(&format!("tests/all/{folder}"));
+        assert!(!sources.is_empty(), "{folder}");
+        for (path, text) in sources {
+            let code = text.lines().filter(|l| !l.trim_start().starts_with("//"));
+            let code = code.collect::<Vec<_>>().join("\n");
+            let code = code.replace("crate::rng::Rng", "");
+            for shared in ["gyrogen::", "crate::", "super::super", "#[path"] {
+                assert!(!code.contains(shared), "{folder}/{path}: {shared}");
+            }
+        }
+    }
 }
 
 fn made(files: &[(&str, &str)]) -> Vec<(String, String)> {

@@ -1,14 +1,8 @@
 //! `compensation.bound_dps` as a user meets it: `run`, then everything that takes the design that it writes.
 
+use crate::common::command::gyrogen;
 use serde_json::Value;
 use std::path::Path;
-use std::process::{Command, Output};
-
-fn gyrogen(arguments: &[&str], folder: &Path) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gyrogen"));
-    command.current_dir(folder).args(arguments);
-    command.output().expect("gyrogen starts")
-}
 
 fn good(arguments: &[&str], folder: &Path) -> String {
     let output = gyrogen(arguments, folder);

@@ -1,8 +1,9 @@
 //! A bundle in the hands of somebody without gyrogen: `make check`, CMake and `cargo test` pass, and damage fails.
 
+use crate::common::command::{all_of, run};
 use crate::oracle::harness::binary;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Command;
 
 fn emitted(language: &str, at: &Path) -> PathBuf {
     let folder = at.join(language);
@@ -13,18 +14,6 @@ fn emitted(language: &str, at: &Path) -> PathBuf {
         .expect("the binary under test starts");
     assert!(output.status.success());
     folder
-}
-
-fn run(program: &str, arguments: &[&str], folder: &Path) -> Output {
-    let output = Command::new(program)
-        .args(arguments)
-        .current_dir(folder)
-        .output();
-    output.unwrap_or_else(|e| panic!("{program}: {e}"))
-}
-
-fn all_of(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr)
 }
 
 /// Ten damages of a product: file, what stands there, what a hand makes of it.

@@ -1,19 +1,9 @@
 //! `outside = "flag"`: the emitted firmware, the model and a definition written out here say the same about every
 //! input, and damage to an end of the range is found.
 
+use crate::common::command::{gyrogen, told};
 use serde_json::Value;
 use std::path::Path;
-use std::process::{Command, Output};
-
-fn gyrogen(arguments: &[&str], folder: &Path) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gyrogen"));
-    command.args(arguments).current_dir(folder);
-    command.output().expect("gyrogen runs")
-}
-
-fn told(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
 
 /// The default design with the flag; `range` as its calibrated range, if any.
 fn design(folder: &Path, range: &str, input: &str) {

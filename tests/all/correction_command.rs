@@ -1,7 +1,7 @@
 //! `gyrogen emit` of a design with a correction and `gyrogen verify` from a design file.
 
+use crate::common::command::gyrogen;
 use std::path::Path;
-use std::process::{Command, Output};
 
 const DESIGN: &str = r#"
 name = "corrected"
@@ -26,12 +26,6 @@ terms = [
     { kind = "cubic", ppm = 80.0, rate_max_dps = 500.0 },
 ]
 "#;
-
-fn gyrogen(arguments: &[&str], folder: &Path) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gyrogen"));
-    let output = command.args(arguments).current_dir(folder).output();
-    output.expect("the program runs")
-}
 
 #[test]
 fn a_design_with_a_correction_becomes_firmware_that_verifies() {

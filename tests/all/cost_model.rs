@@ -1,6 +1,7 @@
 //! The cost model against instructions that were counted: the emitted C, compiled at `-O2` for a processor, run
 //! under qemu one instruction at a time. Needs the cross compilers and qemu's user mode; `.ci/run` has them.
 
+use crate::common::dice::Dice;
 use gyrogen::cost::{self, Target};
 use gyrogen::design::{Design, reader, template};
 use gyrogen::emit::bundle::{Bundle, Part};
@@ -181,23 +182,6 @@ fn designs() -> Vec<(&'static str, Design)> {
         ),
         ("phase loop", changed(&LOOP)),
     ]
-}
-
-/// Numbers that follow one another (Knuth's constants).
-struct Dice(u64);
-
-impl Dice {
-    fn between(&mut self, low: u32, high: u32) -> u32 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        low + ((self.0 >> 33) % u64::from(high - low + 1)) as u32
-    }
-
-    fn one_of<T: Copy>(&mut self, all: &[T]) -> T {
-        all[self.between(0, all.len() as u32 - 1) as usize]
-    }
 }
 
 /// The default with every word and size drawn anew that a key states; `None` where such a design is refused.

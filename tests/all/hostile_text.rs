@@ -6,6 +6,7 @@
 //!
 //! `GYROGEN_HOSTILE=N`: so many texts.
 
+use crate::common::dice::Dice;
 use gyrogen::correction::Correction;
 use gyrogen::design::reader;
 use gyrogen::emit::views::Language;
@@ -54,34 +55,22 @@ const PIECES: [&str; 30] = [
     "é µ °",
 ];
 
-/// Numbers of a linear congruential generator.
-struct Dice(u64);
+fn joined(dice: &mut Dice) -> String {
+    (0..JOINED).map(|_| hostile(dice)).collect()
+}
 
-impl Dice {
-    fn below(&mut self, n: usize) -> usize {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) as usize % n
-    }
-
-    fn joined(&mut self) -> String {
-        (0..JOINED).map(|_| self.hostile()).collect()
-    }
-
-    fn hostile(&mut self) -> String {
-        let count = 1 + self.below(5);
-        let mut text = String::new();
-        for _ in 0..count {
-            match self.below(4) {
-                0 => text.push(char::from_u32(self.below(0x3000) as u32).unwrap_or('*')),
-                1 => text.push_str(["supply", "t_degc", "a", "*", "/"][self.below(5)]),
-                _ => text.push_str(PIECES[self.below(PIECES.len())]),
-            }
+fn hostile(dice: &mut Dice) -> String {
+    let mut below = |n: usize| dice.below(n as u64) as usize;
+    let count = 1 + below(5);
+    let mut text = String::new();
+    for _ in 0..count {
+        match below(4) {
+            0 => text.push(char::from_u32(below(0x3000) as u32).unwrap_or('*')),
+            1 => text.push_str(["supply", "t_degc", "a", "*", "/"][below(5)]),
+            _ => text.push_str(PIECES[below(PIECES.len())]),
         }
-        text
     }
+    text
 }
 
 /// C without comments, strings and white space: lines are spliced first, as the standard says.
@@ -224,8 +213,8 @@ fn texts(count: usize) {
         let expected = code(&bundle(&plain, "gyrogen emit", language));
         assert!(expected.len() >= 2 && expected.iter().any(|(_, text)| text.len() > 1000));
         for _ in 0..count.div_ceil(2 * JOINED * (COLUMNS + 1)) {
-            let columns: Vec<String> = (0..COLUMNS).map(|_| dice.joined()).collect();
-            let command = format!("gyrogen emit {}", dice.joined());
+            let columns: Vec<String> = (0..COLUMNS).map(|_| joined(&mut dice)).collect();
+            let command = format!("gyrogen emit {}", joined(&mut dice));
             let files = bundle(&columns, &command, language);
             assert_eq!(code(&files), expected, "{columns:?} {command:?}");
             for file in files.iter().filter(|f| !f.path.ends_with(".csv")) {
@@ -255,8 +244,8 @@ fn ten_thousand_hostile_texts_stay_in_comments_and_strings() {
 fn two_hundred_hostile_bundles_compile() {
     let mut dice = Dice(1997);
     for round in 0..100 {
-        let columns: Vec<String> = (0..COLUMNS).map(|_| dice.hostile()).collect();
-        let command = format!("gyrogen emit {}", dice.hostile());
+        let columns: Vec<String> = (0..COLUMNS).map(|_| hostile(&mut dice)).collect();
+        let command = format!("gyrogen emit {}", hostile(&mut dice));
         for language in [Language::C, Language::Rust] {
             let made = tempfile::tempdir().expect("a folder");
             let files = bundle(&columns, &command, language);
@@ -302,7 +291,7 @@ fn the_lexers_see_what_the_languages_see() {
 #[test]
 fn a_name_that_becomes_an_identifier_is_refused_with_the_reason() {
     let mut dice = Dice(7);
-    let mut names: Vec<String> = (0..2000).map(|_| dice.hostile()).collect();
+    let mut names: Vec<String> = (0..2000).map(|_| hostile(&mut dice)).collect();
     let words = [
         "Gyro", "E1", "gyroA", "int8", "size", "while", "match", "self", "core", "std", "_a",
         "a__b", "a_", "é", "", "1a", "gyro-a",

@@ -1,18 +1,10 @@
 //! The main job as a user runs it: the embedded default, and real records where they are at hand.
 
+use crate::common::command::{gyrogen_here, text};
+use crate::common::json::number;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-
-fn gyrogen(arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gyrogen"));
-    command.args(arguments).output().expect("gyrogen starts")
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().expect("UTF-8")
-}
 
 fn run(design: Option<&Path>, record: Option<&Path>, out: &Path) -> Value {
     let mut arguments = vec!["run"];
@@ -21,20 +13,13 @@ fn run(design: Option<&Path>, record: Option<&Path>, out: &Path) -> Value {
         arguments.extend(["--record", text(record)]);
     }
     arguments.extend(["--out", text(out), "--format", "json"]);
-    let output = gyrogen(&arguments);
+    let output = gyrogen_here(&arguments);
     let talk = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(0), "{talk}");
     let printed: Value = serde_json::from_slice(&output.stdout).expect("JSON on stdout");
     let written = std::fs::read(out.join("summary.json")).expect("summary.json");
     assert_eq!(output.stdout, written, "stdout and summary.json differ");
     printed
-}
-
-fn number(value: &Value, path: &str) -> f64 {
-    let found = path.split('.').fold(value, |v, key| &v[key]);
-    found
-        .as_f64()
-        .unwrap_or_else(|| panic!("{path} is {found}"))
 }
 
 /// Section 6 of the design: 160 deg/s before, the published 5 % after, the same in every path.
@@ -83,7 +68,7 @@ fn the_default_design_reproduces_the_published_figures_through_all_paths() {
     // The bundles stand on their own.
     for language in ["c", "rust"] {
         let bundle = folder.path().join("firmware").join(language);
-        let output = gyrogen(&["verify", text(&bundle)]);
+        let output = gyrogen_here(&["verify", text(&bundle)]);
         assert_eq!(output.status.code(), Some(0), "{language}");
     }
 
@@ -162,14 +147,17 @@ fn measured_records_become_firmware() {
 fn init_writes_a_design_that_runs_and_never_overwrites() {
     let folder = tempfile::tempdir().expect("a folder");
     let design = folder.path().join("design.toml");
-    assert_eq!(gyrogen(&["init", text(&design)]).status.code(), Some(0));
+    assert_eq!(
+        gyrogen_here(&["init", text(&design)]).status.code(),
+        Some(0)
+    );
     let before = std::fs::read(&design).expect("the design");
-    let second = gyrogen(&["init", text(&design)]);
+    let second = gyrogen_here(&["init", text(&design)]);
     assert_eq!(second.status.code(), Some(2));
     assert_eq!(std::fs::read(&design).expect("the design"), before);
     let out = folder.path().join("emitted");
     let emit = ["emit", text(&design), "--lang", "c", "--out", text(&out)];
-    assert_eq!(gyrogen(&emit).status.code(), Some(0));
+    assert_eq!(gyrogen_here(&emit).status.code(), Some(0));
 }
 
 /// What `init` writes is the embedded default, also where a record calls for other formats than its own
@@ -181,7 +169,10 @@ fn the_file_of_init_runs_on_a_record_as_the_embedded_default() {
         folder.path().join("my.toml"),
         folder.path().join("record.csv"),
     );
-    assert_eq!(gyrogen(&["init", text(&design)]).status.code(), Some(0));
+    assert_eq!(
+        gyrogen_here(&["init", text(&design)]).status.code(),
+        Some(0)
+    );
     let mut csv = String::from("time_s,phase_rad,rate_out_dps\n");
     for k in 0..80 {
         let phase = -1.5 - 0.005 * f64::from(k);
@@ -209,7 +200,7 @@ fn the_file_of_init_runs_on_a_record_as_the_embedded_default() {
 fn a_phase_loop_in_the_file_of_init_takes_the_tuning_word() {
     let folder = tempfile::tempdir().expect("a folder");
     let design = folder.path().join("my.toml");
-    let made = gyrogen(&["init"]);
+    let made = gyrogen_here(&["init"]);
     let lines = String::from_utf8(made.stdout).expect("UTF-8");
     let on = |line: &str| match line.strip_prefix('#') {
         Some(setting)
@@ -255,7 +246,7 @@ fn a_phase_in_degrees_stops_only_a_fit_over_it() {
     }
     std::fs::write(&record, csv).expect("a record");
     let out = folder.path().join("out");
-    let refused = gyrogen(&["run", "--record", text(&record), "--out", text(&out)]);
+    let refused = gyrogen_here(&["run", "--record", text(&record), "--out", text(&out)]);
     let talk = String::from_utf8_lossy(&refused.stderr);
     assert_eq!(refused.status.code(), Some(2), "{talk}");
     assert!(
@@ -309,7 +300,7 @@ fn gaps_in_the_applied_rate_and_the_fitted_design() {
         "--out",
         text(&again),
     ];
-    assert_eq!(gyrogen(&emit).status.code(), Some(0));
+    assert_eq!(gyrogen_here(&emit).status.code(), Some(0));
     let body = |path: PathBuf| {
         let text = std::fs::read_to_string(path).expect("C");
         text.lines().skip(1).map(str::to_owned).collect::<Vec<_>>()
@@ -321,7 +312,7 @@ fn gaps_in_the_applied_rate_and_the_fitted_design() {
 
     // Its thermometer is not what the own thermal run has.
     let other = folder.path().join("other");
-    let own = gyrogen(&["run", text(&design), "--out", text(&other)]);
+    let own = gyrogen_here(&["run", text(&design), "--out", text(&other)]);
     assert_eq!(own.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&own.stderr).contains("--record"));
 }
@@ -373,7 +364,7 @@ fn unusable_input_writes_nothing() {
         let mut arguments = vec!["run"];
         arguments.extend(design.map(|d: &PathBuf| text(d)));
         arguments.extend(["--record", text(record), "--out", text(&out)]);
-        let output = gyrogen(&arguments);
+        let output = gyrogen_here(&arguments);
         let talk = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{words}: {talk}");
         assert!(talk.contains(words), "{words}: {talk}");

@@ -1,16 +1,13 @@
 //! `run` and `equiv` with a compiler for one language, with none, and with one that is none.
 
+use crate::common::command::gyrogen_in;
 use serde_json::Value;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
 fn equiv(here: &Path, more: &[&str], variables: &[(&str, &str)]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gyrogen"));
-    command
-        .args(["equiv", "--samples", "20000", "--out", "out"])
-        .args(more);
-    command.current_dir(here).envs(variables.iter().copied());
-    command.output().expect("the program runs")
+    let equiv = ["equiv", "--samples", "20000", "--out", "out"];
+    gyrogen_in(here, &[&equiv[..], more].concat(), variables)
 }
 
 #[test]

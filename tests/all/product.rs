@@ -1,8 +1,8 @@
 //! `gyrogen emit --part all`: chain, conversion and correction of one design, built, checked and shown together.
 
+use crate::common::command::{all_of, gyrogen, run};
 use crate::common::compiler::cc;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
 const CORRECTION: &str = r#"
 [correction]
@@ -23,23 +23,12 @@ terms = [
 ]
 "#;
 
-fn gyrogen(arguments: &[&str], folder: &Path) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gyrogen"));
-    let output = command.args(arguments).current_dir(folder).output();
-    output.expect("the program runs")
-}
-
-fn said(output: &Output) -> String {
-    let all = [&output.stdout[..], &output.stderr].concat();
-    String::from_utf8_lossy(&all).into_owned()
-}
-
 /// The default design, with its phase loop on if asked, and the correction.
 fn design(phase_loop: bool, folder: &Path) {
     let mut text = format!("name = \"gyro\"\n{CORRECTION}");
     if phase_loop {
         let init = gyrogen(&["init", "whole.toml"], folder);
-        assert!(init.status.success(), "{}", said(&init));
+        assert!(init.status.success(), "{}", all_of(&init));
         let whole = std::fs::read_to_string(folder.join("whole.toml")).expect("a design");
         let mut inside = false;
         let line = |line: &str| {
@@ -55,16 +44,8 @@ fn design(phase_loop: bool, folder: &Path) {
 fn emitted(language: &str, folder: &Path) -> PathBuf {
     let part = ["emit", "design.toml", "--part", "all", "--lang", language];
     let output = gyrogen(&[&part[..], &["--out", language]].concat(), folder);
-    assert!(output.status.success(), "{}", said(&output));
+    assert!(output.status.success(), "{}", all_of(&output));
     folder.join(language)
-}
-
-fn run(program: &str, arguments: &[&str], folder: &Path) -> Output {
-    let output = Command::new(program)
-        .args(arguments)
-        .current_dir(folder)
-        .output();
-    output.unwrap_or_else(|e| panic!("{program}: {e}"))
 }
 
 /// The example of a bundle's README.
@@ -112,7 +93,7 @@ fn run_c(main: &str, folder: &Path) -> Option<i32> {
     arguments.extend(sources.iter().map(String::as_str));
     let built = cc().args(&arguments).current_dir(folder).output();
     let built = built.expect("a C compiler");
-    assert!(built.status.success(), "{}", said(&built));
+    assert!(built.status.success(), "{}", all_of(&built));
     let status = run("./example", &[], folder).status.code();
     for made in ["build.c", "example"] {
         std::fs::remove_file(folder.join(made)).expect("removed");
@@ -128,8 +109,8 @@ fn all_parts_verify_together_and_the_c_example_runs() {
         let folder = emitted("c", top.path());
         assert_eq!(run_c(&example(&folder, "c"), &folder), Some(0));
         let verified = gyrogen(&["verify", "c", "--design", "design.toml"], top.path());
-        assert!(verified.status.success(), "{}", said(&verified));
-        let all = said(&verified);
+        assert!(verified.status.success(), "{}", all_of(&verified));
+        let all = all_of(&verified);
         for name in [
             "chain/chain",
             "conversion/sequence",
@@ -151,7 +132,7 @@ fn all_parts_verify_together_and_the_c_example_runs() {
             ],
             top.path(),
         );
-        assert!(part.status.success(), "{}", said(&part));
+        assert!(part.status.success(), "{}", all_of(&part));
 
         // The check is of what goes between the parts: every wrong wire shows.
         let path = folder.join("test/gyro_all.c");
@@ -196,9 +177,9 @@ fn all_parts_verify_together_and_the_c_example_runs() {
         );
         assert_eq!(again.status.code(), Some(2));
         assert!(
-            said(&again).contains("conversion/gyro_conversion.c (edited)"),
+            all_of(&again).contains("conversion/gyro_conversion.c (edited)"),
             "{}",
-            said(&again)
+            all_of(&again)
         );
         std::fs::write(&source, text).expect("written");
         let again = gyrogen(
@@ -214,7 +195,7 @@ fn all_parts_verify_together_and_the_c_example_runs() {
             ],
             top.path(),
         );
-        assert!(again.status.success(), "{}", said(&again));
+        assert!(again.status.success(), "{}", all_of(&again));
         assert!(!folder.join("conversion/manifest.json").exists());
         assert!(!folder.join("verify.json").exists());
     }
@@ -226,8 +207,8 @@ fn all_parts_verify_together_in_rust_and_the_example_runs() {
     design(true, top.path());
     let folder = emitted("rust", top.path());
     let verified = gyrogen(&["verify", "rust", "--design", "design.toml"], top.path());
-    assert!(verified.status.success(), "{}", said(&verified));
-    assert!(said(&verified).contains("all parts together"));
+    assert!(verified.status.success(), "{}", all_of(&verified));
+    assert!(all_of(&verified).contains("all parts together"));
 
     let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned());
     let tested = run(
@@ -235,7 +216,7 @@ fn all_parts_verify_together_in_rust_and_the_example_runs() {
         &["test", "--offline", "--release", "--target-dir", "target"],
         &folder,
     );
-    assert!(tested.status.success(), "{}", said(&tested));
+    assert!(tested.status.success(), "{}", all_of(&tested));
     let bin = folder.join("src/bin");
     std::fs::create_dir(&bin).expect("made");
     std::fs::write(bin.join("example.rs"), example(&folder, "rust")).expect("written");
@@ -249,7 +230,7 @@ fn all_parts_verify_together_in_rust_and_the_example_runs() {
         "example",
     ];
     let shown = run(&cargo, &shown, &folder);
-    assert!(shown.status.success(), "{}", said(&shown));
+    assert!(shown.status.success(), "{}", all_of(&shown));
     // A wrong wire shows.
     let main = folder.join("src/main.rs");
     let text = std::fs::read_to_string(&main).expect("the check");
@@ -274,16 +255,16 @@ fn make_and_cmake_check_all_parts() {
     design(true, top.path());
     let folder = emitted("c", top.path());
     let made = run("make", &["check"], &folder);
-    let text = said(&made);
+    let text = all_of(&made);
     assert!(
         made.status.success() && text.ends_with("together: pass\n"),
         "{text}"
     );
     let configured = run("cmake", &["-S", ".", "-B", "build/cmake"], &folder);
-    assert!(configured.status.success(), "{}", said(&configured));
+    assert!(configured.status.success(), "{}", all_of(&configured));
     let check = ["--build", "build/cmake", "--target", "check"];
     let whole = run("cmake", &check, &folder);
-    assert!(whole.status.success(), "{}", said(&whole));
+    assert!(whole.status.success(), "{}", all_of(&whole));
     let path = folder.join("test/gyro_all.c");
     let text = std::fs::read_to_string(&path).expect("the check");
     std::fs::write(&path, text.replacen("row.sense_i", "row.sense_q", 1)).expect("written");
@@ -307,9 +288,9 @@ fn coefficients_that_no_record_gave_are_noted() {
             part,
         ];
         let output = gyrogen(&arguments, top.path());
-        assert!(output.status.success(), "{}", said(&output));
-        let notes = said(&output).contains("not fitted to a record");
-        assert_eq!(notes, is_noted, "{part}: {}", said(&output));
+        assert!(output.status.success(), "{}", all_of(&output));
+        let notes = all_of(&output).contains("not fitted to a record");
+        assert_eq!(notes, is_noted, "{part}: {}", all_of(&output));
     }
 }
 
@@ -330,8 +311,8 @@ fn what_does_not_go_together_is_refused() {
                 part,
             ];
             let output = gyrogen(&part, top.path());
-            assert_eq!(output.status.code(), Some(2), "{}", said(&output));
-            assert!(said(&output).contains(rule), "{}", said(&output));
+            assert_eq!(output.status.code(), Some(2), "{}", all_of(&output));
+            assert!(all_of(&output).contains(rule), "{}", all_of(&output));
         }
         assert!(!top.path().join("c/manifest.json").exists());
     };
@@ -369,8 +350,8 @@ fn a_product_that_is_not_whole_does_not_verify() {
     let text = std::fs::read_to_string(&manifest).expect("a manifest");
     let fails = |why: &str| {
         let verified = gyrogen(&["verify", "c"], top.path());
-        assert_eq!(verified.status.code(), Some(1), "{}", said(&verified));
-        assert!(said(&verified).contains(why), "{}", said(&verified));
+        assert_eq!(verified.status.code(), Some(1), "{}", all_of(&verified));
+        assert!(all_of(&verified).contains(why), "{}", all_of(&verified));
     };
     // Without its parts in the manifest.
     let (before, after) = text.split_once("  \"parts\": [").expect("parts");

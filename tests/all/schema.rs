@@ -1,17 +1,8 @@
 //! `gyrogen schema NAME` against what is really written.
 
+use crate::common::command::gyrogen;
 use serde_json::{Value, json};
 use std::path::Path;
-use std::process::Command;
-
-fn gyrogen(arguments: &[&str], folder: &Path) -> std::process::Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gyrogen"));
-    command
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .unwrap()
-}
 
 fn schema(name: &str) -> Value {
     let out = gyrogen(&["schema", name], Path::new("."));

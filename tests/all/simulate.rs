@@ -1,35 +1,20 @@
 //! `simulate` as a user runs it: the published figures, both drive modes, files, refusals.
 
+use crate::common::command::{gyrogen_here, text};
+use crate::common::json::number;
 use serde_json::Value;
 use std::path::Path;
-use std::process::{Command, Output};
-
-fn gyrogen(arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gyrogen"));
-    command.args(arguments).output().expect("gyrogen starts")
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().expect("UTF-8")
-}
 
 fn simulate(arguments: &[&str], out: &Path) -> Value {
     let mut all = vec!["simulate"];
     all.extend(arguments);
     all.extend(["--out", text(out), "--format", "json"]);
-    let output = gyrogen(&all);
+    let output = gyrogen_here(&all);
     let talk = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(0), "{talk}");
     let written = std::fs::read(out.join("simulate.json")).expect("simulate.json");
     assert_eq!(output.stdout, written, "stdout and simulate.json differ");
     serde_json::from_slice(&output.stdout).expect("JSON on stdout")
-}
-
-fn number(value: &Value, path: &str) -> f64 {
-    let found = path.split('.').fold(value, |v, key| &v[key]);
-    found
-        .as_f64()
-        .unwrap_or_else(|| panic!("{path} is {found}"))
 }
 
 /// The columns of a CSV by name.
@@ -63,7 +48,7 @@ fn column(path: &Path, name: &str) -> Vec<f64> {
 /// The default design with the phase loop that its text has switched off.
 fn tracking(folder: &Path) -> std::path::PathBuf {
     let path = folder.join("tracking.toml");
-    assert!(gyrogen(&["init", text(&path)]).status.success());
+    assert!(gyrogen_here(&["init", text(&path)]).status.success());
     let design = std::fs::read_to_string(&path).expect("a design");
     let mut inside = false;
     let lines: Vec<String> = design
@@ -267,7 +252,7 @@ fn what_cannot_be_simulated_is_refused() {
     for (arguments, words) in cases {
         let mut all = vec!["simulate", "--out", text(&out)];
         all.extend(arguments);
-        let output = gyrogen(&all);
+        let output = gyrogen_here(&all);
         let talk = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {talk}");
         assert!(talk.contains(words), "{arguments:?}: {talk}");

@@ -1,6 +1,7 @@
 //! What takes minutes or other programs: every reported point run again by other commands with other noise, budgets of
 //! random designs, GNU parallel and Slurm. By hand: `cargo test --release --test all -- --ignored study_slow::`.
 
+use crate::common::dice::Dice;
 use gyrogen::design::{Design, reader, template};
 use gyrogen::study::budget::budget;
 use gyrogen::study::certainty::{Bounds, Confidence, FIGURES, largest};
@@ -136,23 +137,6 @@ fn every_reported_point_meets_its_figures_with_other_noise() {
 fn with_other_noise(text: &str) -> Design {
     assert!(text.contains("seed = 20040024"));
     reader::parse(&text.replacen("seed = 20040024", OTHER_SEED, 1), None).expect("a design")
-}
-
-/// Numbers that follow one another (Knuth's constants), for designs and not for noise.
-struct Dice(u64);
-
-impl Dice {
-    fn below(&mut self, count: u32) -> u32 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        ((self.0 >> 33) % u64::from(count)) as u32
-    }
-
-    fn between(&mut self, low: u32, high: u32) -> u32 {
-        low + self.below(high - low + 1)
-    }
 }
 
 /// The default with other words, roundings and now and then another oscillator.

@@ -1,22 +1,14 @@
 //! `simulate --trace`: the trace holds the words that `replay` computes from the traced codes.
 
+use crate::common::command::{gyrogen_here, text};
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::process::{Command, Output};
-
-fn gyrogen(arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gyrogen"));
-    command.args(arguments).output().expect("gyrogen starts")
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().expect("UTF-8")
-}
+use std::process::Output;
 
 fn simulate(out: &Path, more: &[&str]) -> Output {
     let mut all = vec!["simulate", "--out", text(out)];
     all.extend(more);
-    gyrogen(&all)
+    gyrogen_here(&all)
 }
 
 /// Cells by column, empty ones left out.
@@ -60,7 +52,7 @@ fn traced_rows_are_replayed_rows() {
     let (capture, replayed) = (folder.path().join("c.csv"), folder.path().join("r.csv"));
     std::fs::write(&capture, codes).expect("written");
     let design = out.join("design.toml");
-    let output = gyrogen(&[
+    let output = gyrogen_here(&[
         "replay",
         text(&design),
         "--capture",

@@ -1,7 +1,8 @@
 //! `gyrogen verify` finds small damage in emitted code: exit 1, and stderr names the table or
 //! function and the first input that differs.
 
-use std::path::{Path, PathBuf};
+use crate::common::files::copy;
+use std::path::PathBuf;
 
 use crate::oracle::bundle::{Bundle, Language};
 use crate::oracle::golden;
@@ -78,19 +79,6 @@ fn design_text() -> String {
     design.nco.table = Format::q(2, 14);
     design.product = CastTo::new(Format::q(1, 14), Rounding::HalfUp, Overflow::Error);
     Printer::plain().print(&design)
-}
-
-fn copy(from: &Path, to: &Path) {
-    std::fs::create_dir_all(to).expect("a writable folder");
-    for entry in std::fs::read_dir(from).expect("a readable folder") {
-        let entry = entry.expect("a readable folder");
-        let target = to.join(entry.file_name());
-        if entry.path().is_dir() {
-            copy(&entry.path(), &target);
-        } else {
-            std::fs::copy(entry.path(), target).expect("a writable folder");
-        }
-    }
 }
 
 /// Damages a copy of the bundle and verifies it.

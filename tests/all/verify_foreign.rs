@@ -1,26 +1,13 @@
 //! `gyrogen verify` knows what a bundle must hold, takes nothing on trust that comes with it, and waits for no
 //! program without end.
 
+use crate::common::command::{gyrogen, gyrogen_in, told};
+use crate::common::files::copy;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Command;
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
-
-fn gyrogen(arguments: &[&str], folder: &Path) -> Output {
-    gyrogen_with(arguments, folder, &[])
-}
-
-fn gyrogen_with(arguments: &[&str], folder: &Path, variables: &[(&str, &str)]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gyrogen"));
-    command.args(arguments).current_dir(folder);
-    command.envs(variables.iter().copied());
-    command.output().expect("the program runs")
-}
-
-fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
 
 /// A correction's bundle in C: small, and with vectors, tables in no number and a sequence.
 const DESIGN: &str = r#"
@@ -47,25 +34,12 @@ fn whole() -> &'static (tempfile::TempDir, String) {
             &["emit", "design.toml", "--lang", "c", "--out", "c"],
             folder.path(),
         );
-        assert!(emitted.status.success(), "{}", said(&emitted));
-        let digest = said(&emitted)
+        assert!(emitted.status.success(), "{}", told(&emitted));
+        let digest = told(&emitted)
             .lines()
             .find_map(|l| l.strip_prefix("digest ").map(str::to_owned));
         (folder, digest.expect("a digest"))
     })
-}
-
-fn copy(from: &Path, to: &Path) {
-    std::fs::create_dir_all(to).expect("a writable folder");
-    for entry in std::fs::read_dir(from).expect("a readable folder") {
-        let entry = entry.expect("a readable folder");
-        let target = to.join(entry.file_name());
-        if entry.path().is_dir() {
-            copy(&entry.path(), &target);
-        } else {
-            std::fs::copy(entry.path(), target).expect("a writable folder");
-        }
-    }
 }
 
 /// A copy of the bundle in a folder of its own.
@@ -116,9 +90,9 @@ fn refused(at: &Path, status: i32, text: &str) {
         output.status.code(),
         Some(status),
         "{text}: {}",
-        said(&output)
+        told(&output)
     );
-    assert!(said(&output).contains(text), "{text}: {}", said(&output));
+    assert!(told(&output).contains(text), "{text}: {}", told(&output));
 }
 
 #[test]
@@ -137,7 +111,7 @@ fn a_bundle_holds_against_its_digest_and_its_design() {
         ],
         folder.path(),
     );
-    assert!(output.status.success(), "{}", said(&output));
+    assert!(output.status.success(), "{}", told(&output));
     let json = std::fs::read_to_string(folder.path().join("verify.json")).expect("a result");
     assert!(json.contains(digest), "{json}");
     let (other, at) = bundle();
@@ -149,10 +123,10 @@ fn a_bundle_holds_against_its_digest_and_its_design() {
     let output = gyrogen(&["verify", "c", "--design", "design.toml"], other.path());
     assert_eq!(output.status.code(), Some(1));
     assert!(
-        said(&output).contains("files are not what the design emits: ")
-            && said(&output).contains("the files are those of the manifest"),
+        told(&output).contains("files are not what the design emits: ")
+            && told(&output).contains("the files are those of the manifest"),
         "{}",
-        said(&output)
+        told(&output)
     );
     // Sealed again with another command, all of it is right but for the digest.
     let command = "gyrogen emit other.toml --lang c";
@@ -174,10 +148,10 @@ fn a_bundle_holds_against_its_digest_and_its_design() {
     }
     reseal(&at, |m| m["command"] = command.into());
     let output = gyrogen(&["verify", "c"], other.path());
-    assert!(output.status.success(), "{}", said(&output));
+    assert!(output.status.success(), "{}", told(&output));
     let output = gyrogen(&["verify", "c", "--digest", digest], other.path());
     assert_eq!(output.status.code(), Some(1));
-    assert!(said(&output).contains("digest"), "{}", said(&output));
+    assert!(told(&output).contains("digest"), "{}", told(&output));
     let output = gyrogen(&["verify", "c", "--digest", "12"], other.path());
     assert_eq!(output.status.code(), Some(2));
 }
@@ -315,7 +289,7 @@ fn a_file_of_a_bundle_is_no_bundle_and_its_folder_is_named() {
         ("alone.c", "give the folder of sources"),
     ] {
         let output = gyrogen(&["verify", file], folder.path());
-        let said = said(&output);
+        let said = told(&output);
         assert_eq!(output.status.code(), Some(2), "{said}");
         assert!(
             said.contains("this is a file, and `verify` takes"),
@@ -327,7 +301,7 @@ fn a_file_of_a_bundle_is_no_bundle_and_its_folder_is_named() {
         );
     }
     let output = gyrogen(&["verify", "tested_correction.c"], &at);
-    let said = said(&output);
+    let said = told(&output);
     assert!(said.contains("did you mean the folder .?"), "{said}");
     assert!(!at.join("verify.json").exists());
 }
@@ -366,18 +340,18 @@ fn a_bundle_that_is_cut_off_or_lacks_a_file_is_told_to_be_written_again() {
         "the command that made it: `gyrogen run`, `close`, `emit` or `approx`, with `--force`";
     std::fs::write(&manifest, &text[..text.len() / 2]).expect("written");
     let output = gyrogen(&["verify", "c"], folder.path());
-    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
-    assert!(said(&output).contains(remedy), "{}", said(&output));
+    assert_eq!(output.status.code(), Some(2), "{}", told(&output));
+    assert!(told(&output).contains(remedy), "{}", told(&output));
     std::fs::write(&manifest, &text).expect("written");
     std::fs::remove_dir_all(at.join("vectors")).expect("removed");
     let output = gyrogen(&["verify", "c"], folder.path());
-    assert_ne!(output.status.code(), Some(0), "{}", said(&output));
+    assert_ne!(output.status.code(), Some(0), "{}", told(&output));
     assert!(
-        !said(&output).contains("check the path"),
+        !told(&output).contains("check the path"),
         "{}",
-        said(&output)
+        told(&output)
     );
-    assert!(said(&output).contains("vectors/"), "{}", said(&output));
+    assert!(told(&output).contains("vectors/"), "{}", told(&output));
 }
 
 #[cfg(unix)]
@@ -395,7 +369,7 @@ fn links_pipes_and_endless_files_are_not_opened() {
             link(target, &at.join(name)).expect("a link");
             let output = gyrogen(&["verify", "c"], at.parent().expect("a parent"));
             assert_ne!(output.status.code(), Some(0));
-            assert!(!said(&output).contains("root:"), "{}", said(&output));
+            assert!(!told(&output).contains("root:"), "{}", told(&output));
         }
         let (_folder, at) = bundle();
         std::fs::remove_file(at.join(name)).expect("removed");
@@ -425,43 +399,42 @@ fn a_folder_with_the_name_of_an_option_is_a_folder() {
     let folder = tempfile::tempdir().expect("a folder");
     copy(&whole().0.path().join("c"), &folder.path().join("-dir"));
     let output = gyrogen(&["verify", "--", "-dir"], folder.path());
-    assert!(output.status.success(), "{}", said(&output));
+    assert!(output.status.success(), "{}", told(&output));
 }
 
 #[cfg(unix)]
 #[test]
 fn a_compiler_may_have_arguments_and_may_not_hang() {
-    use std::os::unix::fs::PermissionsExt;
     let (folder, _) = bundle();
     let here = folder.path();
-    let output = gyrogen_with(&["verify", "c"], here, &[("CC", "cc -O1")]);
-    assert!(output.status.success(), "{}", said(&output));
-    let output = gyrogen_with(&["verify", "c"], here, &[("CC", "/bin/false")]);
+    let output = gyrogen_in(here, &["verify", "c"], &[("CC", "cc -O1")]);
+    assert!(output.status.success(), "{}", told(&output));
+    let output = gyrogen_in(here, &["verify", "c"], &[("CC", "/bin/false")]);
     assert_eq!(output.status.code(), Some(2));
     assert!(
-        said(&output).contains("/bin/false") && !said(&output).contains("there is no compiler"),
+        told(&output).contains("/bin/false") && !told(&output).contains("there is no compiler"),
         "{}",
-        said(&output)
+        told(&output)
     );
     let slow = here.join("slow");
     std::fs::write(
         &slow,
-        "#!/bin/sh\n[ \"$1\" = --version ] && { echo slow 1; exit; }\nsleep 100 & wait\n",
+        "[ \"$1\" = --version ] && { echo slow 1; exit; }\nsleep 100 & wait\n",
     )
     .expect("written");
-    std::fs::set_permissions(&slow, std::fs::Permissions::from_mode(0o755)).expect("allowed");
-    let name = slow.to_str().expect("a name");
+    // Nothing is executable that this process has written: another test's child may still hold it open.
+    let name = format!("sh {}", slow.display());
     let started = Instant::now();
-    let output = gyrogen_with(
-        &["verify", "c"],
+    let output = gyrogen_in(
         here,
-        &[("CC", name), ("GYROGEN_TIME_LIMIT", "1")],
+        &["verify", "c"],
+        &[("CC", &name), ("GYROGEN_TIME_LIMIT", "1")],
     );
     assert_eq!(output.status.code(), Some(1));
     assert!(
-        said(&output).contains("did not end within 1 s"),
+        told(&output).contains("did not end within 1 s"),
         "{}",
-        said(&output)
+        told(&output)
     );
     assert!(started.elapsed() < Duration::from_secs(20));
 }
@@ -480,12 +453,12 @@ fn a_harness_that_hangs_or_floods_is_ended() {
         std::fs::write(&path, damaged).expect("written");
         reseal(&at, |_| ());
         let started = Instant::now();
-        let output = gyrogen_with(
-            &["verify", "c"],
+        let output = gyrogen_in(
             folder.path(),
+            &["verify", "c"],
             &[("GYROGEN_TIME_LIMIT", "5")],
         );
-        assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+        assert_eq!(output.status.code(), Some(1), "{}", told(&output));
         assert!(started.elapsed() < Duration::from_secs(60));
     }
 }

@@ -1,5 +1,6 @@
 //! `gyrogen verify --target`: the same bundle on other processors, under emulation where this machine can.
 
+use crate::common::command::told;
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -11,10 +12,6 @@ fn gyrogen(arguments: &[&str], path: Option<&Path>) -> Output {
         command.env("PATH", path);
     }
     command.output().expect("gyrogen runs")
-}
-
-fn told(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 fn emit(folder: &Path, language: &str) -> String {
