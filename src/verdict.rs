@@ -161,7 +161,7 @@ pub struct Closure {
     pub schema: &'static str,
     /// Of the tool.
     pub version: &'static str,
-    /// Of the design's text.
+    /// Of the design's text as read; the firmware names that of `design.toml` beside it, which has the correction.
     pub design_sha256: String,
     /// As it was called.
     pub command: String,

@@ -150,7 +150,8 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         }
         watch.stage("emitting and verifying");
         let prefix = correction::prefix(&design.name);
-        let sources = sources(&closed, &prefix)?;
+        let augmented = augmented(&closed, &design);
+        let sources = sources(&closed, &prefix, augmented.as_deref())?;
         let compared = if arguments.verify {
             compared(&mut closed, &record, &sources, &prefix)?
         } else {
@@ -170,7 +171,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         write(
             &closed,
             path,
-            &design,
+            (&design, augmented.as_deref()),
             &sources,
             beside,
             (&mut results, arguments.force),
@@ -245,14 +246,28 @@ struct All<'a> {
     controls: Option<&'a Controls>,
 }
 
-/// The correction in C and in Rust, where there is one.
-fn sources(closed: &Closed, prefix: &str) -> Result<Option<[Vec<EmittedFile>; 2]>> {
-    let Some(correction) = &closed.correction else {
+/// The text of the design with the correction, where there is one.
+fn augmented(closed: &Closed, design: &Design) -> Option<String> {
+    let correction = closed.correction.as_ref()?;
+    let planned = Planned {
+        plan: correction.plan.clone(),
+        noise_dps: correction.formats.noise_dps,
+    };
+    Some(crate::job::fitted_design::with_correction(design, &planned))
+}
+
+/// The correction in C and in Rust, where there is one. What is emitted names the design that it can be emitted from again.
+fn sources(
+    closed: &Closed,
+    prefix: &str,
+    augmented: Option<&str>,
+) -> Result<Option<[Vec<EmittedFile>; 2]>> {
+    let Some((correction, augmented)) = closed.correction.as_ref().zip(augmented) else {
         return Ok(None);
     };
     let origin = Origin {
         prefix,
-        sha256: &closed.closure.design_sha256,
+        sha256: &crate::digest::sha256(augmented.as_bytes()),
         command: &closed.closure.command,
     };
     let of = |language| correction::emit(correction, &origin, language);
@@ -280,19 +295,12 @@ fn compared(
 fn write(
     closed: &Closed,
     path: &Path,
-    design: &Design,
+    (design, augmented): (&Design, Option<&str>),
     sources: &Option<[Vec<EmittedFile>; 2]>,
     beside: Beside<'_>,
     (results, force): (&mut Results, bool),
 ) -> Result<()> {
-    let augmented = closed.correction.as_ref().map(|correction| {
-        let planned = Planned {
-            plan: correction.plan.clone(),
-            noise_dps: correction.formats.noise_dps,
-        };
-        let text = crate::job::fitted_design::with_correction(design, &planned);
-        (DesignDiff::of(design, &text), text)
-    });
+    let augmented = augmented.map(|text| (DesignDiff::of(design, text), text));
     let beside = Beside {
         diff: augmented.as_ref().map(|(diff, _)| diff),
         ..beside

@@ -22,7 +22,7 @@ pub struct Whose {
     language: String,
     /// The design's name.
     name: String,
-    /// SHA-256 of the design's text.
+    /// SHA-256 of the text of the design that it is emitted from.
     sha256: String,
 }
 

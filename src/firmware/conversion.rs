@@ -30,7 +30,7 @@ pub fn emit(
         long_restart: SEGMENT.max(2 * u64::from(conversion.rows()) + 1),
         part: "conversion",
         facts: conversion.facts(),
-        request_sha256: origin.sha256,
+        design_sha256: origin.sha256,
         command: origin.command,
     };
     stepped::emit(&what, language)

@@ -11,7 +11,7 @@ use crate::error::Result;
 pub struct Origin<'a> {
     /// Prefix of every name in C, the crate in Rust: a C identifier.
     pub prefix: &'a str,
-    /// SHA-256 of the design (or of the request that stands in its place).
+    /// SHA-256 of the text of the design that it is emitted from.
     pub sha256: &'a str,
     /// The command that makes it again.
     pub command: &'a str,
@@ -38,7 +38,7 @@ pub fn emit(
         long_restart: crate::vectors::stimulus::SEGMENT,
         part: "correction",
         facts: sentences::facts(correction),
-        request_sha256: origin.sha256,
+        design_sha256: origin.sha256,
         command: origin.command,
     };
     stepped::emit(&what, language)

@@ -119,7 +119,7 @@ impl<'a> Emission<'a> {
     /// A template that cannot be filled.
     pub fn print(&self, language: Language) -> Result<Printed> {
         let (design, bundle) = (self.design, &self.bundle);
-        let banner = manifest::banner(&design.source.sha256, self.command);
+        let banner = manifest::banner(manifest::DESIGN, &design.source.sha256, self.command);
         let facts = manifest::facts(design, bundle);
         let view = View::new(bundle, &self.models, &self.every, language, banner, facts);
         let view = match self.part {

@@ -38,7 +38,7 @@ pub struct Standalone<'a> {
 /// A template that cannot be printed (a fault of the tool).
 pub fn emit(what: &Standalone, language: Language) -> Result<Vec<EmittedFile>> {
     let bundle = bundle(what);
-    let banner = manifest::banner(what.request_sha256, what.command);
+    let banner = manifest::banner(manifest::REQUEST, what.request_sha256, what.command);
     let models = std::slice::from_ref(what.model);
     let mut facts = what.facts.clone();
     facts.push("words are two's complement; ranges beside them are proved, not observed".into());
@@ -51,7 +51,7 @@ pub fn emit(what: &Standalone, language: Language) -> Result<Vec<EmittedFile>> {
         design_sha256: what.request_sha256,
         command: what.command,
         language,
-        part: "function",
+        part: manifest::FUNCTION,
         has_code: true,
         columns: &[],
     };

@@ -235,7 +235,7 @@ impl Product<'_> {
         Ok(View {
             p: design.name.clone(),
             language,
-            banner: manifest::banner(&design.source.sha256, command),
+            banner: manifest::banner(manifest::DESIGN, &design.source.sha256, command),
             parts: paths::PARTS,
             facts: self
                 .conversion

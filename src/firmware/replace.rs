@@ -204,7 +204,7 @@ mod tests {
         for file in &mut files {
             file.text = format!(
                 "/* {} */\n{}",
-                manifest::banner("0", "gyrogen emit"),
+                manifest::banner(manifest::DESIGN, "0", "gyrogen emit"),
                 file.text
             );
         }
@@ -238,7 +238,11 @@ mod tests {
             let folder = made.path().join("c");
             write(&generated(&["a.c", "b.c"]), &folder, false).expect("written");
             std::fs::write(folder.join(manifest::NAME), damaged).expect("written");
-            std::fs::write(folder.join("b.c"), manifest::banner("0", "mine")).expect("written");
+            std::fs::write(
+                folder.join("b.c"),
+                manifest::banner(manifest::DESIGN, "0", "mine"),
+            )
+            .expect("written");
             std::fs::write(folder.join("notes.txt"), "mine").expect("written");
             // A copy that was put by.
             std::fs::copy(folder.join("a.c"), folder.join("old_a.c")).expect("copied");

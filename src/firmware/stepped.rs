@@ -43,8 +43,8 @@ pub struct Stepped<'a> {
     pub part: &'static str,
     /// Lines for the head of the sources.
     pub facts: Vec<String>,
-    /// Of the request.
-    pub request_sha256: &'a str,
+    /// Of the text of the design that it is emitted from.
+    pub design_sha256: &'a str,
     /// The command that makes it again.
     pub command: &'a str,
 }
@@ -72,7 +72,7 @@ pub fn emit(what: &Stepped, language: Language) -> Result<Vec<EmittedFile>> {
     let internal = || Error::Check("internal: nothing was traced".into());
     let function = what.program.functions.last().ok_or_else(internal)?;
     let ranges: Vec<Interval> = function.inputs.iter().map(|(_, range)| *range).collect();
-    let banner = manifest::banner(what.request_sha256, what.command);
+    let banner = manifest::banner(manifest::DESIGN, what.design_sha256, what.command);
     let mut facts = what.facts.clone();
     facts.push("words are two's complement; ranges beside them are proved, not observed".into());
     let program = Interpreter::new(what.program);
@@ -123,7 +123,7 @@ pub fn emit(what: &Stepped, language: Language) -> Result<Vec<EmittedFile>> {
     emitted.push(vectors::of_tables(&view.tables));
     emitted.push(files::sums(&emitted));
     let header = Header {
-        design_sha256: what.request_sha256,
+        design_sha256: what.design_sha256,
         command: what.command,
         language,
         part: what.part,

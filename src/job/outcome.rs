@@ -63,7 +63,7 @@ pub struct Summary {
     pub schema: &'static str,
     /// Of the tool.
     pub version: &'static str,
-    /// Of the design's text.
+    /// Of the design's text as read; the firmware names that of `design.toml` beside it, which has the fit.
     pub design_sha256: String,
     /// The command.
     pub command: String,

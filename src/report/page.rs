@@ -5,6 +5,8 @@ use super::figure::Figure;
 use super::figures;
 use super::tables;
 use super::text::{bounding, decimals_of, fixed, grouped, percent, significant};
+use crate::digest::sha256;
+use crate::job::fitted_design;
 use crate::job::outcome::Drift;
 use crate::output::name_of;
 use crate::verify::compare::Compared;
@@ -328,7 +330,11 @@ fn provenance(shown: &Shown) -> Vec<[String; 2]> {
             "design",
             path.map_or("embedded default".to_owned(), |p| name_of(p)),
         ),
-        line("design, sha256", s.design_sha256.clone()),
+        line("SHA-256 of the design as read", s.design_sha256.clone()),
+        line(
+            "SHA-256 of the design with the fit, design.toml",
+            sha256(fitted_design::text(shown.design).as_bytes()),
+        ),
         line("record", s.record.clone().unwrap_or_else(|| own.to_owned())),
         line("C compiler and flags", shown.toolchains[0].to_owned()),
         line("Rust compiler and flags", shown.toolchains[1].to_owned()),

@@ -23,7 +23,7 @@ pub struct Verification {
     pub schema: &'static str,
     /// Of the tool that verified.
     pub version: &'static str,
-    /// Of the design that the bundle was made from.
+    /// As the manifest has it: of the design that the bundle is emitted from, or of the request of `approx`.
     pub design_sha256: String,
     /// SHA-256 of the manifest, which holds those of all other files.
     pub digest: String,

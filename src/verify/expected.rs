@@ -21,7 +21,7 @@ const FUNCTIONS: [(&str, &[&str]); 7] = [
         ],
     ),
     ("compensation", &["bias", "rate", "compensate"]),
-    ("function", &["evaluate"]),
+    (manifest::FUNCTION, &["evaluate"]),
     ("correction", &["correct"]),
     ("conversion", &["convert"]),
     ("tables", &[]),
@@ -381,6 +381,7 @@ fn declared(manifest: &Manifest, language: Language, folder: &Folder, problems: 
 fn banners(manifest: &Manifest, folder: &Folder, problems: &mut Vec<String>) {
     let banner = manifest::banner_of(
         &manifest.version,
+        manifest.source(),
         &manifest.design_sha256,
         &manifest.command,
     );

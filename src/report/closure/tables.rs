@@ -350,7 +350,7 @@ pub fn provenance(closed: &Closed) -> Vec<[String; 2]> {
     [
         ("command", c.command.clone()),
         ("version", c.version.to_owned()),
-        ("design's SHA-256", c.design_sha256.clone()),
+        ("SHA-256 of the design as read", c.design_sha256.clone()),
         (
             "rows",
             format!(
