@@ -124,19 +124,20 @@ fn finding(o: &Outcome, lsb: f64) -> String {
 
 fn errors(o: &Outcome, lsb: f64) -> Vec<[String; 3]> {
     let e = &o.error;
-    let up = |v: f64| bounding(v, 3);
-    let line = |what: &str, v: f64| [what.to_owned(), up(v), up(v / lsb)];
+    let line = |what: &str, v: f64| [what.to_owned(), bounding(v, 3), bounding(v / lsb, 3)];
+    // A bound is rounded up, what was seen to the nearest, here as in the sentence above.
+    let seen = |what: &str, v: f64| [what.to_owned(), significant(v, 3), significant(v / lsb, 3)];
     let mut out = vec![line(
         "certified: approximation, data, evaluation, output",
         e.certified_max_abs,
     )];
     out.extend(
         e.exhaustive_max_abs
-            .map(|v| line("observed over every input code", v)),
+            .map(|v| seen("observed over every input code", v)),
     );
     out.extend(
         e.sampled_max_abs
-            .map(|v| line("observed over the codes that were run", v)),
+            .map(|v| seen("observed over the codes that were run", v)),
     );
     out.push(line(
         "of the data alone, evaluated exactly",
