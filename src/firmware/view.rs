@@ -318,6 +318,12 @@ impl View {
         self.guarded
     }
 
+    /// The entry of a function says what one step of a word is worth in a unit.
+    pub(super) fn has_worth(&self) -> bool {
+        let mut notes = self.functions.iter().flat_map(|f| &f.notes);
+        notes.any(|note| note.contains(" = raw * "))
+    }
+
     /// The functions that are run over all their inputs, and how many these are.
     pub(super) fn exhausted(&self) -> String {
         let run = self.tests.iter().filter(|t| !t.every.is_empty());
