@@ -185,8 +185,9 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
         say!("chosen: {chosen}");
     }
     say!(
-        "error budget: fixed point keeps the compensated rate within {} deg/s of what the fitted polynomial gives (proved: rounding \
-         of the thermometer, the coefficients, the steps, the bias and the rate). The fit's own error is the held-out rms (an estimate).",
+        "error budget: the compensated rate is at most {} deg/s from what the fitted polynomial gives (proved). This is the bound of \
+         the bias in the next line with two roundings more: of the thermometer to its word, and of the rate to the output. The fit's \
+         own error is the held-out rms (an estimate).",
         at_most(s.budget.bound_dps, 3)
     );
     for line in &s.certainty_text {

@@ -291,7 +291,7 @@ pub fn sentences_with(
         ""
     };
     let mut lines = vec![format!(
-        "The firmware's bias is at most {} from the {against} (proved{unless}). Of this the coefficients' words make {}, the \
+        "For a given word of the thermometer the firmware's bias is at most {} from the {against} (proved{unless}). Of this the coefficients' words make {}, the \
          rounding of the steps {} and that of the output {} deg/s.",
         figure(design, bounds.certified_max_dps),
         at_most(bounds.coefficients_dps, 3),
@@ -357,7 +357,7 @@ pub fn sentences_with(
 pub fn run_sentence(design: &Design, certainty: &Certainty) -> String {
     let c = certainty;
     format!(
-        "That bound was tried on {}{} calibrated inputs: the bias was at most {} from the polynomial (at input word {}){}.",
+        "The bound of the bias was tried on {}{} calibrated inputs: the bias was at most {} from the polynomial (at input word {}){}.",
         if c.exhaustive { "all " } else { "" },
         c.inputs_checked,
         figure(design, c.exhaustive_max_dps),
