@@ -6,7 +6,7 @@ use super::stages::Stages;
 use super::terminal::OutputFormat;
 use crate::error::{Error, Result};
 use crate::output::Results;
-use crate::simulation::hunting::Hunting;
+use crate::simulation::hunting::{self, Hunting};
 use crate::simulation::outcome::{Both, Outcome};
 use crate::simulation::trace::Wanted;
 use crate::simulation::{self, Course, Request, record_csv};
@@ -282,33 +282,30 @@ fn print_sentences(outcome: &Outcome) {
 /// What quantisation leaves of the loops, as a table and what it means.
 pub(super) fn show_loops(found: &[Hunting]) {
     let mut table = super::terminal::table(&[
-        "loop",
+        "loop, unit of its output",
         "chamber, degC",
-        "output pp",
-        "output pp, predicted",
-        "error pp, LSB",
-        "error pp, predicted, LSB",
-        "ADC and NCO add at most, LSB",
+        "output pp: circuit",
+        "reduced model",
+        "error pp, LSB: circuit",
+        "reduced model",
+        "at most",
         "mean error, LSB",
     ]);
     for h in found {
         table.add_row([
-            h.name.to_owned(),
+            format!("{}, {}", h.name, h.output_unit),
             format!("{}", h.chamber_degc),
-            format!("{:.0} {}", h.output_pp_lsb, h.output_unit),
+            format!("{:.0}", h.output_pp_lsb),
             format!("{:.0}", h.predicted_output_pp_lsb),
             format!("{:.0}", h.error_pp_lsb),
             format!("{:.0}", h.predicted_error_pp_lsb),
-            format!("{:.0}", h.converters_pp_lsb),
+            format!("{:.0}", h.most_error_pp_lsb()),
             format!("{:.3}", h.error_mean_lsb),
         ]);
     }
     super::terminal::numbers(&mut table, 1..);
     super::terminal::show(&table);
-    say!(
-        "The loops run without noise. pp: what still moves, peak to peak. The prediction leaves ADC and NCO out: the error may be \
-         larger by what these two add at most. By theory the loops have no dead band: they correct every error, however small."
-    );
+    say!("{}", hunting::caption());
 }
 
 /// Decimals that show a tolerance.

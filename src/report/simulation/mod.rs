@@ -6,6 +6,7 @@ use super::figure::Figure;
 use super::narrow::rendered;
 use super::text::{decimals_of, fixed, percent, significant};
 use crate::error::Result;
+use crate::simulation::hunting::{self, Hunting};
 use crate::simulation::outcome::{Drift, Outcome};
 use askama::Template;
 
@@ -21,8 +22,11 @@ struct Page {
     /// What, source, published, obtained, by, agrees.
     paper: Vec<([String; 5], bool)>,
     figures: Vec<Figure>,
-    /// Loop, temperature, output (measured, predicted), error (measured, predicted, bound), mean.
+    /// Loop with the unit of its output, temperature, output (circuit, reduced model), error (circuit, reduced model, at
+    /// most), mean.
     loops: Vec<[String; 8]>,
+    /// What these columns hold.
+    loops_caption: String,
     /// What the facts are of.
     facts_are: &'static str,
     /// Name, value.
@@ -71,6 +75,7 @@ pub fn html(outcome: &Outcome) -> Result<String> {
             .collect(),
         figures: figures::all(outcome),
         loops: loops(outcome),
+        loops_caption: hunting::caption(),
         facts_are: match (s.fit.is_some(), s.lock.is_some()) {
             (true, true) => "Fit, lock and power-on",
             (true, false) => "Fit and power-on",
@@ -142,15 +147,15 @@ fn drift(outcome: &Outcome) -> Vec<[String; 4]> {
 }
 
 fn loops(outcome: &Outcome) -> Vec<[String; 8]> {
-    let row = |h: &crate::simulation::hunting::Hunting| {
+    let row = |h: &Hunting| {
         [
-            h.name.replace('_', " "),
+            format!("{}, {}", h.name.replace('_', " "), h.output_unit),
             fixed(h.chamber_degc, 1),
-            format!("{} {}", fixed(h.output_pp_lsb, 0), h.output_unit),
+            fixed(h.output_pp_lsb, 0),
             fixed(h.predicted_output_pp_lsb, 0),
             fixed(h.error_pp_lsb, 0),
             fixed(h.predicted_error_pp_lsb, 0),
-            fixed(h.converters_pp_lsb, 0),
+            fixed(h.most_error_pp_lsb(), 0),
             fixed(h.error_mean_lsb, 3),
         ]
     };
