@@ -26,7 +26,9 @@ impl Said {
             roles.iter().filter(|r| **r == role).count() as f64 / roles.len().max(1) as f64
         };
         Said {
-            equations: terms.map(|t| t.candidate.equation()).collect(),
+            equations: terms
+                .map(|t| t.candidate.equation(&closed.channels, &t.point))
+                .collect(),
             roles: [Role::Judge, Role::Choose].map(share),
         }
     }

@@ -202,7 +202,7 @@ fn step(view: &View, k: usize, contribution: &Contribution, width: f64) -> Optio
     draw_contribution(&mut frame, &abscissa, contribution, shown);
     svg.add(&frame);
     let title = format!("Cause {}: {} over {}", k + 1, step.effect, abscissa.name);
-    let equation = term.candidate.equation();
+    let equation = term.candidate.equation(&view.closed.channels, &term.point);
     let caption = format!(
         "{}: {}. The deviation counts coefficients and shape, estimated together with the declared model and all other \
          causes: it is wide where those could take its place.{}{constant} {CROWDED}",

@@ -282,7 +282,7 @@ pub fn steps(closed: &Closed) -> Vec<TakenStep> {
             TakenStep {
                 effect: step.effect.clone(),
                 physics: term.candidate.physics(),
-                equation: term.candidate.equation(),
+                equation: term.candidate.equation(&closed.channels, &term.point),
                 channels: step.channels.join(", "),
                 parameters: step.parameters.iter().map(parameter).collect(),
                 heldout_rms: value(step.heldout_rms),

@@ -126,8 +126,8 @@ pub trait Candidate: Send + Sync {
         self.sheet().physics.to_owned()
     }
 
-    /// The contribution to the output.
-    fn equation(&self) -> String {
+    /// The contribution to the output in a shape that was found.
+    fn equation(&self, _c: &Channels, _point: &Point) -> String {
         self.sheet().equation.to_owned()
     }
 

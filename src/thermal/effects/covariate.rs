@@ -52,7 +52,7 @@ impl Candidate for Covariate {
         )
     }
 
-    fn equation(&self) -> String {
+    fn equation(&self, _c: &Channels, _point: &Point) -> String {
         let name = &self.name;
         format!(
             "f({name}), a natural cubic spline of one to seven degrees of freedom in the record's column {name}; at once or after a \

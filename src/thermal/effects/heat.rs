@@ -28,8 +28,7 @@ const THERMAL_LAG: Sheet = Sheet {
     id: "thermal_lag",
     physics: "part of the bias (electronics, package) follows a temperature that lags the \
               structure's: a loop between heating and cooling that closes in dwells",
-    equation: "gain (T - T_l), or gain (T - T_l) + curvature (T^2 - T_l^2) with T and T_l counted from reference_degc; T_l lags T: \
-               tau dT_l/dt = T - T_l, T_l as T or free at the first row and after gaps",
+    equation: "gain (T - T_l), T_l lags T: tau dT_l/dt = T - T_l",
     parameters: &[
         Parameter {
             name: "gain_dps_per_k",
@@ -51,6 +50,22 @@ const THERMAL_LAG: Sheet = Sheet {
 impl Candidate for ThermalLag {
     fn sheet(&self) -> &Sheet {
         &THERMAL_LAG
+    }
+
+    fn equation(&self, c: &Channels, point: &Point) -> String {
+        let as_is = "T_l = T at the first row";
+        let (law, begun) = match Lagging::of(c, point) {
+            Lagging::Linear => ("gain (T - T_l)", as_is),
+            Lagging::Curved => (
+                "gain (T - T_l) + curvature (T^2 - T_l^2) with T and T_l counted from reference_degc",
+                as_is,
+            ),
+            Lagging::Begun => (
+                "gain (T - T_l)",
+                "T_l fitted at the first row and after the longest gaps",
+            ),
+        };
+        format!("{law}; T_l lags T: tau dT_l/dt = T - T_l, {begun}")
     }
 
     fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing> {

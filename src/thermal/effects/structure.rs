@@ -129,9 +129,7 @@ const MODE_CROSSING: Sheet = Sheet {
     id: "mode_crossing",
     physics: "at one temperature a parasitic mode has the drive's frequency and takes energy from \
               it: a bump, or a swing to both sides, in temperature",
-    equation: "(a + d 2 x) / (1 + x^2), or a / sqrt(1 + x^2) where the other mode's amplitude acts, or a exp(-x^2 / 2) \
-               where the crossing is blurred (several modes, a gradient over the die); x = (T - center) / half width, a absorptive, \
-               d dispersive",
+    equation: "(a + d 2 x) / (1 + x^2); x = (T - center) / half width, a absorptive, d dispersive",
     parameters: &[
         Parameter {
             name: "center_degc",
@@ -193,6 +191,17 @@ fn crossing(c: &Channels, point: &Point) -> (f64, f64) {
 impl Candidate for ModeCrossing {
     fn sheet(&self) -> &Sheet {
         &MODE_CROSSING
+    }
+
+    fn equation(&self, _c: &Channels, point: &Point) -> String {
+        let x = "x = (T - center) / half width, a absorptive";
+        match point.form {
+            0 => MODE_CROSSING.equation.to_owned(),
+            1 => format!(
+                "a exp(-x^2 / 2), a crossing that is blurred (several modes, a gradient over the die); {x}"
+            ),
+            _ => format!("a / sqrt(1 + x^2), the other mode's amplitude acts; {x}"),
+        }
     }
 
     fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing> {

@@ -343,7 +343,7 @@ impl Candidate for User {
         }
     }
 
-    fn equation(&self) -> String {
+    fn equation(&self, _c: &Channels, _point: &Point) -> String {
         self.effect.text.clone()
     }
 
