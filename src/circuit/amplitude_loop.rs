@@ -84,6 +84,8 @@ impl AmplitudeLoop {
 impl<A: Arithmetic> Block<A, 1, 1> for AmplitudeLoop {
     type State = AmplitudeLoopState<A::Word>;
     const NAME: &'static str = "amplitude_loop";
+    const PURPOSE: &'static str =
+        "The drive gain that holds the drive's amplitude at its setpoint.";
     const STATE: &'static str = "amplitude_loop";
 
     fn inputs(&self) -> [Port; 1] {

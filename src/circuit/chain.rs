@@ -453,6 +453,7 @@ pub struct Period<'a, const N: usize>(pub &'a Chain<N>);
 impl<A: Arithmetic, const N: usize> Block<A, 2, 0> for Sample<'_, N> {
     type State = ChainState<A::Residue, A::Word, N>;
     const NAME: &'static str = "sample";
+    const PURPOSE: &'static str = "One ADC sample of both channels: oscillator, mixers and the integrators of the decimators.";
     const STATE: &'static str = "chain";
 
     fn inputs(&self) -> [Port; 2] {
@@ -475,6 +476,7 @@ impl<A: Arithmetic, const N: usize> Block<A, 2, 0> for Sample<'_, N> {
 impl<A: Arithmetic, const N: usize> Block<A, 0, 10> for Period<'_, N> {
     type State = ChainState<A::Residue, A::Word, N>;
     const NAME: &'static str = "period";
+    const PURPOSE: &'static str = "A row of the chain at the end of a decimation period: combs, CORDIC, loops and compensation.";
     const STATE: &'static str = "chain";
 
     fn inputs(&self) -> [Port; 0] {

@@ -17,6 +17,8 @@ pub struct Compensate {
 impl<A: Arithmetic> Block<A, 2, 2> for Compensate {
     type State = ();
     const NAME: &'static str = "compensate";
+    const PURPOSE: &'static str =
+        "The compensation of one reading: its bias and its compensated rate.";
 
     fn inputs(&self) -> [Port; 2] {
         let [thermometer] = Block::<A, 1, 1>::inputs(&self.bias);

@@ -278,6 +278,8 @@ impl Bias {
 impl<A: Arithmetic> Block<A, 1, 1> for Bias {
     type State = ();
     const NAME: &'static str = "bias";
+    const PURPOSE: &'static str =
+        "The bias that the polynomial, or what stands for it, has at a word of the thermometer.";
 
     fn inputs(&self) -> [Port; 1] {
         [self.ports[0].clone()]
@@ -390,6 +392,7 @@ impl Rate {
 impl<A: Arithmetic> Block<A, 2, 1> for Rate {
     type State = ();
     const NAME: &'static str = "rate";
+    const PURPOSE: &'static str = "The compensated rate: the raw rate less the bias.";
 
     fn inputs(&self) -> [Port; 2] {
         [self.ports[0].clone(), self.ports[1].clone()]

@@ -85,6 +85,8 @@ impl Vectoring {
 impl<A: Arithmetic> Block<A, 2, 2> for Vectoring {
     type State = ();
     const NAME: &'static str = "cordic";
+    const PURPOSE: &'static str =
+        "Phase and magnitude of a vector by its in-phase and quadrature words.";
 
     fn inputs(&self) -> [Port; 2] {
         [

@@ -107,6 +107,8 @@ pub struct Decimate<'a, const N: usize>(pub &'a Cic<N>);
 impl<A: Arithmetic, const N: usize> Block<A, 1, 0> for Integrate<'_, N> {
     type State = CicState<A::Residue, N>;
     const NAME: &'static str = "integrate";
+    const PURPOSE: &'static str =
+        "Takes a product into the decimator's integrators, once a sample.";
     const STATE: &'static str = "cic";
 
     fn inputs(&self) -> [Port; 1] {
@@ -140,6 +142,8 @@ impl<A: Arithmetic, const N: usize> Block<A, 1, 0> for Integrate<'_, N> {
 impl<A: Arithmetic, const N: usize> Block<A, 0, 1> for Decimate<'_, N> {
     type State = CicState<A::Residue, N>;
     const NAME: &'static str = "decimate";
+    const PURPOSE: &'static str =
+        "The decimated word by the decimator's combs, once a decimation period.";
     const STATE: &'static str = "cic";
 
     fn inputs(&self) -> [Port; 0] {

@@ -58,6 +58,7 @@ impl Mixer {
 impl<A: Arithmetic> Block<A, 2, 1> for Mixer {
     type State = ();
     const NAME: &'static str = "demodulate";
+    const PURPOSE: &'static str = "Product of an ADC code and a carrier.";
 
     fn inputs(&self) -> [Port; 2] {
         [

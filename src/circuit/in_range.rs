@@ -33,6 +33,7 @@ impl InRange {
 impl<A: Arithmetic> Block<A, 1, 1> for InRange {
     type State = ();
     const NAME: &'static str = "in_range";
+    const PURPOSE: &'static str = "Whether a word of the thermometer is in the calibrated range.";
 
     fn inputs(&self) -> [Port; 1] {
         [Port::new("thermometer", self.input_meaning.clone())]

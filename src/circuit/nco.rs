@@ -73,6 +73,8 @@ impl Oscillator {
 impl<A: Arithmetic> Block<A, 0, 2> for Oscillator {
     type State = OscillatorState<A::Residue>;
     const NAME: &'static str = "nco";
+    const PURPOSE: &'static str =
+        "One step of the oscillator: the phase moves on by the tuning word; sine and cosine of it.";
     const STATE: &'static str = "oscillator";
 
     fn inputs(&self) -> [Port; 0] {
@@ -113,6 +115,7 @@ pub struct Detuning<'a>(pub &'a Oscillator);
 impl<A: Arithmetic> Block<A, 0, 1> for Detuning<'_> {
     type State = OscillatorState<A::Residue>;
     const NAME: &'static str = "detuning";
+    const PURPOSE: &'static str = "How far the tuning word is from the design's.";
     const STATE: &'static str = "oscillator";
 
     fn inputs(&self) -> [Port; 0] {
@@ -147,6 +150,8 @@ pub struct Retune<'a>(pub &'a Oscillator);
 impl<A: Arithmetic> Block<A, 1, 0> for Retune<'_> {
     type State = OscillatorState<A::Residue>;
     const NAME: &'static str = "retune";
+    const PURPOSE: &'static str =
+        "Gives the oscillator a new tuning word: the design's plus a correction.";
     const STATE: &'static str = "oscillator";
 
     fn inputs(&self) -> [Port; 1] {

@@ -88,6 +88,8 @@ impl PhaseLoop {
 impl<A: Arithmetic> Block<A, 1, 1> for PhaseLoop {
     type State = PhaseLoopState<A::Word>;
     const NAME: &'static str = "phase_loop";
+    const PURPOSE: &'static str =
+        "The correction of the tuning word that holds the drive phase at its setpoint.";
     const STATE: &'static str = "phase_loop";
 
     fn inputs(&self) -> [Port; 1] {

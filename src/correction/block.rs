@@ -311,6 +311,7 @@ fn ports(plan: &Plan, formats: &Formats) -> Vec<Port> {
 impl<A: Arithmetic, const I: usize> Block<A, I, 1> for Step {
     type State = State<A>;
     const NAME: &'static str = STEP;
+    const PURPOSE: &'static str = "The corrected rate of one reading.";
     const STATE: &'static str = STATE;
 
     fn inputs(&self) -> [Port; I] {

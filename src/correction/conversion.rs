@@ -335,6 +335,7 @@ fn bits_of(magnitude: i128) -> u32 {
 impl<A: Arithmetic, const N: usize> Block<A, N, N> for Conversion {
     type State = State<A>;
     const NAME: &'static str = CONVERT;
+    const PURPOSE: &'static str = "Takes a row of the chain into a reading's means; with its last row, the words of the correction.";
     const STATE: &'static str = SUMS;
 
     fn inputs(&self) -> [Port; N] {

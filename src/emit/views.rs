@@ -88,6 +88,8 @@ pub struct InputView {
 pub struct FunctionView {
     /// Name without the prefix.
     pub name: String,
+    /// What it is for, in a sentence.
+    pub purpose: &'static str,
     /// Domain, range, meaning.
     pub notes: Vec<String>,
     /// What comes of a word outside an input's range; empty where the types hold no such word.
@@ -382,6 +384,7 @@ fn function(bundle: &Bundle, k: usize, language: Language) -> FunctionView {
     let inputs = function.inputs.iter().zip(&lowered.inputs);
     FunctionView {
         name: function.name.clone(),
+        purpose: function.purpose,
         notes,
         outside: outside(function, lowered),
         declaration: c::signature(bundle, k),

@@ -220,6 +220,8 @@ pub trait Block<A: Arithmetic, const I: usize, const O: usize> {
     type State: Clone;
     /// The name of the function in emitted code.
     const NAME: &'static str;
+    /// What the function is for, in a sentence, for emitted code.
+    const PURPOSE: &'static str;
     /// The name of the state's type in emitted code; empty = no state.
     const STATE: &'static str = "";
     /// Names and units of the inputs, for emitted code.

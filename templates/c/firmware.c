@@ -4,7 +4,7 @@
 #include "{{ v.p }}.h"
 #include "{{ v.p }}_tables.h"
 
-{% for f in v.functions %}{% if f.internal %}/* {{ f.name }}
+{% for f in v.functions %}{% if f.internal %}/* {{ f.name }}: {{ f.purpose }}
 {% for line in f.notes %} *   {{ line }}
 {% endfor %} */
 static {% endif %}{{ f.definition }}

@@ -24,7 +24,7 @@ typedef struct {
 {% for x in s.members %}    {{ x.0 }}; /* {{ x.1 }} */
 {% endfor %}} {{ v.p }}_{{ s.name }}_out_t;
 
-{% endfor %}{% for f in v.functions %}{% if !f.internal %}/* {{ f.name }}
+{% endfor %}{% for f in v.functions %}{% if !f.internal %}/* {{ f.name }}: {{ f.purpose }}
 {% for line in f.notes %} *   {{ line }}
 {% endfor %}{% if !f.outside.is_empty() %} *   {{ f.outside }}
 {% endif %} */

@@ -47,7 +47,7 @@ fn check_{{ c }}(a: {{ c }}, low: {{ c }}, high: {{ c }}, number: u32, fault: &m
     a.max(low).min(high)
 }
 
-{% endfor %}{% for f in v.functions %}/// The block `{{ f.name }}`.
+{% endfor %}{% for f in v.functions %}/// {{ f.purpose }}
 ///
 /// ```text
 {% for line in f.notes %}/// {{ line }}

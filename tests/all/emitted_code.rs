@@ -352,7 +352,7 @@ fn the_readme_says_what_there_is() {
         "bias, rate, compensate"
     );
     let wrong = "an input outside its range is not clamped";
-    let (_, integrate) = whole.split_once("- `integrate`\n").expect("the function");
+    let (_, integrate) = whole.split_once("\n- `integrate`: ").expect("the function");
     let (integrate, _) = integrate.split_once("\n\n").expect("its end");
     assert!(integrate.contains(wrong), "{integrate}");
     for readme in [whole, compensation] {

@@ -159,6 +159,7 @@ impl Form {
 impl<A: Arithmetic> Block<A, 1, 1> for Form {
     type State = ();
     const NAME: &'static str = "evaluate";
+    const PURPOSE: &'static str = "The function at a word of its input.";
 
     fn inputs(&self) -> [Port; 1] {
         let codes = self.codes();

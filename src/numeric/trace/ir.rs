@@ -176,6 +176,8 @@ pub enum SlotKind {
 pub struct Function {
     /// The block's name.
     pub name: String,
+    /// What it is for, in a sentence.
+    pub purpose: &'static str,
     /// The name of its state's type; empty = none.
     pub state: &'static str,
     /// The state's variables.

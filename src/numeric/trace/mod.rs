@@ -60,7 +60,7 @@ impl Trace {
         state: &B::State,
         ranges: [Interval; I],
     ) -> usize {
-        let outer = self.open(B::NAME, B::STATE, block.inputs(), ranges);
+        let outer = self.open([B::NAME, B::PURPOSE, B::STATE], block.inputs(), ranges);
         let mut state = state.clone();
         block.visit(&mut state, &mut Loader { trace: self });
         let inputs = std::array::from_fn(|k| self.push(Op::Input(k), ranges[k]));
@@ -83,14 +83,14 @@ impl Trace {
     /// Begins a function inside the innermost one, which it gives back: what `close` goes on with.
     fn open<const I: usize>(
         &self,
-        name: &str,
-        state: &'static str,
+        [name, purpose, state]: [&'static str; 3],
         ports: [Port; I],
         ranges: [Interval; I],
     ) -> Frame {
         let frame = Frame {
             function: Function {
                 name: name.to_owned(),
+                purpose,
                 state,
                 slots: Vec::new(),
                 members: Vec::new(),
