@@ -1,6 +1,7 @@
 //! Everything that the templates of a bundle see.
 
 use super::example::{ByHand, ExampleView, example};
+use super::recipe;
 use super::tested::{self, TestView, Tested};
 use super::vectors::{self, Checked};
 use crate::design::Design;
@@ -85,6 +86,8 @@ pub struct View {
     pub(super) long_restart: u64,
     pub(super) long_checksum: String,
     pub(super) example: Option<ExampleView>,
+    /// How a sensor's code becomes a word of the function that is called, a line each.
+    pub(super) recipes: Vec<String>,
 }
 
 impl View {
@@ -144,6 +147,12 @@ impl View {
                 outputs
             })
         });
+        // The chain takes codes as they come.
+        let called = bundle
+            .program
+            .functions
+            .last()
+            .filter(|_| !bundle.has_chain);
         View {
             p: bundle.prefix.clone(),
             language,
@@ -179,6 +188,7 @@ impl View {
             long_restart: stimulus::SEGMENT,
             long_checksum: String::new(),
             example,
+            recipes: called.map_or(Vec::new(), |f| recipe::sentences(&f.inputs)),
             functions,
             tables,
         }
@@ -212,6 +222,7 @@ impl View {
         self.structs.clear();
         self.functions.clear();
         self.example = None;
+        self.recipes.clear();
         self.checks.clear();
         self.tests.clear();
         self.chain = false;
