@@ -281,6 +281,52 @@ fn broken_records_are_refused_with_their_place() {
             &["1 cell, and", "the file ends in the middle of this row"],
         ),
         (
+            "a file that ends in the sign of its last cell",
+            {
+                let mut text = with_row(19, "19,0.5,-");
+                text.pop();
+                text
+            },
+            plain.clone(),
+            Some((21, 8)),
+            &[
+                "\"-\" in column die_degc",
+                "the file ends in the middle of this row",
+            ],
+        ),
+        (
+            "a file that ends in a quote of its last row",
+            {
+                let mut text = with_row(19, "19,0.5,\"2");
+                text.pop();
+                text
+            },
+            plain.clone(),
+            Some((21, 8)),
+            &[
+                "quote is not closed",
+                "the file ends in the middle of this row",
+            ],
+        ),
+        (
+            "a last cell that is no beginning of a number",
+            {
+                let mut text = with_row(19, "19,0.5,n/a");
+                text.pop();
+                text
+            },
+            plain.clone(),
+            Some((21, 8)),
+            &["\"n/a\" in column die_degc", "leave the cell empty"],
+        ),
+        (
+            "a sign alone in a row that ends",
+            with_row(19, "19,0.5,-"),
+            plain.clone(),
+            Some((21, 8)),
+            &["\"-\" in column die_degc", "leave the cell empty"],
+        ),
+        (
             "a comment among the rows",
             with_row(7, "# restarted"),
             plain.clone(),

@@ -155,6 +155,11 @@ pub(super) fn number(text: &str) -> Result<f64, BadNumber> {
     })
 }
 
+/// Whether a text that is no number is the beginning of one, as where a file was cut: `-`, `.`, `1.5e-`.
+pub(super) fn begins_a_number(text: &str) -> bool {
+    number(&format!("{text}0")).is_ok()
+}
+
 /// Digits with at least two colons, dashes or slashes between them, as dates and times of day have.
 fn is_of_calendar(text: &str) -> bool {
     let of_time = |c: char| c.is_ascii_digit() || ":-/.TZ+ ".contains(c);
@@ -205,6 +210,12 @@ mod tests {
             ("0x1F", BadNumber::Other),
         ] {
             assert_eq!(number(text), Err(why), "{text}");
+        }
+        for text in ["-", "+", ".", "-.", "1.5e", "1.5e-"] {
+            assert!(number(text).is_err() && begins_a_number(text), "{text}");
+        }
+        for text in ["NA", "n", "1,5", "25 degC", "--", "inf"] {
+            assert!(!begins_a_number(text), "{text}");
         }
     }
 }

@@ -35,6 +35,48 @@ fn what_is_tolerated_reads_the_same() {
 }
 
 #[test]
+fn a_last_cell_with_fewer_digits_and_no_line_end_is_told() {
+    let plain = RecordMapping::default();
+    let whole = with_row(19, "19,0.500,39.0");
+    let text = std::str::from_utf8(&whole).unwrap();
+    for (cut, is_told) in [
+        (0, false),
+        (1, false),
+        (2, true),
+        (3, true),
+        (4, true),
+        (5, true),
+    ] {
+        let text = &text[..text.len() - cut];
+        let (record, warnings) = try_parse(text.as_bytes(), &plain).unwrap();
+        assert_eq!(record.len(), 20, "{cut}");
+        let told = warnings.iter().find(|w| w.code == "last_row_may_be_cut");
+        assert_eq!(told.is_some(), is_told, "{cut}: {warnings:?}");
+        if let Some(told) = told {
+            assert_eq!(told.column.as_deref(), Some("die_degc"));
+            assert!(told.message.contains("line 21"), "{}", told.message);
+        }
+    }
+    // Not measured, and said to be so; a row that ends.
+    for last in ["19,0.500,nan", "19,0.500,39\n"] {
+        let mut text = with_row(19, last);
+        text.pop();
+        let (_, warnings) = try_parse(&text, &plain).unwrap();
+        assert!(
+            warnings.iter().all(|w| w.code != "last_row_may_be_cut"),
+            "{warnings:?}"
+        );
+    }
+    // Where rows differ in their digits, fewer say nothing.
+    let shortest = text.replace(",20.0\n", ",20\n");
+    let (_, warnings) = try_parse(shortest[..text.len() - 5].as_bytes(), &plain).unwrap();
+    assert!(
+        warnings.iter().all(|w| w.code != "last_row_may_be_cut"),
+        "{warnings:?}"
+    );
+}
+
+#[test]
 fn semicolons_and_decimal_commas_read_as_commas_and_points() {
     let plain = RecordMapping::default();
     let text = format!("# by hand, once\n{HEADER}\n{}\n", good_rows().join("\n"));

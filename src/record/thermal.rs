@@ -142,6 +142,7 @@ fn parse_text(
     let first = rows.first().map_or(header, |n| source.at(*n));
     let (values, mut warnings) = usable(values, first, &roles)?;
     warnings.splice(0..0, roles.warnings.iter().cloned());
+    warnings.extend(cut_cell(source, &rows, &roles));
     let mut record = ThermalRecord {
         source: path.to_path_buf(),
         time_s: Vec::new(),
@@ -336,6 +337,9 @@ fn any_cells(
     }
     let cells = match cells::split(line.text) {
         Ok(cells) => cells,
+        Err(column) if source.is_cut(line) => {
+            return Err(columns::open_quote(line, column).help(CUT_HELP).into());
+        }
         Err(column) => return Err(columns::open_quote(line, column).into()),
     };
     let again = cells.len() == roles.columns.len()
@@ -356,6 +360,10 @@ fn any_cells(
     if cells.len() != roles.columns.len() {
         return Err(wrong_width(&line, &cells, roles, source).into());
     }
+    let is_cut = |cell: &cells::Cell<'_>| {
+        let is_last = cells.last().is_some_and(|l| l.column == cell.column);
+        is_last && source.is_cut(line) && cells::begins_a_number(&cell.text)
+    };
     for ((cell, column), (name, names)) in cells.iter().zip(columns).zip(&roles.columns) {
         let value = cells::number(&cell.text).unwrap_or_else(|why| {
             if column.bad.is_none() {
@@ -365,10 +373,14 @@ fn any_cells(
                     _ => "is no number",
                 };
                 let shown: String = cell.text.chars().take(40).collect();
+                let help = match is_cut(cell) {
+                    true => CUT_HELP,
+                    false => why.help(),
+                };
                 column.bad = Some(line.error(
                     cell.column,
                     format!("\"{shown}\" in column {name} {what}"),
-                    why.help().to_owned(),
+                    help.to_owned(),
                 ));
             }
             f64::NAN
@@ -429,6 +441,45 @@ fn usable(read: Vec<ReadColumn>, first: Line<'_>, roles: &Roles) -> Result<(Valu
     Ok((kept, warnings))
 }
 
+/// Remedy for a last row that cannot be read and lacks the end of its line.
+const CUT_HELP: &str = "the file ends in the middle of this row: if copying or recording was cut short, do it again; else repair the \
+                        row or take it away";
+
+/// What is said of a last row without the end of its line whose last cell is a number with fewer digits behind the point than
+/// any other row has there. Many programs end no last line, so that the row is kept.
+fn cut_cell(source: Lines<'_>, rows: &[usize], roles: &Roles) -> Option<Warning> {
+    let (last, before) = rows.split_last()?;
+    let last = source.at(*last);
+    if !source.is_cut(last) {
+        return None;
+    }
+    let cell = |line: Line<'_>| {
+        let cell = line.text.rsplit(',').next().unwrap_or("");
+        cell.trim_matches([' ', '\t', '"']).to_owned()
+    };
+    let behind = |cell: &str| cell.split_once('.').map_or(0, |(_, digits)| digits.len());
+    let first = *before.first()?;
+    let others = source
+        .iter()
+        .filter(|l| (first..last.number).contains(&l.number));
+    let least = others.map(|l| behind(&cell(l))).min()?;
+    let shown = cell(last);
+    let (name, names) = roles.columns.last()?;
+    let is_measured = shown.is_empty() || shown.parse().is_ok_and(f64::is_finite);
+    (is_measured && behind(&shown) < least).then(|| {
+        Warning::on(
+            "last_row_may_be_cut",
+            names.last().unwrap_or(name),
+            format!(
+                "line {}, the last one, has no line end, and \"{shown}\" in column {name} has fewer digits behind the point than in any \
+                 other row: the row may be cut short, and is taken as it is. If copying or recording was cut short, do it again, or \
+                 take the row away; if the row is whole, end its line",
+                last.number
+            ),
+        )
+    })
+}
+
 /// A row whose number of cells is not the header's.
 fn wrong_width(
     line: &Line<'_>,
@@ -443,12 +494,7 @@ fn wrong_width(
             "remove what is too much; if it is a decimal comma, export with decimal points"
                 .to_owned(),
         ),
-        None if source.is_cut(*line) => (
-            line.text.chars().count() + 1,
-            "the file ends in the middle of this row: if copying or recording was cut short, do it again; else repair the row or take \
-             it away"
-                .to_owned(),
-        ),
+        None if source.is_cut(*line) => (line.text.chars().count() + 1, CUT_HELP.to_owned()),
         None => (
             line.text.chars().count() + 1,
             format!(
