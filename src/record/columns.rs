@@ -298,7 +298,11 @@ fn converted(
                         "the design says that column \"{name}\" is in {}, and its name says {}",
                         a.name, b.name
                     ),
-                    "rename the column, or correct the unit in [record.columns]".to_owned(),
+                    format!(
+                        "if the name is right, write unit = \"{}\" or leave the unit out; if the design is, rename the column in the file's \
+                         header, such as to \"x\", and write {role} = {{ column = \"x\", unit = \"{}\" }}",
+                        b.name, a.name
+                    ),
                 )
                 .into());
             }
@@ -524,14 +528,42 @@ mod tests {
     }
 
     #[test]
-    fn raw_codes_are_no_rate() {
-        let mapped = |name: &str| RecordMapping {
+    fn a_unit_against_the_columns_name_is_refused_with_both_remedies() {
+        let mut mapping = mapped_to("gyro_z_rad_s");
+        mapping.units.insert("rate_out_dps".into(), "deg/s".into());
+        let header = "time_s,gyro_z_rad_s";
+        let error = resolve(at(header), &mapping).unwrap_err().to_string();
+        for part in [
+            "column \"gyro_z_rad_s\" is in deg/s, and its name says rad/s",
+            "write unit = \"rad/s\" or leave the unit out",
+            "rename the column in the file's header",
+            "rate_out_dps = { column = \"x\", unit = \"deg/s\" }",
+        ] {
+            assert!(error.contains(part), "{part}: {error}");
+        }
+        // What the message says helps.
+        mapping.units.clear();
+        assert!(resolve(at(header), &mapping).is_ok());
+        let mut mapping = mapped_to("x");
+        mapping.units.insert("rate_out_dps".into(), "deg/s".into());
+        assert!(resolve(at("time_s,x"), &mapping).is_ok());
+    }
+
+    /// A mapping of the rate to a column.
+    fn mapped_to(name: &str) -> RecordMapping {
+        RecordMapping {
             columns: [("rate_out_dps".to_owned(), name.into())].into(),
             ..RecordMapping::default()
-        };
+        }
+    }
+
+    #[test]
+    fn raw_codes_are_no_rate() {
         for name in ["gyro_z_lsb", "GyroZ raw", "rate_counts", "z.code"] {
             let header = format!("time_s,die_degc,{name}");
-            let error = resolve(at(&header), &mapped(name)).unwrap_err().to_string();
+            let error = resolve(at(&header), &mapped_to(name))
+                .unwrap_err()
+                .to_string();
             assert!(error.contains("holds raw codes"), "{name}: {error}");
             // Nor is it proposed for one.
             let error = resolve(at(&header), &RecordMapping::default()).unwrap_err();
@@ -540,7 +572,7 @@ mod tests {
         }
         for name in ["raw", "gyro_z", "rawrate", "lsbgyro_z"] {
             let header = format!("time_s,die_degc,{name}");
-            assert!(resolve(at(&header), &mapped(name)).is_ok(), "{name}");
+            assert!(resolve(at(&header), &mapped_to(name)).is_ok(), "{name}");
         }
     }
 
