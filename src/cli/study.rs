@@ -59,6 +59,8 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         None => design.requirements.clone(),
     };
     let was_there = arguments.out.exists();
+    // What cannot be written is said as of any command.
+    drop(Results::claim(&arguments.out, &PLANNED, &recorded.inputs)?);
     // The journal of a study that was stopped stands in the folder itself.
     std::fs::create_dir_all(&arguments.out)
         .map_err(|e| io_error(&arguments.out, "make the folder", &e))?;

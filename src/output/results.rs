@@ -13,6 +13,9 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+/// Remedy for a folder that cannot be used.
+const ANOTHER: &str = "name another folder with --out";
+
 /// Results on the way to their folder.
 #[derive(Debug)]
 pub struct Results {
@@ -40,12 +43,14 @@ impl Results {
     pub fn claim(out: &Path, planned: &[&str], inputs: &[PathBuf]) -> Result<Self> {
         let failed = |e: &io::Error| io_error(out, "make the folder", e);
         let (existing, missing) = existing(out).map_err(|e| failed(&e))?;
+        let is_there = missing == Path::new("");
+        let shown = existing.display();
         if !existing.is_dir() {
-            let error = InputError::new("this is a file, and a folder is wanted for the results");
-            return Err(error
-                .in_file(existing)
-                .help("name another folder with --out")
-                .into());
+            let message = match is_there {
+                true => "this is a file, and a folder is wanted for the results".to_owned(),
+                false => format!("cannot make the folder: `{shown}` is a file"),
+            };
+            return Err(InputError::new(message).in_file(out).help(ANOTHER).into());
         }
         for name in planned {
             let path = out.join(name);
@@ -60,16 +65,20 @@ impl Results {
             let (why, help) = match e.kind() {
                 // The folder is there: the system keeps its own files in it, as in /proc.
                 io::ErrorKind::NotFound => (
-                    "the system takes no new files there".to_owned(),
-                    "name another folder with --out",
+                    format!("the system takes no new files in `{shown}`"),
+                    ANOTHER.to_owned(),
                 ),
                 _ => (
                     cause(&e),
-                    "check its permissions and the disk, or name another folder with --out",
+                    format!("check the permissions of `{shown}` and the disk, or {ANOTHER}"),
                 ),
             };
-            let error = InputError::new(format!("cannot write into this folder: {why}"));
-            error.in_file(&existing).help(help)
+            let what = match is_there {
+                true => "write into this folder",
+                false => "make the folder",
+            };
+            let error = InputError::new(format!("cannot {what}: {why}"));
+            error.in_file(out).help(help)
         })?;
         let collected = staged.path().join(&missing);
         fs::create_dir_all(&collected).map_err(|e| failed(&e))?;

@@ -57,21 +57,31 @@ fn a_file_on_the_way_is_named_as_what_it_is() {
     let top = tempfile::tempdir().unwrap();
     let file = top.path().join("file");
     fs::write(&file, "mine").unwrap();
-    for out in [file.clone(), file.join("sub"), file.join("sub/deep")] {
+    for (name, said) in [
+        ("file", "this is a file, and a folder is wanted"),
+        ("file/sub", "cannot make the folder: `"),
+        ("file/sub/deep", "cannot make the folder: `"),
+    ] {
+        let out = top.path().join(name);
         let error = Results::claim(&out, &[], &[]).unwrap_err().to_string();
-        assert!(
-            error.contains("file: error: this is a file, and a folder is wanted"),
-            "{error}"
-        );
+        assert!(error.contains(&format!("{name}: error: {said}")), "{error}");
+        assert!(error.contains("is a file"), "{error}");
     }
 }
 
 #[cfg(target_os = "linux")]
 #[test]
 fn a_folder_of_the_system_is_not_said_to_be_missing() {
-    let error = Results::claim(Path::new("/proc/results"), &[], &[]).unwrap_err();
-    let error = error.to_string();
-    assert!(error.contains("takes no new files"), "{error}");
+    for (out, what) in [
+        ("/proc/results", "make the folder"),
+        ("/proc/a/b", "make the folder"),
+        ("/proc", "write into this folder"),
+    ] {
+        let error = Results::claim(Path::new(out), &[], &[]).unwrap_err();
+        let error = error.to_string();
+        let said = format!("{out}: error: cannot {what}: the system takes no new files in `/proc`");
+        assert!(error.contains(&said), "{error}");
+    }
 }
 
 #[cfg(unix)]
