@@ -33,7 +33,7 @@ pub struct Arguments {
     domain: String,
     /// Degree of the polynomial or of the segments; of a table 0 plain, 1 linear, 2
     /// quadratic. This or --bound is needed.
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N")]
     degree: Option<usize>,
     /// Which powers of x the polynomial has; all if left out, and with --bound whatever is cheapest.
     #[arg(long, value_enum)]
@@ -58,7 +58,7 @@ pub struct Arguments {
     #[arg(long, value_enum, default_value = "polynomial")]
     form: Asked,
     /// The most that the proved error may be, in the function's unit.
-    #[arg(long, value_name = "X", value_parser = super::values::number, allow_negative_numbers = true)]
+    #[arg(long, value_name = "X", value_parser = super::values::number)]
     bound: Option<f64>,
     /// Which error the coefficients keep small.
     #[arg(long, value_enum, default_value = "absolute")]

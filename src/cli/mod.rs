@@ -109,12 +109,23 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// The parser; words that are chosen from a list are taken in capitals too.
+/// The parser; words that are chosen from a list are taken in capitals too, and numbers with a minus behind an option.
 fn parser() -> clap::Command {
+    let is_path = |arg: &clap::Arg| {
+        let of = arg.get_value_parser().type_id();
+        of == std::any::TypeId::of::<std::path::PathBuf>()
+    };
     Cli::command().mut_subcommands(|command| {
-        command.mut_args(|arg| match arg.get_possible_values().is_empty() {
-            true => arg,
-            false => arg.ignore_case(true),
+        command.mut_args(|arg| {
+            let is_of_words = !arg.get_possible_values().is_empty();
+            let is_value =
+                arg.get_action().takes_values() && !arg.is_positional() && !is_path(&arg);
+            match (is_of_words, is_value) {
+                (true, _) => arg.ignore_case(true),
+                // What is wrong with the number is its own parser's to say.
+                (false, true) => arg.allow_negative_numbers(true),
+                _ => arg,
+            }
         })
     })
 }
@@ -128,9 +139,16 @@ fn with_advice(mut error: clap::Error) -> clap::Error {
     };
     match error.kind() {
         ErrorKind::UnknownArgument => unknown::with_advice(error),
-        ErrorKind::InvalidSubcommand if error.get(ContextKind::SuggestedSubcommand).is_none() => {
-            // `help WORD` asks for no similar word by itself.
+        ErrorKind::InvalidSubcommand => {
             let word = text(&error, ContextKind::InvalidSubcommand);
+            if let Some(tip) = unknown::of_command(&word) {
+                error.remove(ContextKind::SuggestedSubcommand);
+                return with_tip(error, tip);
+            }
+            if error.get(ContextKind::SuggestedSubcommand).is_some() {
+                return error;
+            }
+            // `help WORD` asks for no similar word by itself.
             let parser = Cli::command();
             let names: Vec<&str> = parser.get_subcommands().map(|c| c.get_name()).collect();
             if let Some(name) = crate::nearest::nearest(&word, &names) {
@@ -138,6 +156,13 @@ fn with_advice(mut error: clap::Error) -> clap::Error {
                 error.insert(ContextKind::SuggestedSubcommand, similar);
             }
             error
+        }
+        ErrorKind::InvalidValue => {
+            let option = text(&error, ContextKind::InvalidArg);
+            match unknown::of_value(&option, &text(&error, ContextKind::InvalidValue)) {
+                Some(tip) => with_tip(error, tip),
+                None => error,
+            }
         }
         ErrorKind::ValueValidation => {
             match values::plain_integer(&text(&error, ContextKind::InvalidValue)) {

@@ -25,8 +25,7 @@ pub struct Arguments {
         long,
         value_name = "S",
         conflicts_with = "profile",
-        value_parser = super::values::number,
-        allow_negative_numbers = true
+        value_parser = super::values::number
     )]
     duration: Option<f64>,
     /// A chamber of your own over time, in place of the design's thermal run (CSV: time_s, chamber_degc, and where wanted

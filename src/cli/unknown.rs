@@ -10,14 +10,54 @@ pub(super) fn with_advice(mut error: clap::Error) -> clap::Error {
         _ => return error,
     };
     let parser = super::Cli::command();
-    let mut words = std::env::args_os().skip(1);
-    let name = words.find(|word| word.as_encoded_bytes().first() != Some(&b'-'));
+    let name = given_command();
     let command = name.and_then(|name| parser.find_subcommand(name));
     error.remove(ContextKind::Suggested);
     match command.map_or(String::new(), |command| advice(command, &argument)) {
         // A similar option, if there is one, is named beside this.
         none if none.is_empty() => error,
         tip => super::with_tip(error, &tip),
+    }
+}
+
+/// The command on this process's command line: the first word that is no option.
+fn given_command() -> Option<std::ffi::OsString> {
+    let mut words = std::env::args_os().skip(1);
+    words.find(|word| word.as_encoded_bytes().first() != Some(&b'-'))
+}
+
+/// Which command does what is called otherwise elsewhere; `None` for any other word.
+pub(super) fn of_command(word: &str) -> Option<&'static str> {
+    match word.to_lowercase().as_str() {
+        "fit" | "calibrate" | "calibration" | "compensate" => Some(
+            "`run --record FILE` fits the bias to a record and writes firmware; `close --record FILE` looks for what that fit leaves",
+        ),
+        "build" | "generate" | "codegen" => {
+            Some("`emit --lang c` (or `rust`) writes the firmware of a design")
+        }
+        _ => None,
+    }
+}
+
+/// What to write in the place of a value that an option does not have; `None` where its possible values say enough.
+pub(super) fn of_value(option: &str, value: &str) -> Option<&'static str> {
+    let is_lang = option.split(' ').next() == Some("--lang");
+    let lower = value.to_lowercase();
+    let is_both = ["both", "all"].contains(&lower.as_str())
+        || (lower.contains("rust")
+            && lower
+                .split(|c: char| !c.is_alphanumeric())
+                .any(|w| w == "c"));
+    (is_lang && is_both).then(|| both(&given_command().unwrap_or_default()))
+}
+
+/// How both languages are had.
+fn both(command: &std::ffi::OsStr) -> &'static str {
+    match command == "emit" {
+        true => {
+            "one language at a time: once with `--lang c` and once with `--lang rust`, each with a folder of its own (`--out`)"
+        }
+        false => "leave `--lang` out for both C and Rust",
     }
 }
 
@@ -31,7 +71,14 @@ fn advice(command: &clap::Command, argument: &str) -> String {
         (_, "--lang") => {
             "`close` and `approx` always write both C and Rust, without an option; `run`, `equiv` and `emit` take `--lang`"
         }
+        ("run" | "close", "--bound") => {
+            "the bound on the compensation's error stands in the design: bound_dps in [compensation]"
+        }
+        ("simulate", "--samples") => "give how long the run is as --duration S, in seconds",
         (_, "-o") => return of_out(command),
+        (_, number) if number.starts_with('-') && number.parse::<f64>().is_ok() => {
+            "a number is the value of an option, and stands behind its name"
+        }
         (_, option) if option.starts_with('-') => "",
         ("approx", function) => {
             return format!(
@@ -100,11 +147,31 @@ mod tests {
         assert_eq!(said("verify", "b"), "one folder at a time");
         assert_eq!(said("emit", "-o"), "did you mean --out DIR?");
         assert_eq!(said("emit", "--foo"), "");
+        assert!(said("run", "--bound").contains("bound_dps in [compensation]"));
+        assert!(said("simulate", "--samples").contains("--duration S"));
+        assert!(said("equiv", "-5").contains("the value of an option"));
         let emit = said("emit", "b.toml");
         assert!(
             !emit.contains("--record") && emit.contains("the design is"),
             "{emit}"
         );
         assert!(said("run", "b.toml").contains("a record is given with --record FILE"));
+    }
+
+    #[test]
+    fn a_command_of_another_name_and_both_languages_have_their_tip() {
+        assert!(
+            of_command("Fit")
+                .is_some_and(|t| t.contains("run --record") && t.contains("close --record"))
+        );
+        assert!(of_command("generate").is_some_and(|t| t.contains("emit")));
+        assert_eq!(of_command("clsoe"), None);
+        for value in ["both", "ALL", "c,rust", "rust+c"] {
+            assert!(of_value("--lang <LANG>", value).is_some(), "{value}");
+        }
+        assert_eq!(of_value("--lang <LANG>", "python"), None);
+        assert_eq!(of_value("--part <PART>", "both"), None);
+        assert!(both("emit".as_ref()).contains("one language at a time"));
+        assert!(both("run".as_ref()).contains("leave `--lang` out"));
     }
 }

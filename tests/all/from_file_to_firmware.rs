@@ -308,6 +308,27 @@ fn arguments_that_are_nearly_right_are_shown_right() {
             vec!["close", "--record", "r.csv", "--capture", "c.csv"],
             "one command for each",
         ),
+        (
+            vec!["check", "--samples", "-5"],
+            "give a whole number from 1000 to 100000000",
+        ),
+        (
+            vec!["close", "--self-test", "--records", "-1.5"],
+            "invalid value '-1.5' for '--records <N>'",
+        ),
+        (
+            vec!["fit", "--record", "r.csv"],
+            "`run --record FILE` fits the bias",
+        ),
+        (vec!["help", "fit"], "`run --record FILE` fits the bias"),
+        (
+            vec!["run", "--record", "r.csv", "--lang", "both"],
+            "leave `--lang` out for both",
+        ),
+        (
+            vec!["emit", "--lang", "c,rust"],
+            "once with `--lang c` and once with `--lang rust`",
+        ),
         (vec!["check", "-q", "-v"], "leave one of the two out"),
         (vec!["emit"], "add it; `--help`"),
         (
