@@ -97,7 +97,16 @@ pub(super) fn table(
     let scale = match keys.scale() {
         Some(scale) => Some(in_unit(path, scale, &named, used)?),
         None if says_volts || !rows.iter().all(whole) => {
-            return Err(no_scale(path, &named, used, &rows).into());
+            // In whole volts the first row is as good as any.
+            let row = rows.iter().position(|r| !whole(r)).unwrap_or(0);
+            let is_none = |k: &usize| rows[row].get(*k).is_some_and(|v| v.fract() != 0.0);
+            let cell = used.into_iter().find(is_none).unwrap_or(used[0]);
+            let line = lines.get(before + row).map_or("", |l| l.trim_end());
+            let left = line.split(char::from(separator)).take(cell);
+            let column = left.map(|c| c.chars().count() + 1).sum::<usize>() + 1;
+            let mut error = no_scale(path, &named, used, &rows).at(number + before + row, column);
+            error.source_line = Some(line.to_owned());
+            return Err(error.into());
         }
         None => None,
     };

@@ -25,7 +25,8 @@ pub(super) fn in_unit(path: &Path, scale: Scale, named: &Named, used: [usize; 2]
     })
 }
 
-/// An error that asks for the scale; with the step that the values stand on, where they do.
+/// An error that asks for the scale, without the place of what is no code; with the step that the values stand on, where they
+/// do.
 pub(super) fn no_scale(
     path: &Path,
     named: &Named,

@@ -205,6 +205,38 @@ fn what_is_not_said_is_asked_for_with_the_keys() {
 }
 
 #[test]
+fn what_is_no_code_is_shown_at_its_place() {
+    for (text, line, column) in [
+        ("drive,sense\n1,2\n3,4\n5,6.5\n7,8\n", 4, 3),
+        (
+            "# by hand\n\ndrive;t;sense\n0,5;0,1;2\n3;0,2;4\n5;0,3;6\n",
+            4,
+            1,
+        ),
+        ("drive (V),sense (V)\n1,2\n3,4\n5,6\n", 2, 1),
+    ] {
+        let error = csv(text).rows(Q15, 9).1.unwrap();
+        assert_eq!(
+            (error.line, error.column),
+            (Some(line), Some(column)),
+            "{error}"
+        );
+        let told = error.to_string();
+        assert!(
+            told.contains("the columns are no codes") && told.contains("volts_per_code = 0.0001"),
+            "{told}"
+        );
+    }
+    // Below the contract's names, which have no scale.
+    let error = csv("drive_code,sense_code\n0.5,1\n")
+        .rows(Q15, 9)
+        .1
+        .unwrap();
+    let told = error.to_string();
+    assert!(told.contains("call them `drive` and `sense`"), "{told}");
+}
+
+#[test]
 fn values_between_the_codes_are_told() {
     let rows: String = (0..60)
         .map(|k| format!("{},{}\n", f64::from(k) * 0.37e-3, f64::from(k) * 0.73e-3))

@@ -374,6 +374,10 @@ fn bench_row(line: Line<'_>, layout: Layout, codes: Codes, bench: Bench) -> Resu
 const ROW_HELP: &str = "repair the row. The rows are samples at one rate, so that none in the middle can be left out: else use the \
                         part before it, or the part behind it, as a capture of its own";
 
+/// Remedy for a number that is no code, below a name that says that there are codes.
+const VOLTS_HELP: &str = "a code is written in digits alone, with a `-` where it is negative. If the columns hold volts, call them `drive` and `sense` and write \
+                          `volts_per_code` into the side-car or a comment line";
+
 /// A cell that holds no `wanted`: message and remedy.
 fn no_reading(cell: &str, name: &str, wanted: &str) -> (String, String) {
     if bench_csv::is_mark(cell) {
@@ -388,7 +392,11 @@ fn no_reading(cell: &str, name: &str, wanted: &str) -> (String, String) {
         true => format!("the cell of {name} is empty"),
         false => format!("{name} `{cell}` is no {wanted}"),
     };
-    (message, ROW_HELP.to_owned())
+    let help = match cell.parse().is_ok_and(f64::is_finite) {
+        true => VOLTS_HELP,
+        false => ROW_HELP,
+    };
+    (message, help.to_owned())
 }
 
 /// Remedy for a last row that cannot be read and lacks the end of its line.
