@@ -69,6 +69,30 @@ pub fn similar(path: &Path) -> Option<PathBuf> {
     Some(path.with_file_name(other))
 }
 
+/// The files that are there under a path, or under one that differs from it in the case of its extension alone: `CAP.TOML`
+/// for `CAP.toml`.
+pub fn in_any_case(path: &Path) -> Vec<PathBuf> {
+    let folder = match path.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    };
+    let Ok(entries) = std::fs::read_dir(folder) else {
+        // A folder that may be entered and not be listed.
+        let there = path.exists().then(|| path.to_path_buf());
+        return there.into_iter().collect();
+    };
+    let is_one = |other: &Path| match (other.extension(), path.extension()) {
+        (Some(a), Some(b)) => other.file_stem() == path.file_stem() && a.eq_ignore_ascii_case(b),
+        _ => other.file_name() == path.file_name(),
+    };
+    let names = entries.flatten().map(|e| PathBuf::from(e.file_name()));
+    let found = names.filter(|name| is_one(name));
+    let mut found: Vec<PathBuf> = found.map(|name| path.with_file_name(name)).collect();
+    // The order of a folder's entries is nobody's.
+    found.sort();
+    found
+}
+
 /// All bytes of a text, or as many as it takes to see that it is none (a byte 0, or what is not UTF-8).
 ///
 /// # Errors

@@ -116,6 +116,10 @@ fn an_input_is_never_written_over_by_any_name() {
             "{name}"
         );
     }
+    let capitals = top.path().join("CAP.TOML");
+    fs::write(&capitals, "mine").unwrap();
+    let capture = [top.path().join("CAP.BIN")];
+    assert!(Results::claim(top.path(), &["CAP.TOML"], &capture).is_err());
     assert!(Results::claim(top.path(), &["input.toml"], &[]).is_ok());
     assert_eq!(fs::read(&input).unwrap(), b"mine");
 }

@@ -1,6 +1,7 @@
 //! Whether two paths name one file: an input is never written over, by whatever name.
 
 use crate::error::{InputError, Result};
+use crate::input::in_any_case;
 use std::path::{Path, PathBuf};
 
 /// Refuses an output that is one of the inputs, or the side-car of one, under any name: by another path, a link, or a
@@ -14,10 +15,10 @@ pub fn refuse(output: &Path, inputs: &[PathBuf]) -> Result<()> {
     };
     let is_own = |path: &Path| identity(path).as_ref() == Some(&own);
     for input in inputs {
-        // Of a capture: `c.toml` beside `c.npy`, `c.csv`, `c.csv.gz`, `c.raw`.
+        // Of a capture: `c.toml` beside `c.npy`, `c.csv`, `c.csv.gz`, `c.raw`, `c.TOML` too.
         let sidecars = [input.clone(), input.with_extension("")].map(|p| p.with_extension("toml"));
         if let Some(read) = std::iter::once(input.clone())
-            .chain(sidecars)
+            .chain(sidecars.iter().flat_map(|p| in_any_case(p)))
             .find(|p| is_own(p))
         {
             let what = format!("{} would be written over this input", output.display());

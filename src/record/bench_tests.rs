@@ -205,6 +205,34 @@ fn what_is_not_said_is_asked_for_with_the_keys() {
 }
 
 #[test]
+fn a_side_car_is_found_whatever_the_case_of_its_extension() {
+    let samples: Vec<u8> = ROWS
+        .iter()
+        .flat_map(|(d, s)| [*d as i16, *s as i16])
+        .flat_map(i16::to_le_bytes)
+        .collect();
+    let keys = "item = \"int16\"\n";
+    let capture = || Capture::new("CAP.BIN", &samples);
+    for name in ["CAP.toml", "CAP.TOML", "CAP.Toml"] {
+        let (rows, error) = capture().beside(name, keys).rows(Q15, 9);
+        assert_eq!((rows, error), (ROWS.to_vec(), None), "{name}");
+    }
+    // Elsewhere the two may be one file.
+    if !cfg!(target_os = "linux") {
+        return;
+    }
+    let two = capture().beside("CAP.TOML", keys).beside("CAP.toml", keys);
+    let told = two.rows(Q15, 9).1.unwrap().to_string();
+    for part in [
+        "CAP.BIN: error",
+        "two side-cars: CAP.TOML and CAP.toml",
+        "keep the one",
+    ] {
+        assert!(told.contains(part), "{part}: {told}");
+    }
+}
+
+#[test]
 fn what_is_no_code_is_shown_at_its_place() {
     for (text, line, column) in [
         ("drive,sense\n1,2\n3,4\n5,6.5\n7,8\n", 4, 3),

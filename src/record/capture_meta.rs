@@ -3,7 +3,9 @@
 
 use super::bench_keys::{BenchKeys, KeyValue};
 use super::capture_places::Places;
+use crate::base_name::name_of;
 use crate::error::{InputError, Result, io_error};
+use crate::input::in_any_case;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use toml::de::{DeTable, DeValue};
@@ -140,17 +142,27 @@ impl CaptureMeta {
 
     /// Reads the side-car of a capture: the TOML file of the same stem, keys at top level; with those that say
     /// what a bench wrote. No such file = nothing is known; other keys are ignored. A file that is no TOML, or a key
-    /// with the wrong type, is refused with its line.
+    /// with the wrong type, is refused with its line, and so are two files whose extensions differ in case alone.
     pub(super) fn of_sidecar(
         capture: &Path,
         places: &mut Places,
     ) -> Result<(CaptureMeta, BenchKeys)> {
-        let path = sidecar_of(capture);
         let mut meta = CaptureMeta::default();
         let mut keys = BenchKeys::default();
-        if path == capture {
-            return Ok((meta, keys));
+        let mut found = in_any_case(&sidecar_of(capture));
+        found.retain(|path| path != capture);
+        if let [one, other, ..] = found.as_slice() {
+            let [one, other] = [one, other].map(|p| name_of(p));
+            return Err(InputError::new(format!(
+                "this capture has two side-cars: {one} and {other}"
+            ))
+            .in_file(capture)
+            .help("keep the one whose keys are right, and rename or remove the other")
+            .into());
         }
+        let Some(path) = found.pop() else {
+            return Ok((meta, keys));
+        };
         let Some(text) = read_sidecar(&path)? else {
             return Ok((meta, keys));
         };
