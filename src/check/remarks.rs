@@ -2,8 +2,9 @@
 
 use super::budget::Budget;
 use super::outcome::{NodeCheck, Overflows};
+use crate::circuit::scale::full_scale_is_off;
 use crate::cosim::rest::rows_per_s;
-use crate::design::Design;
+use crate::design::{Compensation, Design};
 use crate::equivalence::overflow;
 use crate::numeric::format::Rounding;
 use crate::spectrum::nco_spurs;
@@ -13,7 +14,8 @@ use serde::Serialize;
 /// A remark.
 #[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Remark {
-    /// `idle_bits`, `biased_rounding`, `dead_band`, `spurs_in_band`, `output_hides_fit`, `wrap_possible`, `correction_not_checked`.
+    /// `idle_bits`, `biased_rounding`, `dead_band`, `spurs_in_band`, `output_hides_fit`, `wrap_possible`, `scale_factor`,
+    /// `correction_not_checked`.
     pub code: &'static str,
     /// The dotted key, with the channel or the part.
     pub node: String,
@@ -37,6 +39,17 @@ pub fn remarks(design: &Design, nodes: &[NodeCheck], budget: &Budget) -> Vec<Rem
         wraps(design, node, &mut all);
     }
     output(design, &mut all);
+    let is_of_chain = |c: &Compensation| c.input.is_of_chain();
+    if design.compensation.as_ref().is_some_and(is_of_chain)
+        && let Some((message, mend)) = full_scale_is_off(design)
+    {
+        all.push(Remark {
+            code: "scale_factor",
+            node: "compensation.rate_full_scale_dps".to_owned(),
+            message,
+            mend,
+        });
+    }
     if design.correction.is_some() {
         all.push(Remark {
             code: "correction_not_checked",

@@ -119,6 +119,24 @@ fn idle_bits_and_a_coarse_output_are_named() {
 }
 
 #[test]
+fn a_full_scale_that_is_off_by_two_is_named_as_run_names_it() {
+    let c = checked(&[(
+        "rate_full_scale_dps = 2048.0",
+        "rate_full_scale_dps = 1024.0",
+    )]);
+    let found = c.remarks.iter().find(|r| r.code == "scale_factor");
+    let remark = found.expect("a remark");
+    assert!(
+        remark.message.contains("come out 0.5000 times as large"),
+        "{}",
+        remark.message
+    );
+    assert_eq!(remark.mend, "set compensation.rate_full_scale_dps = 2048.0");
+    let c = checked(&[]);
+    assert!(codes(&c).iter().all(|(code, _)| *code != "scale_factor"));
+}
+
+#[test]
 fn a_detuned_coarse_table_has_spurs_in_band() {
     let c = checked(&[
         ("tuning_word = 134217728", "tuning_word = 134230000"),

@@ -24,6 +24,29 @@ pub fn full_scale_dps(design: &Design) -> f64 {
     own.unwrap_or_else(|| power_of_two_near(nominal_full_scale_dps(design)))
 }
 
+/// What is wrong where the compensation's full scale is not that of gyro and decimator, as where a format was taken for one of
+/// half its range; and what mends it. `None`: they agree, or there is no compensation.
+pub fn full_scale_is_off(design: &Design) -> Option<(String, String)> {
+    let own = design.compensation.as_ref()?.rate_full_scale_dps;
+    let nominal = nominal_full_scale_dps(design);
+    if (own / nominal - 1.0).abs() <= 0.01 {
+        return None;
+    }
+    let what = format!(
+        "compensation.rate_full_scale_dps is {own}, and sense I of the design's own gyro has a full scale of {nominal:.3} deg/s: its \
+         rates and drift come out {:.4} times as large",
+        own / nominal
+    );
+    let near = power_of_two_near(nominal);
+    let mend = match own == near {
+        true => {
+            format!("set thermal_run.sense_full_scale_dps so that it is {near}, a power of two")
+        }
+        false => format!("set compensation.rate_full_scale_dps = {near:?}"),
+    };
+    Some((what, mend))
+}
+
 /// What an amplitude at an ADC (LSB) is, for a magnitude of 1: a product with the carrier
 /// halves it, and the decimator's gain is (R M)^N / 2^G.
 pub fn amplitude_lsb_per_magnitude(design: &Design) -> f64 {

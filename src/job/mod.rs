@@ -73,7 +73,8 @@ pub fn run(
         warnings.push(warning(
             "bias_saturates",
             format!(
-                "the bias leaves its formats inside the calibrated range: at input {} it is {:.4} deg/s from the fit",
+                "the bias leaves its formats inside the calibrated range: at input {} it is {:.4} deg/s from the fit. Give \
+                 compensation.accumulator or compensation.output more integer bits: `gyrogen check` names the word that overflows",
                 certainty.at_input_raw, certainty.exhaustive_max_dps
             ),
         ));

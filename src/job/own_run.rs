@@ -4,7 +4,8 @@ use super::formats;
 use super::points::{Point, Points};
 use super::{clamped_bias, compensation, warning};
 use crate::circuit::engine::{self, ArithmeticKind, Rows};
-use crate::cosim::scale::{full_scale_dps, nominal_full_scale_dps};
+use crate::circuit::scale::full_scale_is_off;
+use crate::cosim::scale::full_scale_dps;
 use crate::cosim::surroundings::Moment;
 use crate::cosim::{readings, stream};
 use crate::design::{CompensationInput, Design};
@@ -104,18 +105,10 @@ impl OwnRun {
                 ),
             ));
         }
-        let nominal = nominal_full_scale_dps(design);
-        if let Some(c) = &design.compensation
-            && (c.rate_full_scale_dps / nominal - 1.0).abs() > 0.01
-        {
+        if let Some((what, mend)) = full_scale_is_off(design) {
             warnings.push(warning(
                 "scale_factor",
-                format!(
-                    "compensation.rate_full_scale_dps is {}, sense I of this run has a full scale of \
-                     {nominal:.3} deg/s (a power of two is wanted): rates and drift come out {:.4} times as large",
-                    c.rate_full_scale_dps,
-                    c.rate_full_scale_dps / nominal
-                ),
+                format!("{what}. To mend it, {mend}"),
             ));
         }
         warnings
