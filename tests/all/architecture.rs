@@ -7,7 +7,7 @@ use imports::imports;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// The search of thermal causes: its method is being replaced, and its circle goes with it.
+/// The search of thermal causes, whose steps call each other: a circle that is known, and to be cut.
 const EXCEPTION: &str = "thermal/search/";
 
 /// The files below a folder of the package, with their texts.
