@@ -33,7 +33,7 @@ fn emitted_c_and_rust_are_the_model_bit_for_bit_on_random_plans() {
             assert!(c.name != "correct" || c.inputs >= 3000);
         }
     }
-    assert!(bent > 2, "{bent} plans with an s2");
+    assert!(bent >= 2, "{bent} plans with an s2");
 }
 
 #[test]
