@@ -7,6 +7,7 @@
 //! with the model over every input code; [`Rate`] subtracts it.
 
 use crate::approx::form::Form;
+use crate::design::record_columns::unit_behind;
 use crate::design::{Circuit, Compensation, CompensationInput, Outside};
 use crate::numeric::arithmetic::{Arithmetic, Block, Port};
 use crate::numeric::cast::{Cast, Label, Target};
@@ -113,7 +114,11 @@ impl Bias {
                             "{} = raw * 2^-{fraction_bits}, {}",
                             channel.column, channel.format
                         ))
-                        .in_unit(&channel.column, -fraction_bits, ""),
+                        .in_unit(
+                            &channel.column,
+                            -fraction_bits,
+                            unit_behind(&channel.column),
+                        ),
                     )
                 }
             };

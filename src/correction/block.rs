@@ -8,6 +8,7 @@ use super::plan::{MOST_INPUTS, MOST_OF_A_KIND, Plan, Term};
 use super::rate_terms::{OnRate, passes};
 use super::states::Followed;
 use super::terms::{OnBias, Slots, exact, raw};
+use crate::design::record_columns::unit_behind;
 use crate::error::Result;
 use crate::numeric::arithmetic::{Arithmetic, Block, Port, Scale, StateVisitor};
 use crate::numeric::cast::{Cast, Label};
@@ -287,7 +288,7 @@ fn ports(plan: &Plan, formats: &Formats) -> Vec<Port> {
                 quantity: input.column.clone(),
                 offset: input.offset,
                 factor: input.scale * pow2(-(format.fraction_bits as i32)),
-                unit: "",
+                unit: unit_behind(&input.column),
             };
             Port {
                 scale: Some(scale),

@@ -24,6 +24,14 @@ pub fn is_known(name: &str) -> bool {
     KNOWN.iter().any(|(known, _)| *known == name)
 }
 
+/// [`unit_of`] a column, to stand behind a number; empty where there is none.
+pub fn unit_behind(name: &str) -> &'static str {
+    match unit_of(name) {
+        "1" => "",
+        unit => unit,
+    }
+}
+
 /// The unit of a column: the contract's, or by the suffix of an auxiliary column's name;
 /// `"1"` where the name carries none.
 pub fn unit_of(name: &str) -> &'static str {

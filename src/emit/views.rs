@@ -308,13 +308,8 @@ pub fn functions(bundle: &Bundle, language: Language) -> Vec<FunctionView> {
 fn described(port: &Port, range: Interval) -> String {
     let quantity = port.scale.as_ref().map(|s| {
         let at = |raw: i128| constant(s.offset + s.factor * raw as f64, 7);
-        // A quantity's name has the unit where the scale has none.
-        let unit = if s.unit.is_empty() {
-            &s.quantity
-        } else {
-            s.unit
-        };
-        format!(" ({} .. {} {unit})", at(range.low), at(range.high))
+        let range = format!("{} .. {} {}", at(range.low), at(range.high), s.unit);
+        format!(" ({})", range.trim_end())
     });
     format!(
         "{}: {} .. {}{}; {}",

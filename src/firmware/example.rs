@@ -134,7 +134,7 @@ pub(super) fn example(
     })
 }
 
-/// What words stand for: `die_degc = 31.98, rate = 12.5 deg/s`.
+/// What words stand for: `die_degc = 31.98 degC, rate = 12.5 deg/s`.
 fn quantities<'a>(words: impl Iterator<Item = (&'a Port, &'a i128)>) -> String {
     let quantity = |(port, raw): (&Port, &i128)| {
         let Scale {

@@ -2,6 +2,7 @@
 
 use super::emitted::EmittedFile;
 use super::view::View;
+use crate::design::record_columns::unit_behind;
 use crate::design::{CompensationInput, Design, Outside};
 use crate::digest::sha256;
 use crate::emit::bundle::Bundle;
@@ -307,11 +308,13 @@ fn in_quantity(design: &Design, input: &CompensationInput, range: (i128, i128)) 
             c.sample_rate_hz * pow2(-(c.nco.phase_bits as i32)),
             "Hz",
         ),
-        // The column's name has the unit.
-        CompensationInput::Channel(channel) => (0.0, channel.format.lsb(), channel.column.as_str()),
+        CompensationInput::Channel(channel) => {
+            (0.0, channel.format.lsb(), unit_behind(&channel.column))
+        }
     };
     let at = |raw: i128| text::constant((zero + raw as f64) * factor, 7);
-    format!("{} .. {} {unit}", at(range.0), at(range.1))
+    let range = format!("{} .. {} {unit}", at(range.0), at(range.1));
+    range.trim_end().to_owned()
 }
 
 /// Where a bundle comes from and what it is.
@@ -476,6 +479,6 @@ mod tests {
             rate_format: Format::q(4, 28),
         });
         let die = in_quantity(&design, &channel, (-2560, 16640));
-        assert_eq!(die, "-10 .. 65 die_degc");
+        assert_eq!(die, "-10 .. 65 degC");
     }
 }

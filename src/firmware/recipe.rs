@@ -3,7 +3,6 @@
 //! `word = clamp(((code - C) * M + R) >> S, LOW, HIGH)`, with `value = step * code`, is the word
 //! `(value - offset) / lsb`, rounded to the nearest. M has 30 bits, so that with codes of 32 bits nothing leaves 64 bits.
 
-use crate::design::record_columns::unit_of;
 use crate::numeric::arithmetic::{Port, Scale};
 use crate::numeric::format::pow2;
 use crate::numeric::trace::ir::Interval;
@@ -85,12 +84,7 @@ pub fn sentences(inputs: &[(Port, Interval)]) -> Vec<String> {
 
 fn sentence(name: &str, scale: &Scale, range: Interval, r: &Recipe) -> String {
     let unit = match scale.unit {
-        "" => unit_of(&scale.quantity),
-        unit => unit,
-    };
-    // A number has none.
-    let unit = match unit {
-        "1" => String::new(),
+        "" => String::new(),
         unit => format!(" {unit}"),
     };
     format!(
@@ -156,7 +150,7 @@ mod tests {
             quantity: input.column.clone(),
             offset: input.offset,
             factor: input.scale * format.lsb(),
-            unit: "",
+            unit: crate::design::record_columns::unit_behind(&input.column),
         };
         (scale, Interval::new(format.min_raw(), format.max_raw()))
     }

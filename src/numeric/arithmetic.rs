@@ -243,7 +243,7 @@ pub struct Scale {
     pub offset: f64,
     /// Of one step of the word, in `unit`.
     pub factor: f64,
-    /// Empty where the quantity's name has it.
+    /// Empty for a number.
     pub unit: &'static str,
 }
 
