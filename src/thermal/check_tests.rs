@@ -141,6 +141,9 @@ fn each_shortcoming_has_its_warning() {
         found.contains(&"few_points") && found.contains(&"extrapolation"),
         "{found:?}"
     );
+    // A constant moves nowhere.
+    let found = codes(&few, &with_noise(&few, 30.0, 6), FitOrder::Fixed(0));
+    assert!(!found.contains(&"extrapolation"), "{found:?}");
 }
 
 #[test]

@@ -231,22 +231,20 @@ fn extrapolation(c: &Checked<'_>) -> Option<Warning> {
     let (t, change, std) = worst;
     let wild = change > 0.75 * drift.max(3.0 * fit.noise_floor_rms_dps);
     let unsure = std > 0.25 * drift.max(4.0 * fit.noise_floor_rms_dps);
-    (wild || unsure).then(|| {
+    // A constant goes nowhere.
+    (fit.order > 0 && (wild || unsure)).then(|| {
         Warning::on(
             "extrapolation",
             &fit.thermometer,
             format!(
                 "at {} {}, a tenth of the range beyond what was measured, the polynomial of order {} has moved by {} deg/s, \
-                 known to {} deg/s (one standard deviation). It says nothing of the gyro there. Limit the input to {} \
-                 .. {} {}",
+                 known to {} deg/s (one standard deviation). It says nothing of the gyro there, and the firmware does not \
+                 evaluate it there",
                 g(t),
                 fit.unit,
                 fit.order,
                 g(change),
-                g(std),
-                g(low),
-                g(high),
-                fit.unit
+                g(std)
             ),
         )
     })
