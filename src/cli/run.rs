@@ -132,8 +132,7 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
     }
     super::terminal::show(&super::comparison_table(&s.equivalence.functions));
     say!(
-        "words compared: all that a call gives, so its results, the state that it keeps and its fault number; of the chain the words \
-         of its rows, of a table its entries."
+        "words compared: per call its results, its state and its fault number; per row of the chain its words; per table its entries."
     );
     let mut table = super::terminal::table(&[
         "rate output at rest",
@@ -166,13 +165,12 @@ fn print(outcome: &Outcome, out: &std::path::Path) {
     }
     super::terminal::numbers(&mut table, 1..);
     super::terminal::show(&table);
+    if let Some(said) = outcome.single_readings() {
+        say!("{said}");
+    }
     say!(
-        "drift: largest less smallest mean over {DRIFT_BINS} bins of the thermometer, in which noise averages out{}. rms: of every \
-         reading about zero, with noise and a constant bias, so that it can be larger than the drift.",
-        match s.warnings.iter().any(|w| w.code == "heating_cooling_loop") {
-            true => " and heating and cooling cancel (see the warning on their loop)",
-            false => "",
-        }
+        "drift: largest less smallest mean over {DRIFT_BINS} bins of the thermometer, in which noise averages out. rms: of every \
+         reading about zero, with noise and a constant bias, so that it can be larger than the drift."
     );
     say!("fit in {}: {}.", s.fit.thermometer, s.fit.reason);
     say!(

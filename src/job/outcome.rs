@@ -199,6 +199,21 @@ pub struct Outcome {
     pub parts: Parts,
 }
 
+/// By how much single readings are off where heating and cooling differ, which means over bins of temperature do not
+/// show; `None` without the warning that says so.
+pub fn single_readings(summary: &Summary, points: &Points) -> Option<String> {
+    let mut warnings = summary.warnings.iter();
+    warnings.any(|w| w.code == "heating_cooling_loop").then(|| {
+        let largest = points.iter().map(|p| p.fixed_dps.abs());
+        format!(
+            "Heating and cooling differ, and the drift is that of their average: single readings are off by {} deg/s rms and by \
+             up to {} deg/s after compensation. `gyrogen close`, with the same record and design, looks for the lag.",
+            number(summary.after.fixed.rms_dps, 3),
+            number(largest.fold(0.0, f64::max), 3)
+        )
+    })
+}
+
 /// Share of drift and of rms from which on what is left is all that there was (convention).
 const NO_GAIN: f64 = 0.95;
 
@@ -310,6 +325,11 @@ impl Outcome {
     /// True if emitted code and model agree everywhere.
     pub fn holds(&self) -> bool {
         self.summary.equivalence.mismatches == 0
+    }
+
+    /// Where heating and cooling differ, what the drift of their means leaves out: see [`single_readings`].
+    pub fn single_readings(&self) -> Option<String> {
+        single_readings(&self.summary, &self.parts.points)
     }
 
     /// The first difference of each function that has one.

@@ -22,6 +22,19 @@ impl Warning {
         }
     }
 
+    /// How many there are of each label: "2 warnings, 1 note"; `None` of none.
+    pub fn counted(all: &[Warning]) -> Option<String> {
+        let counted = ["warning", "note"].into_iter().filter_map(|label| {
+            match all.iter().filter(|w| w.label() == label).count() {
+                0 => None,
+                1 => Some(format!("1 {label}")),
+                n => Some(format!("{n} {label}s")),
+            }
+        });
+        let counted: Vec<String> = counted.collect();
+        (!counted.is_empty()).then(|| counted.join(", "))
+    }
+
     /// A remark on one column.
     pub fn on(code: &'static str, column: &str, message: impl Into<String>) -> Self {
         Warning {

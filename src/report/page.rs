@@ -7,8 +7,9 @@ use super::tables;
 use super::text::{bounding, decimals_of, fixed, grouped, percent, significant};
 use crate::digest::sha256;
 use crate::job::fitted_design;
-use crate::job::outcome::Drift;
+use crate::job::outcome::{Drift, single_readings};
 use crate::output::name_of;
+use crate::record::Warning;
 use crate::verify::compare::Compared;
 use askama::Template;
 
@@ -65,8 +66,10 @@ pub struct Page {
     pub equivalence: Vec<Equivalent>,
     /// Words and mismatches in all.
     pub equivalence_sum: [String; 2],
-    /// Code, column, message.
-    pub warnings: Vec<[String; 3]>,
+    /// How many warnings and notes.
+    pub counted: Option<String>,
+    /// Code, label, column, message.
+    pub warnings: Vec<[String; 4]>,
     /// Name, value.
     pub provenance: Vec<[String; 2]>,
     /// Path, SHA-256.
@@ -183,12 +186,18 @@ impl Page {
                 grouped(s.equivalence.compared),
                 grouped(s.equivalence.mismatches),
             ],
+            counted: Warning::counted(&s.warnings),
             warnings: s
                 .warnings
                 .iter()
                 .map(|w| {
                     let column = w.column.clone().unwrap_or_else(|| "–".to_owned());
-                    [w.code.to_owned(), column, w.message.clone()]
+                    [
+                        w.code.to_owned(),
+                        w.label().to_owned(),
+                        column,
+                        w.message.clone(),
+                    ]
                 })
                 .collect(),
             provenance: provenance(shown),
@@ -222,15 +231,15 @@ fn headline(shown: &Shown) -> String {
         (false, false) => "does not carry",
     };
     format!(
-        "Bias drift over temperature {change} from {} to {} deg/s peak to peak ({} of what it was; means over bins of temperature{}), \
-         computed in fixed point; the emitted {} {verdict} the model's bits: {} in {} words \
+        "Bias drift over temperature {change} from {} to {} deg/s peak to peak ({} of what it was; means over bins of temperature), \
+         computed in fixed point{} emitted {} {verdict} the model's bits: {} in {} words \
          compared. What is left: {}.",
         fixed(before, decimals),
         fixed(after, decimals),
         percent(after, before),
-        match s.warnings.iter().any(|w| w.code == "heating_cooling_loop") {
-            true => ", in which heating and cooling cancel: see the warning on their loop",
-            false => "",
+        match single_readings(s, shown.points) {
+            Some(said) => format!(". {said} The"),
+            None => "; the".to_owned(),
         },
         s.built(),
         mismatches(s.equivalence.mismatches),

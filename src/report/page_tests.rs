@@ -277,3 +277,16 @@ fn long_records_are_thinned_and_keep_their_extremes() {
     assert!(html.contains("the shade is how many lie there") && html.contains(" cell l4"));
     assert!(html.len() < 1_500_000, "{}", html.len());
 }
+
+#[test]
+fn the_lead_says_what_the_mean_of_heating_and_cooling_leaves_out() {
+    let mut made = usual(60);
+    assert!(!made.html().contains("Heating and cooling differ, and"));
+    made.summary.warnings = ["heating_cooling_loop", "units_converted"]
+        .map(|code| Warning::on(code, "die_degc", "seen"))
+        .to_vec();
+    let html = made.html();
+    is_sound(&html);
+    assert!(html.contains("Heating and cooling differ, and the drift is that of their average"));
+    assert!(html.contains(">1 warning, 1 note</a>"));
+}

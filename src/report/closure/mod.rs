@@ -22,6 +22,7 @@ use super::narrow::rendered;
 use super::page::Equivalent;
 use super::text::grouped;
 use crate::error::Result;
+use crate::record::Warning;
 use crate::selftest::controls::Controls;
 use crate::thermal::close::Closed;
 use crate::thermal::firmware::emitted::Emitted;
@@ -46,8 +47,10 @@ struct Page {
     weighed: Option<Figure>,
     /// What to measure where something is left.
     measure: Vec<String>,
-    /// Code, column, message.
-    warnings: Vec<[String; 3]>,
+    /// How many warnings and notes.
+    counted: Option<String>,
+    /// Code, label, column, message.
+    warnings: Vec<[String; 4]>,
     own: Own,
 }
 
@@ -182,12 +185,18 @@ pub fn page(c: &Closure, name: &str, own: Own) -> Result<String> {
         evidence: tables::evidence(c),
         weighed: weighed::figure(c),
         measure: weighed::measure_next(c),
+        counted: Warning::counted(&c.warnings),
         warnings: c
             .warnings
             .iter()
             .map(|w| {
                 let column = w.column.clone().unwrap_or_else(|| "–".to_owned());
-                [w.code.to_owned(), column, w.message.clone()]
+                [
+                    w.code.to_owned(),
+                    w.label().to_owned(),
+                    column,
+                    w.message.clone(),
+                ]
             })
             .collect(),
         own,

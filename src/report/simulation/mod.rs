@@ -6,6 +6,7 @@ use super::figure::Figure;
 use super::narrow::rendered;
 use super::text::{decimals_of, fixed, percent, significant};
 use crate::error::Result;
+use crate::record::Warning;
 use crate::simulation::hunting::{self, Hunting};
 use crate::simulation::outcome::{Drift, Outcome};
 use askama::Template;
@@ -31,8 +32,10 @@ struct Page {
     facts_are: &'static str,
     /// Name, value.
     facts: Vec<[String; 2]>,
-    /// Code, column, message.
-    warnings: Vec<[String; 3]>,
+    /// How many warnings and notes.
+    counted: Option<String>,
+    /// Code, label, column, message.
+    warnings: Vec<[String; 4]>,
     provenance: Vec<[String; 2]>,
 }
 
@@ -83,12 +86,18 @@ pub fn html(outcome: &Outcome) -> Result<String> {
             (false, false) => "Power-on",
         },
         facts: facts(outcome),
+        counted: Warning::counted(&s.warnings),
         warnings: s
             .warnings
             .iter()
             .map(|w| {
                 let column = w.column.clone().unwrap_or_else(|| "–".to_owned());
-                [w.code.to_owned(), column, w.message.clone()]
+                [
+                    w.code.to_owned(),
+                    w.label().to_owned(),
+                    column,
+                    w.message.clone(),
+                ]
             })
             .collect(),
         provenance: [
