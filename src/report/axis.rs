@@ -168,6 +168,7 @@ impl Axis {
     pub fn labelled(&self, exponent: i32) -> String {
         match (self.quantity.as_str(), exponent) {
             ("", _) => String::new(),
+            (quantity, 0) if self.unit.is_empty() => quantity.to_owned(),
             (quantity, 0) => format!("{quantity}, {}", self.unit),
             (quantity, e) => format!("{quantity}, 10{} {}", superscript(e), self.unit),
         }

@@ -331,13 +331,16 @@ pub fn evidence(c: &Closure) -> Vec<Told> {
 pub fn provenance(closed: &Closed) -> Vec<[String; 2]> {
     let c = &closed.closure;
     let count = |role| closed.split.roles.iter().filter(|r| **r == role).count();
-    let [choose, judge] = [Role::Choose, Role::Judge].map(|role| grouped(count(role) as u64));
+    let [fit, choose, judge] =
+        [Role::Fit, Role::Choose, Role::Judge].map(|role| grouped(count(role) as u64));
     let held_out = match closed.split.roles.contains(&Role::Judge) {
         true => {
-            format!("{choose} to choose between models, {judge} held out of all but the errors")
+            format!(
+                "{fit} for the fit, {choose} for the choice of causes, {judge} held out for the error"
+            )
         }
         false => format!(
-            "{choose} held out, to choose between models and for the errors: too few to keep these apart"
+            "{fit} for the fit, {choose} held out for the choice of causes and for the error: too few to keep these apart"
         ),
     };
     let noise = &closed.after.fit.noise;
@@ -353,10 +356,7 @@ pub fn provenance(closed: &Closed) -> Vec<[String; 2]> {
         ("SHA-256 of the design as read", c.design_sha256.clone()),
         (
             "rows",
-            format!(
-                "{}; of these {held_out}",
-                grouped(closed.channels.len() as u64)
-            ),
+            format!("{} rows: {held_out}", grouped(closed.channels.len() as u64)),
         ),
         ("thermometer", closed.channels.thermometer.clone()),
         ("noise beside the causes", strengths),

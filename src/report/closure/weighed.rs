@@ -36,7 +36,7 @@ fn drawn(scored: &[(&Evidence, f64)], width: f64) -> Figure {
             high: interval.high + 0.45 * (interval.high - interval.low),
         },
         quantity: "gain of log-likelihood, alone".to_owned(),
-        unit: "nats".to_owned(),
+        unit: String::new(),
     };
     svg.legend([
         ("bar-of", Swatch::Area, "taken".to_owned()),
@@ -83,7 +83,8 @@ fn drawn(scored: &[(&Evidence, f64)], width: f64) -> Figure {
     svg.add(&frame);
     svg.figure(
         "What was close, and what lost",
-        "Each candidate alone beside the declared model, before any cause is in; p is the chance that the best of all candidates does \
+        "Each candidate alone beside the declared model, before any cause is in. A larger gain means that the record is likelier \
+         with the candidate, by a factor of e (2.7) for each 1 of it; p is the chance that the best of all candidates does \
          as well where there is nothing. The table says why one was not taken.",
     )
 }
