@@ -357,9 +357,13 @@ pub fn sentences_with(
 pub fn run_sentence(design: &Design, certainty: &Certainty) -> String {
     let c = certainty;
     format!(
-        "The bound of the bias was tried on {}{} calibrated inputs: the bias was at most {} from the polynomial (at input word {}){}.",
+        "The bound of the bias was tried on {}{} {}: the bias was at most {} from the polynomial (at input word {}){}.",
         if c.exhaustive { "all " } else { "" },
         c.inputs_checked,
+        match design.compensation.as_ref().and_then(|c| c.clamp_raw) {
+            Some(_) => "calibrated inputs",
+            None => "input words",
+        },
         figure(design, c.exhaustive_max_dps),
         c.at_input_raw,
         if c.saturates {
