@@ -136,7 +136,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         let (record, warnings) = crate::record::read_any(path, &design.record)?;
         watch.stage("closing");
         if arguments.format == OutputFormat::Text {
-            say!("read: {}", record.understood());
+            say!("read: {}", record.understood(&design.record));
         }
         let mut closed = close::close(
             &record,

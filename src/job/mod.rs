@@ -94,7 +94,7 @@ pub fn run(
     say("running the record through float, fixed and emitted code");
     let understood = record_path.map(|_| {
         let rows = record.rows_understood(&warnings);
-        [record.understood(), rows]
+        [record.understood(&design.record), rows]
     });
     let points = match &simulated {
         Some(run) => run.points(&design, &fit, &firmware)?,

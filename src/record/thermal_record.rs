@@ -1,6 +1,7 @@
 //! A thermal record: rows of averaged readings.
 
 use super::warning::Warning;
+use crate::design::RecordMapping;
 use crate::design::record_columns;
 use crate::design::units::{self, Unit};
 use crate::statistics::stats;
@@ -126,12 +127,20 @@ impl ThermalRecord {
     }
 
     /// Each column with its unit, and what the file calls it where that is another name: for a user to see how the file was
-    /// understood.
-    pub fn understood(&self) -> String {
+    /// understood; `mapping` is what it was read with.
+    pub fn understood(&self, mapping: &RecordMapping) -> String {
         let names = std::iter::once("time_s").chain(self.columns.keys().map(String::as_str));
+        // A log's topics state their units.
+        let assumed = |name: &str, file: &str| {
+            let is_said = mapping.units.contains_key(name) || units::stated(file, name).is_some();
+            !is_said && !self.is_of_log() && record_columns::unit_of(name) != "1"
+        };
         let said = names.map(|name| {
             let unit = record_columns::unit_of(name);
             match self.renamed.get(name) {
+                Some(file) if assumed(name, file) => {
+                    format!("{name} in {unit} (from {file}, whose name has no unit)")
+                }
                 Some(file) => format!("{name} in {unit} (from {file})"),
                 // An auxiliary column, whose unit nobody has said.
                 None if unit == "1" => format!("{name} as it is"),
