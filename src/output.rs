@@ -168,6 +168,16 @@ impl Target {
                 .help("check the folder's permissions, or name a file in another one")
                 .into()
             }
+            // The folder is there: the system keeps its own files in it, as in /proc.
+            io::ErrorKind::NotFound => {
+                let shown = folder.display();
+                InputError::new(format!(
+                    "cannot write: the system takes no new files in `{shown}`"
+                ))
+                .in_file(named)
+                .help("name a file in another folder")
+                .into()
+            }
             _ => write_failed(named, &e),
         })?;
         Ok(Target::Replace {

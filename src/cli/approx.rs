@@ -44,8 +44,8 @@ pub struct Arguments {
     /// Format of the output, as that of the input.
     #[arg(long, value_name = "FORMAT")]
     output: Format,
-    /// Format of the coefficients, or one for each of a polynomial's, lowest order first (`Q1.15,Q1.17`); with
-    /// --bound chosen if left out.
+    /// Format of the coefficients, or one for each of a polynomial's, lowest order first (`Q1.15,Q1.17`). This
+    /// or --bound is needed; with --bound it is chosen if left out.
     #[arg(long, value_name = "FORMAT", value_delimiter = ',')]
     coefficients: Vec<Format>,
     /// Format that each step of a polynomial is rounded to; so wide that nothing is lost if left out.

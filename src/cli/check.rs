@@ -246,6 +246,14 @@ fn requirements(check: &Check) {
     }
 }
 
+/// Bits of headroom, rounded down: a lack of them is never shown as none.
+fn headroom(bits: f64) -> String {
+    match bits < 0.0 {
+        true => format!("{:.2}", (100.0 * bits).floor() / 100.0),
+        false => format!("{bits:.2}"),
+    }
+}
+
 fn row(n: &NodeCheck) -> Vec<String> {
     let overflow = match n.overflow {
         Overflows::Impossible => "impossible (proved)".to_owned(),
@@ -259,10 +267,7 @@ fn row(n: &NodeCheck) -> Vec<String> {
         n.name.clone(),
         n.format.clone(),
         format!("{} .. {}", n.proved[0], n.proved[1]),
-        n.headroom_bits.map_or("-".to_owned(), |b| match b < 0.0 {
-            true => "< 0".to_owned(),
-            false => format!("{b:.2}"),
-        }),
+        n.headroom_bits.map_or("-".to_owned(), headroom),
         overflow,
         line.map_or("-".to_owned(), |l| {
             let rms = l.predicted_rms_lsb.or(l.measured_rms_lsb);

@@ -2,7 +2,6 @@
 
 use super::recorded::Recorded;
 use super::stages::Stages;
-use super::terminal::OutputFormat;
 use crate::circuit::engine::{self, ArithmeticKind, Rows};
 use crate::design::Design;
 use crate::error::{Error, Result};
@@ -10,6 +9,7 @@ use crate::output::name_of;
 use crate::record::capture::{CaptureReader, mismatch_warnings};
 use crate::record::replayed::Replayed;
 use crate::record::rows::{Kind, RowWriter};
+use crate::text::counted;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -28,9 +28,18 @@ pub struct Arguments {
     /// Whose words are written: the bit-accurate circuit, or its float twin.
     #[arg(long, value_enum, default_value = "fixed")]
     arith: Arith,
-    /// What is printed on stdout: nothing, or what was done as JSON.
+    /// How what was done is told.
     #[arg(long, value_enum, default_value = "text")]
-    format: OutputFormat,
+    format: Told,
+}
+
+/// How it is told what was done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Told {
+    /// Sentences on stderr; nothing on stdout.
+    Text,
+    /// The same sentences, and JSON on stdout.
+    Json,
 }
 
 /// Which arithmetic's words are written.
@@ -144,18 +153,21 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     }
     if index == 0 {
         warnings.push(format!(
-            "the capture has {samples} samples, and a row takes {period}. The file has no row. Capture longer"
+            "the capture has {}; one row needs {period}, so that the file has no row. Capture longer",
+            counted(samples, "sample")
         ));
         talk!("warning: {}", warnings[warnings.len() - 1]);
     }
     talk!(
-        "replayed {samples} samples into {index} rows: {:.1} M samples/s in the circuit, \
+        "replayed {} into {}: {:.1} M samples/s in the circuit, \
          {:.1} M/s with reading and writing, one thread",
+        counted(samples, "sample"),
+        counted(index, "row"),
         rate(samples, busy),
         rate(samples, started.elapsed()),
     );
     talk!("{}", units(&design, kind, &columns));
-    if arguments.format == OutputFormat::Json {
+    if arguments.format == Told::Json {
         let replayed = Replayed {
             schema: "gyrogen.replay/1",
             version: env!("CARGO_PKG_VERSION"),

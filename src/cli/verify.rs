@@ -216,20 +216,31 @@ fn print(v: &Verification, folder: &Path) {
     }
     say!("digest: {}", v.digest);
     say!("wrote {}", folder.join(RESULT).display());
-    say!("verdict: {}", verdict(v));
+    // Why it does not is the error's to say.
+    say!(
+        "verdict: {}",
+        if v.holds { "holds" } else { "does not hold" }
+    );
 }
 
-/// Whether the bundle holds, and why it does not.
-fn verdict(v: &Verification) -> String {
-    match v.holds {
-        true => "holds".to_owned(),
-        false => format!("does not hold: {}", reasons(v).join("; ")),
-    }
-}
-
-/// What was found wrong.
+/// What was found wrong, the likeliest cause of the others first.
 fn reasons(v: &Verification) -> Vec<String> {
     let mut reasons = Vec::new();
+    let (line_ends, edited): (Vec<&str>, Vec<&str>) = v
+        .changed_files
+        .iter()
+        .map(String::as_str)
+        .partition(|file| v.other_line_ends.iter().any(|other| other == file));
+    if !edited.is_empty() {
+        let files = edited.join(", ");
+        reasons.push(format!("files differ from the manifest: {files}"));
+    }
+    if !line_ends.is_empty() {
+        let files = line_ends.join(", ");
+        reasons.push(format!(
+            "files differ from the manifest in their line ends alone (CR LF for LF): {files}"
+        ));
+    }
     for f in v.functions.iter().filter(|f| f.mismatches > 0) {
         let first = f.first.as_deref().unwrap_or("");
         reasons.push(format!(
@@ -239,10 +250,6 @@ fn reasons(v: &Verification) -> Vec<String> {
     }
     if v.selftest == Some(false) {
         reasons.push("the self-test fails".into());
-    }
-    if !v.changed_files.is_empty() {
-        let files = v.changed_files.join(", ");
-        reasons.push(format!("files differ from the manifest: {files}"));
     }
     reasons.extend(v.problems.iter().cloned());
     reasons
@@ -264,8 +271,14 @@ fn remedy(v: &Verification) -> Option<String> {
         true => "move files of your own out of the folder; where the bundle's files changed, ",
         false => "",
     };
+    let git = match v.other_line_ends.is_empty() {
+        true => "",
+        false => {
+            "keep git from changing line ends: `* -text` in .gitattributes, and check the files out anew; or "
+        }
+    };
     Some(format!(
-        "{foreign}write the bundle again with the command that made it, `{}`, and its --out (`--force` replaces edited files)",
+        "{foreign}{git}write the bundle again with the command that made it, `{}`, and its --out (`--force` replaces edited files)",
         v.made_by
     ))
 }

@@ -35,6 +35,9 @@ pub struct Verification {
     pub toolchain: String,
     /// Files that are not what the manifest says.
     pub changed_files: Vec<String>,
+    /// Those of them that differ in their line ends alone.
+    #[serde(skip)]
+    pub other_line_ends: Vec<String>,
     /// What a bundle of this part and language has to hold and does not, what it holds and must not, and what is
     /// not as the digest or the design says.
     pub problems: Vec<String>,
@@ -117,6 +120,7 @@ pub fn verify(
         problems.extend(other_than(&emit(design, &manifest)?, &folder));
     }
     let changed_files = changed(&manifest, &folder);
+    let other_line_ends = in_line_ends(&manifest, &folder, &changed_files);
     let is_another = changed_files.is_empty() && own == 0 && !problems.is_empty();
     let mut run = Run {
         language,
@@ -206,6 +210,7 @@ pub fn verify(
         target: target.name().into(),
         toolchain: toolchain_name,
         changed_files,
+        other_line_ends,
         is_another,
         has_foreign,
         made_by: manifest.command,
@@ -247,6 +252,17 @@ fn changed(manifest: &Manifest, folder: &Folder) -> Vec<String> {
         bytes.map_or(true, |b| crate::digest::sha256(&b) != file.sha256)
     };
     let files = manifest.files.iter().filter(differs);
+    files.map(|file| file.path.clone()).collect()
+}
+
+/// Those of the changed files that are the manifest's once CR LF is LF again, as git may have changed it.
+fn in_line_ends(manifest: &Manifest, folder: &Folder, changed: &[String]) -> Vec<String> {
+    let is_same = |file: &&manifest::FileEntry| {
+        let text = folder.read_text(&file.path);
+        text.is_ok_and(|t| crate::digest::sha256(t.replace("\r\n", "\n").as_bytes()) == file.sha256)
+    };
+    let files = manifest.files.iter().filter(|f| changed.contains(&f.path));
+    let files = files.filter(is_same);
     files.map(|file| file.path.clone()).collect()
 }
 

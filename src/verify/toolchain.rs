@@ -230,7 +230,19 @@ pub fn languages(asked: Option<Language>) -> Result<(Vec<Language>, Vec<String>)
     if found.is_empty() {
         return Err(lacking.swap_remove(0));
     }
-    Ok((found, lacking.iter().map(ToString::to_string).collect()))
+    Ok((found, lacking.iter().map(within_a_sentence).collect()))
+}
+
+/// Why a compiler is lacking, for the end of a note: what is wrong and what to do about it.
+fn within_a_sentence(error: &Error) -> String {
+    match error {
+        Error::Input(e) => {
+            let said = [Some(&e.message), e.help.as_ref()];
+            let said: Vec<&str> = said.into_iter().flatten().map(String::as_str).collect();
+            said.join("; ")
+        }
+        other => other.to_string(),
+    }
 }
 
 pub(super) fn version(compiler: &str) -> String {

@@ -237,6 +237,20 @@ fn dropped_outputs_and_states_are_noticed() {
 }
 
 #[test]
+fn other_line_ends_are_told_from_an_edited_file() {
+    let (_folder, at) = bundle();
+    let path = at.join("tested_correction.c");
+    let text = std::fs::read_to_string(&path).expect("a source");
+    std::fs::write(&path, text.replace('\n', "\r\n")).expect("written");
+    refused(
+        &at,
+        1,
+        "check failed: files differ from the manifest in their line ends alone (CR LF for LF): tested_correction.c",
+    );
+    refused(&at, 1, "`* -text` in .gitattributes");
+}
+
+#[test]
 fn a_changed_file_is_named_also_where_it_does_not_compile() {
     let (_folder, at) = bundle();
     let path = at.join("tested_correction.c");
@@ -263,7 +277,7 @@ fn a_changed_file_is_named_also_where_it_does_not_compile() {
     );
     let last = said.lines().last().unwrap_or("");
     assert!(
-        last.starts_with("verdict: does not hold: files differ from the manifest"),
+        last == "verdict: does not hold" && !said.contains("files differ"),
         "{said}"
     );
     // No file of somebody's own is there to be moved.
