@@ -93,7 +93,7 @@ pub struct FunctionView {
     /// Domain, range, meaning.
     pub notes: Vec<String>,
     /// What comes of a word outside an input's range; empty where the types hold no such word.
-    pub outside: &'static str,
+    pub outside: String,
     /// Prototype without `;`.
     pub declaration: String,
     /// Definition.
@@ -419,14 +419,25 @@ fn input(range: Interval, ty: String, language: Language) -> InputView {
 }
 
 /// What comes of a word that an input's type holds and its range does not.
-fn outside(function: &Function, lowered: &Lowered) -> &'static str {
+fn outside(function: &Function, lowered: &Lowered) -> String {
     let mut inputs = function.inputs.iter().zip(&lowered.inputs);
     let holds_more = inputs
         .any(|((_, range), ty)| matches!(ty, Type::Signed(width) if width.interval() != *range));
+    // Limits of the function's own are another matter: they are for words of the range.
+    let of = function
+        .inputs
+        .iter()
+        .find(|(port, _)| port.limits.is_some());
+    let of = of.map_or("its range".to_owned(), |(_, range)| {
+        format!(
+            "{} .. {}, which is no word of the format,",
+            range.low, range.high
+        )
+    });
     match (holds_more, lowered.guarded) {
-        (false, _) => "",
-        (true, true) => "an input outside its range is clamped to it",
-        (true, false) => "an input outside its range is not clamped: its result may be wrong",
+        (false, _) => String::new(),
+        (true, true) => format!("an input outside {of} is clamped to it"),
+        (true, false) => format!("an input outside {of} is not clamped: its result may be wrong"),
     }
 }
 

@@ -72,7 +72,7 @@ fn facts(outcome: &Outcome) -> Vec<String> {
             e.certified_max_abs, e.at_input_raw
         ),
         format!(
-            "inputs outside {} .. {} are limited to them",
+            "domain: words {} .. {}; of the input's other words each gives the result at the nearer end",
             outcome.input_codes[0], outcome.input_codes[1]
         ),
     ]

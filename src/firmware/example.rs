@@ -74,7 +74,8 @@ impl ByHand {
     }
 }
 
-/// A call of the last function, each of whose inputs lies at five eighths of its range (a flag is set); `result` is the type
+/// A call of the last function, each of whose inputs lies at five eighths of its range, or of the limits that the function
+/// has for it (a flag is set); `result` is the type
 /// of its result, `model` gives the words that are due. `None` where a word has more than 64 bits, or the model has no result.
 pub(super) fn example(
     bundle: &Bundle,
@@ -97,11 +98,12 @@ pub(super) fn example(
     {
         return None;
     }
-    let ranges = function.inputs.iter().map(|(_, range)| range);
+    let ranges = function.inputs.iter();
+    let ranges = ranges.map(|(port, range)| port.limits.unwrap_or((range.low, range.high)));
     let inputs: Vec<i128> = ranges
-        .map(|range| match range.high - range.low {
-            1 => range.high,
-            span => range.low + span / 8 * 5,
+        .map(|(low, high)| match high - low {
+            1 => high,
+            span => low + span / 8 * 5,
         })
         .collect();
     let outputs = model(&inputs);

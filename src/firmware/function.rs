@@ -42,7 +42,9 @@ pub fn emit(what: &Standalone, language: Language) -> Result<Vec<EmittedFile>> {
     let models = std::slice::from_ref(what.model);
     let mut facts = what.facts.clone();
     facts.push("words are two's complement; ranges beside them are proved, not observed".into());
-    let view = View::new(&bundle, models, &[what.every], language, banner, facts);
+    let mut view = View::new(&bundle, models, &[what.every], language, banner, facts);
+    // The input is a number, no sensor's code.
+    view.recipes.clear();
     let mut emitted = files::sources(&view, Part::Compensation, language)?;
     emitted.extend_from_slice(what.vectors);
     emitted.push(vectors::of_tables(&view.tables));

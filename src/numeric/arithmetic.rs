@@ -256,6 +256,8 @@ pub struct Port {
     pub meaning: String,
     /// What its words stand for, where that is a quantity outside the circuit.
     pub scale: Option<Scale>,
+    /// First and last word that the block computes with, where it limits all others of the range to these.
+    pub limits: Option<(i128, i128)>,
 }
 
 impl Port {
@@ -265,7 +267,14 @@ impl Port {
             name,
             meaning: meaning.into(),
             scale: None,
+            limits: None,
         }
+    }
+
+    /// The same port, whose words the block limits to `low ..= high`.
+    pub fn limited(mut self, low: i128, high: i128) -> Self {
+        self.limits = Some((low, high));
+        self
     }
 
     /// A port that is not there: without a name.

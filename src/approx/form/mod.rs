@@ -163,15 +163,21 @@ impl<A: Arithmetic> Block<A, 1, 1> for Form {
 
     fn inputs(&self) -> [Port; 1] {
         let codes = self.codes();
-        let meaning = format!(
-            "{}, limited to {} .. {}",
-            codes.format, codes.low, codes.high
-        );
-        [Port::new("x", meaning)]
+        let all = codes.all();
+        let above = (codes.high < all.high)
+            .then(|| format!("words above {0} give the result at {0}", codes.high));
+        let below = (all.low < codes.low)
+            .then(|| format!("words below {0} give the result at {0}", codes.low));
+        let parts = [Some(codes.format.to_string()), below, above];
+        let meaning: Vec<String> = parts.into_iter().flatten().collect();
+        let port = Port::new("x", meaning.join("; ")).limited(codes.low, codes.high);
+        [port.in_unit("x", -(codes.format.fraction_bits as i32), "")]
     }
 
     fn outputs(&self) -> [Port; 1] {
-        [Port::new("y", self.output().to_string())]
+        let format = self.output();
+        let port = Port::new("y", format.to_string());
+        [port.in_unit("y", -(format.fraction_bits as i32), "")]
     }
 
     #[inline(always)]
