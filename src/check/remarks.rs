@@ -2,7 +2,7 @@
 
 use super::budget::Budget;
 use super::outcome::{NodeCheck, Overflows};
-use crate::circuit::scale::full_scale_is_off;
+use crate::circuit::scale::{excitation_is_off, full_scale_is_off};
 use crate::cosim::rest::rows_per_s;
 use crate::design::{Compensation, Design};
 use crate::equivalence::overflow;
@@ -14,8 +14,8 @@ use serde::Serialize;
 /// A remark.
 #[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Remark {
-    /// `idle_bits`, `biased_rounding`, `dead_band`, `spurs_in_band`, `output_hides_fit`, `wrap_possible`, `scale_factor`,
-    /// `correction_not_checked`.
+    /// `idle_bits`, `biased_rounding`, `dead_band`, `spurs_in_band`, `output_hides_fit`, `wrap_possible`,
+    /// `excitation_off_resonance`, `scale_factor`, `correction_not_checked`.
     pub code: &'static str,
     /// The dotted key, with the channel or the part.
     pub node: String,
@@ -39,6 +39,14 @@ pub fn remarks(design: &Design, nodes: &[NodeCheck], budget: &Budget) -> Vec<Rem
         wraps(design, node, &mut all);
     }
     output(design, &mut all);
+    if let Some((message, mend)) = excitation_is_off(design) {
+        all.push(Remark {
+            code: "excitation_off_resonance",
+            node: "circuit.nco.tuning_word".to_owned(),
+            message,
+            mend,
+        });
+    }
     let is_of_chain = |c: &Compensation| c.input.is_of_chain();
     if design.compensation.as_ref().is_some_and(is_of_chain)
         && let Some((message, mend)) = full_scale_is_off(design)

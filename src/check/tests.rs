@@ -137,6 +137,27 @@ fn a_full_scale_that_is_off_by_two_is_named_as_run_names_it() {
 }
 
 #[test]
+fn an_excitation_beside_the_resonance_is_named_as_run_names_it() {
+    let c = checked(&[("drive_frequency_hz = 1750.0", "drive_frequency_hz = 1800.0")]);
+    let found = c
+        .remarks
+        .iter()
+        .find(|r| r.code == "excitation_off_resonance");
+    let remark = found.expect("a remark");
+    assert!(
+        remark.message.contains("the NCO runs at 1750.000 Hz"),
+        "{}",
+        remark.message
+    );
+    let c = checked(&[]);
+    assert!(
+        codes(&c)
+            .iter()
+            .all(|(code, _)| *code != "excitation_off_resonance")
+    );
+}
+
+#[test]
 fn a_detuned_coarse_table_has_spurs_in_band() {
     let c = checked(&[
         ("tuning_word = 134217728", "tuning_word = 134230000"),

@@ -47,6 +47,28 @@ pub fn full_scale_is_off(design: &Design) -> Option<(String, String)> {
     Some((what, mend))
 }
 
+/// The frequency that the NCO's own tuning word makes, Hz; above half of the rate it is the alias.
+pub fn oscillator_hz(design: &Design) -> f64 {
+    let nco = &design.circuit.nco;
+    let turns = nco.tuning_word as f64 * pow2(-(nco.phase_bits as i32));
+    (turns - turns.round()) * design.circuit.sample_rate_hz
+}
+
+/// What is wrong where the NCO drives the gyro beside its resonance, and what mends it. `None`: within a thousandth of it.
+pub fn excitation_is_off(design: &Design) -> Option<(String, String)> {
+    let hz = oscillator_hz(design);
+    let drive_hz = design.gyro.drive_frequency_hz;
+    if (hz / drive_hz - 1.0).abs() <= 1e-3 {
+        return None;
+    }
+    let what = format!(
+        "the NCO runs at {hz:.3} Hz, but the gyro resonates at {drive_hz} Hz. It is driven beside its resonance, so that its \
+         amplitude is small and its phase off"
+    );
+    let mend = "set the NCO's tuning word to the resonance, or use a phase loop".to_owned();
+    Some((what, mend))
+}
+
 /// What an amplitude at an ADC (LSB) is, for a magnitude of 1: a product with the carrier
 /// halves it, and the decimator's gain is (R M)^N / 2^G.
 pub fn amplitude_lsb_per_magnitude(design: &Design) -> f64 {

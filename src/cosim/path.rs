@@ -4,6 +4,7 @@ use super::inexact::Inexact;
 use super::rest::{self, Rest};
 use crate::circuit::engine::{self, ArithmeticKind, Engine, Rows};
 use crate::circuit::followers::Followers;
+use crate::circuit::scale::oscillator_hz;
 use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::numeric::fixed::Overflowed;
@@ -137,7 +138,7 @@ impl Path {
         let reference = Reference {
             sample_rate_hz: circuit.sample_rate_hz,
             full_scale_lsb,
-            excitation_hz: rest::oscillator_hz(design),
+            excitation_hz: oscillator_hz(design),
             tracking: circuit.phase_loop.is_some(),
             held_amplitude: circuit.amplitude_loop.is_some(),
             nominal_gain: rest::nominal_gain(design),

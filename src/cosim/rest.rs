@@ -1,7 +1,7 @@
 //! Where the loops come to rest, and how fast: the closed loop linearised around its steady state.
 
 use crate::circuit::chain::Held;
-use crate::circuit::scale::amplitude_lsb_per_magnitude;
+use crate::circuit::scale::{amplitude_lsb_per_magnitude, oscillator_hz};
 use crate::design::Design;
 use crate::error::{InputError, Result};
 use crate::numeric::format::pow2;
@@ -30,14 +30,6 @@ pub fn nominal_gain(design: &Design) -> f64 {
         }
         None => 1.0,
     }
-}
-
-/// The oscillator's frequency at the design's own tuning word, Hz; of the alias below half the
-/// sample rate.
-pub fn oscillator_hz(design: &Design) -> f64 {
-    let nco = &design.circuit.nco;
-    let turns = nco.tuning_word as f64 * pow2(-(nco.phase_bits as i32));
-    (turns - turns.round()) * design.circuit.sample_rate_hz
 }
 
 /// The steady state under the conditions that the gyroscope has.

@@ -77,7 +77,8 @@ fn nco(t: &Table) -> Result<Nco> {
     let tuning_word = t.need("tuning_word")?.integer(
         *I64.start()..=top,
         "what the accumulator advances in a sample, 0 to 2^phase_bits - 1, \
-         or a negative word, which counts modulo 2^phase_bits",
+         or a negative word, which counts modulo 2^phase_bits; for a frequency it is \
+         f_hz / sample_rate_hz * 2^phase_bits, rounded",
     )?;
     let bits = t.need("table_address_bits")?;
     let table_address_bits = bits.integer(

@@ -69,6 +69,7 @@ const BROKEN: &[Case] = &[
     ("sample_rate_hz = 56000.0", "sample_rate_hz = ¦0", "is 0; it has to be positive", "Hz"),
     ("phase_bits = 32", "phase_bits = ¦7", "is 7; it has to be 8..=64", "width"),
     ("phase_bits = 32", "phase_bits = ¦99999999999999999999999999999999999999999999", "8..=64", "width"),
+    ("tuning_word = 134217728", "tuning_word = ¦1750.0", "takes an integer, found the real 1750.0", "f_hz / sample_rate_hz * 2^phase_bits"),
     ("tuning_word = 134217728", "tuning_word = ¦4294967296", "is 4294967296; it has to be", "modulo 2^phase_bits"),
     ("tuning_word = 134217728", "tuning_word = ¦0x1_0000_0000", "is 0x1_0000_0000;", "4294967295"),
     ("table_address_bits = 12", "table_address_bits = ¦17", "2..=16", "at most phase_bits"),

@@ -295,7 +295,11 @@ impl<'a> Value<'a> {
             DeValue::Integer(integer) => integer,
             DeValue::Float(real) => {
                 let near = real.as_str().parse::<f64>().unwrap_or(f64::NAN);
-                let help = if near.fract() == 0.0 && near.abs() < 1e15 {
+                let is_raw = ["_raw", "_word"].iter().any(|w| self.name().contains(w));
+                let help = if is_raw {
+                    // A real here is rather a quantity in its unit than a word with a point.
+                    format!("a raw word is an integer, and no value in a unit; {help}")
+                } else if near.fract() == 0.0 && near.abs() < 1e15 {
                     format!(
                         "an integer key takes no real: write `{} = {near}`",
                         self.name()

@@ -4,7 +4,7 @@ use super::formats;
 use super::points::{Point, Points};
 use super::{clamped_bias, compensation, warning};
 use crate::circuit::engine::{self, ArithmeticKind, Rows};
-use crate::circuit::scale::full_scale_is_off;
+use crate::circuit::scale::{excitation_is_off, full_scale_is_off};
 use crate::cosim::scale::full_scale_dps;
 use crate::cosim::surroundings::Moment;
 use crate::cosim::{readings, stream};
@@ -90,19 +90,11 @@ impl OwnRun {
 
     /// Where the design's own numbers do not fit each other.
     pub fn warnings(&self, design: &Design) -> Vec<Warning> {
-        let circuit = &design.circuit;
         let mut warnings = Vec::new();
-        let word = circuit.nco.tuning_word as f64;
-        let nco_hz = word * pow2(-(circuit.nco.phase_bits as i32)) * circuit.sample_rate_hz;
-        let drive_hz = design.gyro.drive_frequency_hz;
-        if (nco_hz / drive_hz - 1.0).abs() > 1e-3 {
+        if let Some((what, mend)) = excitation_is_off(design) {
             warnings.push(warning(
                 "excitation_off_resonance",
-                format!(
-                    "the NCO runs at {nco_hz:.3} Hz, but the gyro resonates at {drive_hz} Hz. It is driven beside its \
-                     resonance, so that its amplitude is small and its phase off. Set the NCO's tuning word to the \
-                     resonance, or use a phase loop"
-                ),
+                format!("{what}. To mend it, {mend}"),
             ));
         }
         if let Some((what, mend)) = full_scale_is_off(design) {

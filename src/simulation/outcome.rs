@@ -5,7 +5,6 @@ use super::hunting::Hunting;
 use super::paper::{self, Figure, ScaleFactor, Simulated};
 use super::startup::Startup;
 use crate::cosim::readings::{Mean, Taken};
-use crate::cosim::rest;
 use crate::design::Design;
 use crate::job::calibration::Calibration;
 use crate::record::Warning;
@@ -333,16 +332,10 @@ fn warnings(parts: &Parts) -> Vec<Warning> {
             ),
         ));
     }
-    let hz = rest::oscillator_hz(design);
-    let drive_hz = design.gyro.drive_frequency_hz;
-    if (hz / drive_hz - 1.0).abs() > 1e-3 {
+    if let Some((what, mend)) = crate::circuit::scale::excitation_is_off(design) {
         warnings.push(Warning::general(
             "excitation_off_resonance",
-            format!(
-                "the NCO runs at {hz:.3} Hz, but the gyro resonates at {drive_hz} Hz. It is driven beside its resonance, so \
-                 that its amplitude is small and its phase off. Set the NCO's tuning word to the resonance, or use a phase \
-                 loop"
-            ),
+            format!("{what}. To mend it, {mend}"),
         ));
     }
     if let Some((_, calibration)) = &parts.calibrated {
