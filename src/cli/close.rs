@@ -107,7 +107,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         (&arguments.capture, "--capture"),
     ] {
         if let Some(file) = file {
-            super::common::refuse_design(file, option)?;
+            super::common::refuse_design(("close", option), file, arguments.design.path())?;
         }
     }
     let mut design = arguments.design.read()?;

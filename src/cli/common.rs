@@ -97,28 +97,44 @@ fn refuse_record(path: &std::path::Path) -> Result<()> {
     }
 }
 
-/// A design in a record's or a capture's place is named as what it is; `option` is the one that it was given with.
-pub(super) fn refuse_design(path: &Path, option: &str) -> Result<()> {
+/// A design in a record's or a capture's place is named as what it is; `option` is the one of `command` that it was given
+/// with, `design` the file in the design's place.
+pub(super) fn refuse_design(
+    (command, option): (&str, &str),
+    path: &Path,
+    design: Option<&Path>,
+) -> Result<()> {
+    if is_toml(path) != Some(true) {
+        return Ok(());
+    }
+    let message = format!("this is a design (TOML), and `{option}` takes measured data");
+    let help = match design.filter(|d| is_toml(d) == Some(false)) {
+        Some(other) => format!(
+            "the two look swapped: `gyrogen {command} {} {option} {}`",
+            path.display(),
+            other.display()
+        ),
+        None => "give the design before the options, or with --design where there is that option"
+            .to_owned(),
+    };
+    Err(crate::error::InputError::new(message)
+        .in_file(path)
+        .help(help)
+        .into())
+}
+
+/// Whether a file is TOML with a key or a table. `None`: it is no file; that is the reader's to say.
+fn is_toml(path: &Path) -> Option<bool> {
     use std::io::Read;
     if !std::fs::metadata(path).is_ok_and(|m| m.is_file()) {
-        return Ok(());
+        return None;
     }
     let mut text = String::new();
     let read = std::fs::File::open(path).and_then(|f| f.take(1 << 20).read_to_string(&mut text));
-    let is_design = |text: &str| {
-        let parsed = text.parse::<toml_edit::DocumentMut>();
-        parsed.is_ok_and(|d| d.iter().any(|(_, item)| item.is_table() || item.is_value()))
-    };
-    match read {
-        Ok(_) if is_design(&text) => Err(crate::error::InputError::new(format!(
-            "this is a design (TOML), and `{option}` takes measured data"
-        ))
-        .in_file(path)
-        .help("give the design before the options, or with --design where there is that option")
-        .into()),
-        // What cannot be read is the reader's to say.
-        _ => Ok(()),
-    }
+    let parsed = read.ok().map(|_| text.parse::<toml_edit::DocumentMut>());
+    let is_filled =
+        |d: toml_edit::DocumentMut| d.iter().any(|(_, item)| item.is_table() || item.is_value());
+    Some(parsed.is_some_and(|p| p.is_ok_and(is_filled)))
 }
 
 /// The threads that were asked for, or as many as the machine has.

@@ -123,7 +123,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
 fn codes(design: &Design, arguments: &Arguments) -> Result<(Vec<i32>, Vec<i32>, String)> {
     let most = arguments.samples.map(|n| n as usize);
     if let Some(path) = &arguments.capture {
-        super::common::refuse_design(path, "--capture")?;
+        super::common::refuse_design(("equiv", "--capture"), path, arguments.design.path())?;
         let (drive, sense) = read(design, path, most.unwrap_or(usize::MAX))?;
         return Ok((drive, sense, format!("capture {}", name_of(path))));
     }

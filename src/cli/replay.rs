@@ -96,8 +96,12 @@ fn refuse_foreign(out: &Path, header: &[&str]) -> Result<()> {
 /// no file is written then.
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let stages = Stages::start("replaying");
+    super::common::refuse_design(
+        ("replay", "--capture"),
+        &arguments.capture,
+        arguments.design.path(),
+    )?;
     let design = arguments.design.read()?;
-    super::common::refuse_design(&arguments.capture, "--capture")?;
     let kind = ArithmeticKind::from(arguments.arith);
     crate::output::refuse_inputs(&arguments.out, &recorded.inputs)?;
     let mut capture = CaptureReader::open(&arguments.capture, design.circuit.adc.format)?;

@@ -61,7 +61,7 @@ const PLANNED: [&str; 5] = [
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let watch = Stages::start("reading the design");
     if let Some(record) = &arguments.record {
-        super::common::refuse_design(record, "--record")?;
+        super::common::refuse_design(("run", "--record"), record, arguments.design.path())?;
     }
     let mut design = arguments.design.read()?;
     design.record.undo_correction = arguments.undo_correction;
