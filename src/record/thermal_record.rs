@@ -96,6 +96,12 @@ impl ThermalRecord {
                 "column {named} is taken as {taken}: correct that in [record.columns] or in its name"
             );
         };
+        self.line_for(column, unit)
+    }
+
+    /// The line of the design that says that the file has a column in `unit`, or what to rename first.
+    pub(super) fn line_for(&self, column: &str, unit: &str) -> String {
+        let named = self.renamed.get(column).map_or(column, String::as_str);
         match units::stated(named, column) {
             // Two statements that contradict each other are refused.
             Some(said) if said.name != unit => format!(

@@ -2,11 +2,16 @@
 
 use super::thermal::ThermalRecord;
 use super::warning::Warning;
+use crate::design::units;
 use crate::statistics::stats;
+use crate::text::number;
 
 /// No die moves faster over 10 K, K/s: a chamber's ramp makes 0.2, power-on and hot air 0.5. Ramps
 /// of 1.5 K/min and more are told from it when their minutes pass for seconds.
 const FASTEST_K_PER_S: f64 = 1.5;
+
+/// Rows further apart make no thermal record, s (convention).
+const MOST_STEP_S: f64 = 3600.0;
 
 /// Movement that counts as such, K.
 const LEAST_MOVE_K: f64 = 10.0;
@@ -167,12 +172,54 @@ fn too_short(record: &ThermalRecord) -> Option<Warning> {
             "time_step_implausible",
             "time_s",
             format!(
-                "die_degc moves by {LEAST_MOVE_K} K and more at {fastest:.2} K/s, faster than a die can. time_s looks like \
-                 minutes. If it is, say so: {}",
-                record.unit_in_design("time_s", "min")
+                "die_degc moves by {LEAST_MOVE_K} K and more at {fastest:.2} K/s, faster than a die can. {}",
+                slower_units(record, fastest)
             ),
         )
     })
+}
+
+/// How far apart the rows are as the times were understood, the units in which the die is slow enough, and the line to write
+/// for the first of them.
+fn slower_units(record: &ThermalRecord, fastest_k_per_s: f64) -> String {
+    const UNITS: [&str; 6] = ["us", "ms", "s", "min", "h", "d"];
+    let taken = record.units.get("time_s");
+    let (name, times) = taken.map_or(("s", 1.0), |u| (u.name, u.times));
+    let steps: Vec<f64> = record.time_s.windows(2).map(|w| w[1] - w[0]).collect();
+    let step_s = stats::median(&steps);
+    let column = record
+        .renamed
+        .get("time_s")
+        .map_or("time_s", String::as_str);
+    let units: Vec<(&str, f64)> = UNITS
+        .iter()
+        .filter_map(|unit| Some((*unit, units::parse(unit)?.times / times)))
+        .filter(|(_, longer)| fastest_k_per_s <= FASTEST_K_PER_S * longer)
+        .filter(|(_, longer)| longer * step_s <= MOST_STEP_S)
+        .take(2)
+        .collect();
+    let as_taken = format!(
+        "Column {column} is taken as {name}, and its rows are {} s apart then (median)",
+        number(step_s, 3)
+    );
+    let each: Vec<String> = units
+        .iter()
+        .map(|(unit, longer)| {
+            format!(
+                "in {unit} they are {} s apart, and the die moves at {} K/s",
+                number(longer * step_s, 3),
+                number(fastest_k_per_s / longer, 3)
+            )
+        })
+        .collect();
+    match units.first() {
+        Some((unit, _)) => format!(
+            "{as_taken}; {}. If it is in {unit}, say so: {}",
+            each.join("; "),
+            record.line_for("time_s", unit)
+        ),
+        None => format!("{as_taken}. Correct the times in the file"),
+    }
 }
 
 /// The rows before and behind the largest step of a channel within a time.
@@ -211,6 +258,31 @@ mod tests {
         for unit in [10.0 / 60.0, 10_000.0] {
             let found = codes(header, row(unit));
             assert_eq!(found, ["error_values", "time_step_implausible"], "{unit}");
+        }
+    }
+
+    #[test]
+    fn seconds_under_a_name_of_milliseconds_get_a_whole_sentence() {
+        let die = |k: f64| 70.0 - (70.0 - k / 3.0).abs();
+        let rows: String = (0..400)
+            .map(f64::from)
+            .map(|k| format!("{},{},{}\n", 10.0 * k, (k * 1.7).sin(), die(k)))
+            .collect();
+        let text = format!("t_ms,rate_out_dps,die_degc\n{rows}");
+        let mapping = RecordMapping {
+            columns: [("time_s".to_owned(), "t_ms".into())].into(),
+            ..RecordMapping::default()
+        };
+        let (_, warnings) = parse(text.as_bytes(), Path::new("r.csv"), &mapping).unwrap();
+        let found = warnings.iter().find(|w| w.code == "time_step_implausible");
+        let said = found.expect("a warning").message.clone();
+        for piece in [
+            "Column t_ms is taken as ms",
+            "in s they are 10",
+            "rename the column in the file",
+            "time_s = { column = \"x\", unit = \"s\" }",
+        ] {
+            assert!(said.contains(piece), "{piece}: {said}");
         }
     }
 
