@@ -11,6 +11,8 @@ use std::path::Path;
 
 /// Rows of numbers in a row that make the first of them the first row (convention: a preamble has single ones).
 pub(super) const ROWS_OF_A_TABLE: usize = 3;
+/// What the names of the drive's and of the sense's column contain.
+const WORDS: [[&str; 2]; 2] = [["drive", "drv"], ["sense", "sns"]];
 /// Most columns that are listed in a message (convention).
 const MOST_LISTED: usize = 20;
 
@@ -61,6 +63,9 @@ pub(super) fn table(
         );
         error.source_line = lines.get(k).map(|l| l.trim_end().to_owned());
         return Err(error.into());
+    }
+    if let Some((k, count)) = ragged_row(&lines[..before], separator, width) {
+        return Err(wrong_count((path, number + k), lines[k], count, width).into());
     }
     if let Some(k) = damaged_row(&lines[..before], lines[before], separator) {
         let mut error = InputError::new(
@@ -302,6 +307,64 @@ fn damaged_row(before: &[&str], row: &str, separator: u8) -> Option<usize> {
     found
 }
 
+/// The first of the rows between the names of the columns and the first whole row that has not as many cells, and how many it
+/// has: it would end as a part of the preamble. A number under a line with one name, or beside a number, is a preamble's.
+fn ragged_row(before: &[&str], separator: u8, width: usize) -> Option<(usize, usize)> {
+    let is_number = |c: &String| number(c, separator).is_some();
+    let all: Vec<Vec<String>> = before.iter().map(|l| cells(l, separator)).collect();
+    let is_row = |c: &&Vec<String>| !c.is_empty() && c.iter().all(is_number);
+    let first = all.len() - all.iter().rev().take_while(is_row).count();
+    let names = &all[first.checked_sub(1)?];
+    if names.len() < 2 || names.iter().any(is_number) {
+        return None;
+    }
+    let ragged = (first..all.len()).find(|k| all[*k].len() != width)?;
+    Some((ragged, all[ragged].len()))
+}
+
+/// A row, on line `number`, with another count of cells than the others.
+fn wrong_count(
+    (path, number): (&Path, usize),
+    line: &str,
+    count: usize,
+    width: usize,
+) -> InputError {
+    let cells = match count {
+        1 => "1 cell".to_owned(),
+        n => format!("{n} cells"),
+    };
+    let mut error = InputError::new(format!("this row has {cells}, where {width} are wanted"))
+        .in_file(path)
+        .at(number, 1)
+        .help("repair the row or take it away");
+    error.source_line = Some(line.trim_end().to_owned());
+    error
+}
+
+/// Why a file whose first line (`number`) names the drive's and the sense's column is no table: no row, or one of another width.
+pub(super) fn no_rows((path, number): (&Path, usize), text: &str) -> Option<InputError> {
+    let lines: Vec<&str> = text.lines().collect();
+    let separator = separator(lines.get(..1)?);
+    let names = cells(lines[0], separator);
+    let says = |words: [&str; 2]| {
+        let mut lower = names.iter().map(|n| n.to_lowercase());
+        lower.any(|n| words.iter().any(|w| n.contains(w)))
+    };
+    if names.len() < 2 || !says(WORDS[0]) || !says(WORDS[1]) {
+        return None;
+    }
+    let rows = || (1..lines.len()).filter(|k| !lines[*k].trim().is_empty());
+    if rows().next().is_none() {
+        let error = InputError::new("the capture has a header and no rows");
+        let help = "capture again; each line after the header is a sample of drive and sense";
+        return Some(error.in_file(path).at(number, 1).help(help));
+    }
+    let count = |k: &usize| cells(lines[*k], separator).len();
+    let ragged = rows().find(|k| count(k) != names.len())?;
+    let at = (path, number + ragged);
+    Some(wrong_count(at, lines[ragged], count(&ragged), names.len()))
+}
+
 /// What instruments and programs write in place of a number that they do not have: names of no column.
 const MARKS: [&str; 12] = [
     "ovl",
@@ -378,12 +441,11 @@ fn used(
     keys: &BenchKeys,
 ) -> Result<[usize; 2]> {
     let mut out = [0; 2];
-    let words = [["drive", "drv"], ["sense", "sns"]];
     let parts = out
         .iter_mut()
         .zip(&keys.columns)
         .zip(BenchKeys::KEYS)
-        .zip(words);
+        .zip(WORDS);
     for (((place, asked), key), words) in parts {
         let is_meant = |name: &String| {
             let name = name.to_lowercase();

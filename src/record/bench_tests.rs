@@ -715,3 +715,42 @@ fn a_packed_csv_is_read_as_it_is() {
         Capture::new("scope.csv.gz", &packed[..packed.len() - 9]).beside("scope.toml", CHANNELS);
     assert!(cut.rows(Q15, 400).1.is_some());
 }
+
+#[test]
+fn rows_with_too_few_cells_are_named_and_never_dropped() {
+    let many: String = (0..9).map(|k| format!("{k},{k}\n")).collect();
+    for (text, expected) in [
+        (
+            "drive,sense\n".to_owned(),
+            "c.csv:1:1: error: the capture has a header and no rows",
+        ),
+        (
+            "drive,sense\n5\n".to_owned(),
+            "c.csv:2:1: error: this row has 1 cell, where 2 are wanted",
+        ),
+        (
+            "drive,sense\n5,6\n7\n".to_owned(),
+            "c.csv:3:1: error: this row has 1 cell, where 2 are wanted",
+        ),
+        (
+            format!("drive,sense\n5\n{many}"),
+            "c.csv:2:1: error: this row has 1 cell, where 2 are wanted",
+        ),
+        (
+            format!("drive,sense\n5,6\n7\n{many}"),
+            "c.csv:3:1: error: this row has 1 cell, where 2 are wanted",
+        ),
+    ] {
+        let (rows, error) = Capture::new("c.csv", text.as_bytes()).rows(Q15, 4);
+        let said = error.expect("an error").to_string();
+        let (place, message) = expected.split_once(" error: ").unwrap();
+        let line = place.strip_prefix("c.csv").unwrap();
+        assert!(
+            rows.is_empty() && said.contains(message) && said.contains(line),
+            "{text:?}: {said}"
+        );
+    }
+    // A preamble's count of samples is no row.
+    let text = format!("Samples\n9\n\ndrive,sense\n{many}");
+    assert_eq!(Capture::new("c.csv", text.as_bytes()).rows(Q15, 4).1, None);
+}

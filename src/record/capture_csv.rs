@@ -89,7 +89,8 @@ impl CsvSource {
                 let text = String::from_utf8_lossy(&bytes);
                 let found = bench_csv::table((path, number), &text, &keys, &mut meta)?;
                 let Some(table) = found.filter(|table| table.before > 0) else {
-                    return Err(e);
+                    let why = bench_csv::no_rows((path, number), &text);
+                    return Err(why.map_or(e, Error::from));
                 };
                 // The header's own line is taken already.
                 let skipped: Vec<usize> = bytes

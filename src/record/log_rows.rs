@@ -108,7 +108,7 @@ pub(super) fn record(
     error_values::take(&mut record, &mut warnings);
     stopped::take(&mut record, &mut warnings);
     dead::refuse(&record, path, None)?;
-    plausibility::check(&record, &mut warnings);
+    plausibility::check(&record, true, &mut warnings);
     frozen::check(&record, &mut warnings);
     Ok((record, warnings))
 }

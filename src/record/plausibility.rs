@@ -9,12 +9,15 @@ use super::temperature::temperature;
 use super::thermal::ThermalRecord;
 use super::warning::Warning;
 use super::{scale, timing};
+use crate::design::units;
 use crate::statistics::stats;
 use crate::text::number;
 use std::f64::consts::{PI, TAU};
 
 /// Adds a warning for each column whose values are unlikely.
-pub(super) fn check(record: &ThermalRecord, warnings: &mut Vec<Warning>) {
+///
+/// `says_rate` tells whether the design states the unit of the output's column.
+pub(super) fn check(record: &ThermalRecord, says_rate: bool, warnings: &mut Vec<Warning>) {
     for (name, values) in &record.columns {
         let column = Column {
             name,
@@ -26,7 +29,7 @@ pub(super) fn check(record: &ThermalRecord, warnings: &mut Vec<Warning>) {
             "phase_rad" => phase(&column),
             "rate_out_dps" => rate(&column)
                 .or_else(|| at_rest(&column))
-                .or_else(|| counts(&column))
+                .or_else(|| counts(&column, says_rate))
                 .or_else(|| not_given(&column)),
             "rate_dps" | "quad_dps" => rate(&column),
             "freq_hz" => frequency(&column),
@@ -253,12 +256,17 @@ const LEAST_COUNTED: usize = 20;
 const LEAST_COUNT: f64 = 100.0;
 
 /// Whole numbers of hundreds and more, none with a fraction: an output that nobody has scaled. With an applied rate the scale is
-/// judged by that.
-fn counts(c: &Column<'_>) -> Option<Warning> {
+/// judged by that. Where neither the design nor the column's name states a unit, smaller whole numbers are doubted too.
+fn counts(c: &Column<'_>, says_rate: bool) -> Option<Warning> {
+    let named = c.record.renamed.get(c.name).filter(|_| !says_rate);
+    let is_unstated = named.is_some_and(|n| units::stated(n, c.name).is_none());
     let sizes: Vec<f64> = c.sorted.iter().map(|v| v.abs()).collect();
     let is_whole = c.sorted.iter().all(|v| v.fract() == 0.0);
     let moves = c.max() > c.min();
-    let is_large = stats::median(&sizes) >= LEAST_COUNT;
+    let is_large = match is_unstated {
+        true => sizes.iter().any(|s| *s > 1.0),
+        false => stats::median(&sizes) >= LEAST_COUNT,
+    };
     if !(is_whole && moves && is_large && sizes.len() >= LEAST_COUNTED)
         || c.record.is_of_log()
         || has_applied_rate(c.record)
@@ -269,11 +277,15 @@ fn counts(c: &Column<'_>) -> Option<Warning> {
         "rate_in_counts",
         format!(
             "{} has whole numbers only, from {} to {}. It looks like raw counts and not like deg/s. Multiply raw counts by the gyro's \
-             scale (deg/s per LSB) first. If it is mdeg/s, say so: {}",
+             scale (deg/s per LSB) first. If it is mdeg/s, say so: {}{}",
             c.name,
             c.min(),
             c.max(),
-            c.record.unit_in_design(c.name, "mdps")
+            c.record.unit_in_design(c.name, "mdps"),
+            match is_unstated {
+                true => "; if it is deg/s, unit = \"dps\"",
+                false => "",
+            }
         ),
     )
 }

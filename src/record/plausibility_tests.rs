@@ -173,6 +173,28 @@ fn each_mistake_has_its_warning() {
 }
 
 #[test]
+fn whole_numbers_without_a_stated_unit_are_doubted() {
+    let said = |name: &str, unit: Option<&str>, fine: f64| {
+        let mut text = format!("time_s,{name}\n");
+        for k in 0..40 {
+            let k = f64::from(k);
+            text.push_str(&format!("{k},{}\n", 13.0 + fine * (k * 1.7).sin().round()));
+        }
+        let role = || "rate_out_dps".to_owned();
+        let mapping = RecordMapping {
+            columns: [(role(), name.into())].into(),
+            units: unit.map(|u| (role(), u.to_owned())).into_iter().collect(),
+            ..RecordMapping::default()
+        };
+        let (_, warnings) = parse(text.as_bytes(), Path::new("r.csv"), &mapping).unwrap();
+        warnings.iter().any(|w| w.code == "rate_in_counts")
+    };
+    assert!(said("gz", None, 1.0));
+    assert!(!said("gz", None, 0.5) && !said("gz", Some("dps"), 1.0));
+    assert!(!said("gz_dps", None, 1.0));
+}
+
+#[test]
 fn a_steady_large_output_without_a_rate_is_doubted() {
     let turned = |k: f64| format!("{k},{}", 150.5 + wiggle(k));
     assert_eq!(codes("time_s,rate_out_dps", turned), ["rate_not_given"]);

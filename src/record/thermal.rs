@@ -180,7 +180,8 @@ fn parse_text(
     enough(&record, last, &mut warnings)?;
     dead::refuse(&record, path, record.lines.first().copied())?;
     temperature::refuse(&record, header, &roles, mapping)?;
-    plausibility::check(&record, &mut warnings);
+    let says_rate = mapping.units.contains_key("rate_out_dps");
+    plausibility::check(&record, says_rate, &mut warnings);
     frozen::check(&record, &mut warnings);
     Ok((record, warnings))
 }
