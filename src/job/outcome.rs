@@ -217,6 +217,9 @@ pub fn single_readings(summary: &Summary, points: &Points) -> Option<String> {
 /// Share of drift and of rms from which on what is left is all that there was (convention).
 const NO_GAIN: f64 = 0.95;
 
+/// The same of the rms where the drift is what it was: its mean alone may have been taken off (convention).
+const HARDLY_LESS: f64 = 0.8;
+
 impl Outcome {
     /// Draws the conclusions.
     pub fn new(parts: Parts) -> Self {
@@ -245,13 +248,13 @@ impl Outcome {
         let apart = points.iter().map(|p| (p.fixed_dps - p.float_dps).abs());
         let on_record = points.iter().filter(|p| p.differs()).count() as u64;
         let gains_nothing = after.emitted.drift_pp_dps > NO_GAIN * before.drift_pp_dps
-            && after.emitted.rms_dps > NO_GAIN * before.rms_dps;
+            && after.emitted.rms_dps > HARDLY_LESS * before.rms_dps;
         let is_measured = parts.record_path.is_some();
         let no_gain = (is_measured && gains_nothing).then(|| {
             let rates = || parts.points.iter().map(|p| p.before_dps);
             let (low, high) = (rates().fold(f64::INFINITY, f64::min), rates().fold(f64::NEG_INFINITY, f64::max));
             let said = format!(
-                "the compensation takes nothing off: the rate runs from {} to {} deg/s before it and is no smaller after it. \
+                "the compensation takes nothing of the drift off: the rate runs from {} to {} deg/s before it and is no smaller after it. \
                  Either it does not follow {}, or the gyro was turned. Cut the rows in which it turned, or give the applied \
                  rate as rate_dps",
                 number(low, 4),
