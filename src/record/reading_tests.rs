@@ -69,7 +69,7 @@ fn a_last_cell_with_fewer_digits_and_no_line_end_is_told() {
     }
     // Where rows differ in their digits, fewer say nothing.
     let shortest = text.replace(",20.0\n", ",20\n");
-    let (_, warnings) = try_parse(shortest[..text.len() - 5].as_bytes(), &plain).unwrap();
+    let (_, warnings) = try_parse(&shortest.as_bytes()[..text.len() - 5], &plain).unwrap();
     assert!(
         warnings.iter().all(|w| w.code != "last_row_may_be_cut"),
         "{warnings:?}"
