@@ -101,7 +101,7 @@ const CASES: [Case; 8] = [
 fn random_polynomials_are_what_the_manual_says_and_within_their_bounds() {
     let mut dice = Dice(7);
     let mut ratios = Vec::new();
-    for k in 0..24 {
+    for k in 0..36 {
         let (function, domain, f) = CASES[dice.below(CASES.len() as u64) as usize];
         let folder = tempfile::tempdir().unwrap();
         let bits = 8 + dice.below(9);
