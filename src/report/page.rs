@@ -341,7 +341,7 @@ fn provenance(shown: &Shown) -> Vec<[String; 2]> {
         ),
         line("SHA-256 of the design as read", s.design_sha256.clone()),
         line(
-            "SHA-256 of the design with the fit, design.toml",
+            "SHA-256 of design.toml",
             sha256(fitted_design::text(shown.design).as_bytes()),
         ),
         line("record", s.record.clone().unwrap_or_else(|| own.to_owned())),
