@@ -89,7 +89,7 @@ fn here(design: &Design, periods: usize) -> (f64, u64) {
 fn touch(walk: &Walk) {
     const FAR: u64 = 1 << 40;
     const PAIRS: usize = 1 << 19;
-    let mut pairs = [vec![0.0; PAIRS], vec![0.0; PAIRS]];
+    let mut pairs = [vec![0f32; PAIRS], vec![0f32; PAIRS]];
     walk.fill(FAR, pairs.each_mut().map(|p| &mut p[..]));
 }
 

@@ -36,18 +36,30 @@ static inline void sin_cos(uint64_t phase,double*sine,double*cosine){
   double a=quarter&1?c:s, b=quarter&1?-s:c;
   *sine=quarter&2?-a:a; *cosine=quarter&2?-b:b;
 }
-static inline double logarithm(double x){
-  const uint64_t half=0x3fe6a09e667f3bcd, one=0x3ff0000000000000;
-  uint64_t bits; memcpy(&bits,&x,8); bits+=one-half;
-  int64_t e=(int64_t)(bits>>52)-1023; bits=(bits&(((uint64_t)1<<52)-1))+half; double m; memcpy(&m,&bits,8);
-  double s=(m-1)/(m+1), q=s*s;
-  double p=1.0/21; p=p*q+1.0/19; p=p*q+1.0/17; p=p*q+1.0/15; p=p*q+1.0/13; p=p*q+1.0/11; p=p*q+1.0/9; p=p*q+1.0/7; p=p*q+1.0/5; p=p*q+1.0/3; p=p*q+1;
-  return (double)e*0.693147180559945309417232121458+2*s*p;
+/* In single precision, a pair from 64 bits. */
+static inline void sin_cos_single(uint32_t phase,float*sine,float*cosine){
+  uint32_t quarter=(phase+((uint32_t)1<<29))>>30;
+  float x=(float)(int32_t)(phase-(quarter<<30))*(6.28318530717958647692f/4294967296.0f), q=x*x;
+  float s=1.0f/362880; s=s*q-1.0f/5040; s=s*q+1.0f/120; s=s*q-1.0f/6; s=(s*q+1.0f)*x;
+  float c=1.0f/40320; c=c*q-1.0f/720; c=c*q+1.0f/24; c=c*q-0.5f; c=c*q+1.0f;
+  float a=quarter&1?c:s, b=quarter&1?-s:c;
+  *sine=quarter&2?-a:a; *cosine=quarter&2?-b:b;
 }
-static inline void pair(stream g,uint64_t index,double*a,double*b){
+static inline float logarithm_single(float x){
+  const uint32_t half=0x3f3504f3, one=0x3f800000;
+  uint32_t bits; memcpy(&bits,&x,4); bits+=one-half;
+  int32_t e=(int32_t)(bits>>23)-127; bits=(bits&(((uint32_t)1<<23)-1))+half; float m; memcpy(&m,&bits,4);
+  float s=(m-1)/(m+1), q=s*s;
+  float p=1.0f/9; p=p*q+1.0f/7; p=p*q+1.0f/5; p=p*q+1.0f/3; p=p*q+1;
+  return (float)e*0.693147180559945309417f+2*s*p;
+}
+static inline void polar(int32_t radius,uint32_t angle,float*a,float*b){
+  float u=((float)radius+0.5f)*(1.0f/2147483648.0f), r=sqrtf(-2*logarithm_single(u)), s, c;
+  sin_cos_single(angle,&s,&c); *a=r*c; *b=r*s;
+}
+static inline void pair(stream g,uint64_t index,float*a,float*b){
   uint64_t bits=mix(mix(index*GOLDEN+g.inner)^g.outer);
-  double u=((double)(int64_t)(bits>>24)+0.5)*(1.0/1099511627776.0), r=sqrt(-2*logarithm(u)), s, c;
-  sin_cos(bits<<40,&s,&c); *a=r*c; *b=r*s;
+  polar((int32_t)(bits>>33),(uint32_t)bits,a,b);
 }
 
 /* ---- plant: eq. 5 to 9 ---- */
@@ -131,9 +143,9 @@ static void serial(const tabs*t,const plant*p,stream g,long periods,int32_t*rows
       double x=m[0][0]*w[0]+m[0][1]*w[1], u=m[1][0]*w[0]+m[1][1]*w[1];
       double y=m[2][0]*w[0]+m[2][1]*w[1]+m[2][2]*w[2]+m[2][3]*w[3], v=m[3][0]*w[0]+m[3][1]*w[1]+m[3][2]*w[2]+m[3][3]*w[3];
       w[0]=x;w[1]=u;w[2]=y;w[3]=v;
-      double a,c; pair(g,n,&a,&c);
+      float a,c; pair(g,n,&a,&c);
       double s=S[ph>>27],k=Co[ph>>27];
-      int64_t d=code(dr*s+di*k+p->row[0][0]*x+p->row[0][1]*u+p->drive_rms*a), q=code(sr*s+si*k+p->row[1][0]*y+p->row[1][1]*v+p->sense_rms*c);
+      int64_t d=code(dr*s+di*k+p->row[0][0]*x+p->row[0][1]*u+p->drive_rms*(double)a), q=code(sr*s+si*k+p->row[1][0]*y+p->row[1][1]*v+p->sense_rms*(double)c);
       uint32_t at=(ph+(1u<<19))>>20; int64_t ts=t->table[at], tc=t->table[(at+1024)&4095];
       int64_t pr[4]={sat(hu(d*ts,8),24),sat(hu(d*tc,8),24),sat(hu(q*ts,8),24),sat(hu(q*tc,8),24)};
       for(int j=0;j<4;j++){ In[j][0]+=pr[j]; In[j][1]+=In[j][0]; In[j][2]+=In[j][1]; }
@@ -147,7 +159,7 @@ static void block(const tabs*t,const plant*p,stream g,long periods,int32_t*rows)
   int64_t In[4][3]={{0}}, D[4][3]={{0}}; agc l={67108864,16384}; double w[4]={0}, gain=0.5;
   /* A period is a whole turn, so its carriers and its table entries never change. */
   double S[R],Co[R],F[6][R],P[4][4]; int32_t ts[R],tc[R],w2[R],w3[R];
-  static double na[AHEAD],nb[AHEAD];
+  static float na[AHEAD],nb[AHEAD]; static int32_t radius[AHEAD]; static uint32_t angle[AHEAD];
   memset(P,0,sizeof P); for(int i=0;i<4;i++) P[i][i]=1;
   for(int i=0;i<R;i++){
     sin_cos((uint64_t)(i+1)<<59,&S[i],&Co[i]);
@@ -158,12 +170,16 @@ static void block(const tabs*t,const plant*p,stream g,long periods,int32_t*rows)
     for(int k=0;k<4;k++) F[2+k][i]=p->row[1][0]*P[2][k]+p->row[1][1]*P[3][k];
   }
   for(long b=0;b<periods;b++){
-    int from=(int)(b*R%AHEAD); if(from==0) for(int i=0;i<AHEAD;i++) pair(g,(uint64_t)(b*R+i),&na[i],&nb[i]);
+    int from=(int)(b*R%AHEAD); 
+    if(from==0){
+      for(int i=0;i<AHEAD;i++){ uint64_t bits=mix(mix((uint64_t)(b*R+i)*GOLDEN+g.inner)^g.outer); radius[i]=(int32_t)(bits>>33); angle[i]=(uint32_t)bits; }
+      for(int i=0;i<AHEAD;i++) polar(radius[i],angle[i],&na[i],&nb[i]);
+    }
     double now=l.gain/32768.0; if(now!=gain){ change(p,now-gain,0,1,w); gain=now; }
     double dr=gain*creal(p->output[0]),di=gain*cimag(p->output[0]),sr=gain*creal(p->output[1]),si=gain*cimag(p->output[1]);
-    int32_t d[R],q[R]; const double*a=na+from,*c=nb+from; const double drms=p->drive_rms,srms=p->sense_rms;
-    for(int i=0;i<R;i++){ double v=dr*S[i]+di*Co[i]+w[0]*F[0][i]+w[1]*F[1][i]+drms*a[i]; v=v<-32768?-32768:v>32767?32767:v; int32_t z=(int32_t)v; double r=v-z; d[i]=z+(r>=0.5)-(r<-0.5); }
-    for(int i=0;i<R;i++){ double v=sr*S[i]+si*Co[i]+w[0]*F[2][i]+w[1]*F[3][i]+w[2]*F[4][i]+w[3]*F[5][i]+srms*c[i]; v=v<-32768?-32768:v>32767?32767:v; int32_t z=(int32_t)v; double r=v-z; q[i]=z+(r>=0.5)-(r<-0.5); }
+    int32_t d[R],q[R]; const float*a=na+from,*c=nb+from; const double drms=p->drive_rms,srms=p->sense_rms;
+    for(int i=0;i<R;i++){ double v=dr*S[i]+di*Co[i]+w[0]*F[0][i]+w[1]*F[1][i]+drms*(double)a[i]; v=v<-32768?-32768:v>32767?32767:v; int32_t z=(int32_t)v; double r=v-z; d[i]=z+(r>=0.5)-(r<-0.5); }
+    for(int i=0;i<R;i++){ double v=sr*S[i]+si*Co[i]+w[0]*F[2][i]+w[1]*F[3][i]+w[2]*F[4][i]+w[3]*F[5][i]+srms*(double)c[i]; v=v<-32768?-32768:v>32767?32767:v; int32_t z=(int32_t)v; double r=v-z; q[i]=z+(r>=0.5)-(r<-0.5); }
     double o[4]; for(int i=0;i<4;i++) o[i]=P[i][0]*w[0]+P[i][1]*w[1]+P[i][2]*w[2]+P[i][3]*w[3]; memcpy(w,o,sizeof o);
     int64_t sum[4];
     for(int j=0;j<4;j++){

@@ -52,7 +52,7 @@ pub struct Path {
     drive_lsb: Vec<f64>,
     sense_lsb: Vec<f64>,
     /// Noise of rms 1 of the drive and of the sense input.
-    noise: [Vec<f64>; 2],
+    noise: [Vec<f32>; 2],
     codes: [Vec<i32>; 2],
     rows: Rows,
     /// What the last period's samples were taken under.

@@ -120,7 +120,7 @@ impl Converter {
     }
 
     /// [`analog`](Self::analog) of inputs with noise of an rms added first, LSB; `noise` is of rms 1.
-    pub fn front_end(&self, inputs: &mut [f64], rms_lsb: f64, noise: &[f64]) {
+    pub fn front_end(&self, inputs: &mut [f64], rms_lsb: f64, noise: &[f32]) {
         pulp::Arch::new().dispatch(FrontEnd {
             converter: *self,
             inputs,
@@ -207,7 +207,7 @@ struct FrontEnd<'a> {
     converter: Converter,
     inputs: &'a mut [f64],
     rms_lsb: f64,
-    noise: &'a [f64],
+    noise: &'a [f32],
 }
 
 impl pulp::WithSimd for FrontEnd<'_> {
@@ -217,7 +217,7 @@ impl pulp::WithSimd for FrontEnd<'_> {
     fn with_simd<S: pulp::Simd>(self, _simd: S) {
         if self.rms_lsb != 0.0 {
             for (input, noise) in self.inputs.iter_mut().zip(self.noise) {
-                *input += self.rms_lsb * noise;
+                *input += self.rms_lsb * f64::from(*noise);
             }
         }
         if let Some(bend) = &self.converter.bend {

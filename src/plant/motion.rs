@@ -54,6 +54,11 @@ impl Power {
         }
     }
 
+    /// From (x, u) to (y, v) under these couplings.
+    fn coupled(&self, couplings: Couplings) -> Matrix2<f64> {
+        self.by_velocity * couplings.velocity + self.by_position * couplings.position
+    }
+
     fn times(&self, factor: f64) -> Power {
         Power {
             drive: self.drive * factor,
@@ -89,13 +94,22 @@ impl Power {
 }
 
 /// How the drive acts on the sense mode: by its velocity and by its displacement.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Couplings {
     /// Of the velocity u.
     pub velocity: f64,
     /// Of the displacement x.
     pub position: f64,
 }
+
+/// No samples.
+const NOT_MADE: (usize, Rows, Couplings) = {
+    let couplings = Couplings {
+        velocity: 0.0,
+        position: 0.0,
+    };
+    (0, [[0.0; 2]; 2], couplings)
+};
 
 /// What an ADC sees of the motion: of (x, u) the drive's, of (y, v) the sense channel's.
 pub type Rows = [[f64; 2]; 2];
@@ -107,12 +121,10 @@ pub struct Tables {
     powers: Vec<Power>,
     /// M.
     one: Power,
-    rows: Rows,
-    /// Samples that the outputs are made for.
-    made: usize,
-    /// What the ADCs see after n samples: the drive's of x and u; the sense channel's of y and v, of x and u
-    /// by the velocity, of x and u by the displacement.
-    outputs: [Values; 8],
+    /// What the outputs are made for: samples, and what they are seen by.
+    made: (usize, Rows, Couplings),
+    /// What the ADCs see after n samples: the drive's of x and u; the sense channel's of y and v, of x and u.
+    outputs: [Values; 6],
     /// What the excitation's phase advances by, 2^-64 turn, and for how many samples the next are made.
     carrier: (u64, usize),
     /// Sine and cosine of n steps.
@@ -126,9 +138,8 @@ impl Tables {
         Tables {
             powers: Vec::new(),
             one,
-            rows: [[0.0; 2]; 2],
-            made: 0,
-            outputs: [NO_VALUES; 8],
+            made: NOT_MADE,
+            outputs: [NO_VALUES; 6],
             carrier: (0, 0),
             sine: NO_VALUES,
             cosine: NO_VALUES,
@@ -139,7 +150,7 @@ impl Tables {
     pub fn set(&mut self, one: Power) {
         self.one = one;
         self.powers.clear();
-        self.made = 0;
+        self.made = NOT_MADE;
     }
 
     /// Both modes moved on by one sample.
@@ -147,7 +158,7 @@ impl Tables {
         &self.one
     }
 
-    fn prepare(&mut self, samples: usize, rows: Rows, step: u64) {
+    fn prepare(&mut self, samples: usize, rows: Rows, couplings: Couplings, step: u64) {
         while self.powers.len() < samples {
             let next = match self.powers.last() {
                 Some(last) => self.one.after(last),
@@ -155,21 +166,20 @@ impl Tables {
             };
             self.powers.push(next);
         }
-        if self.made < samples || self.rows != rows {
+        if self.made.0 < samples || (self.made.1, self.made.2) != (rows, couplings) {
             let [[dx, du], [dy, dv]] = rows;
             let seen = |m: &Matrix2<f64>, a, b| [a * m.m11 + b * m.m21, a * m.m12 + b * m.m22];
             for (n, power) in self.powers.iter().enumerate().take(samples) {
                 let pairs = [
                     seen(&power.drive, dx, du),
                     seen(&power.sense, dy, dv),
-                    seen(&power.by_velocity, dy, dv),
-                    seen(&power.by_position, dy, dv),
+                    seen(&power.coupled(couplings), dy, dv),
                 ];
                 for (to, value) in self.outputs.iter_mut().zip(pairs.as_flattened()) {
                     to.as_flattened_mut()[n] = *value;
                 }
             }
-            (self.made, self.rows) = (samples, rows);
+            self.made = (samples, rows, couplings);
         }
         if self.carrier.0 != step || self.carrier.1 < samples {
             let sine = &mut self.sine.as_flattened_mut()[..samples];
@@ -185,19 +195,19 @@ impl Tables {
         &self,
         chunk: usize,
         [drive, sense]: [[f64; 2]; 2],
-        [x, u, y, v, rx, ru, qx, qu]: [f64; 8],
+        [x, u, y, v]: [f64; 4],
     ) -> ([f64; WIDTH], [f64; WIDTH]) {
         let mut seen = ([0.0; WIDTH], [0.0; WIDTH]);
         if chunk >= PIECE / WIDTH {
             return seen;
         }
         let (sine, cosine) = (&self.sine[chunk], &self.cosine[chunk]);
-        let [a, b, c, d, e, f, g, h] = self.outputs.each_ref().map(|o| &o[chunk]);
+        let [a, b, c, d, e, f] = self.outputs.each_ref().map(|o| &o[chunk]);
         for n in 0..WIDTH {
             seen.0[n] = drive[0] * cosine[n] + drive[1] * sine[n] + (x * a[n] + u * b[n]);
         }
         for n in 0..WIDTH {
-            let free = (y * c[n] + v * d[n]) + (rx * e[n] + ru * f[n]) + (qx * g[n] + qu * h[n]);
+            let free = (y * c[n] + v * d[n]) + (x * e[n] + u * f[n]);
             seen.1[n] = sense[0] * cosine[n] + sense[1] * sine[n] + free;
         }
         seen
@@ -218,20 +228,18 @@ impl Tables {
         sense_lsb: &mut [f64],
     ) {
         let samples = drive_lsb.len();
-        self.prepare(samples, rows, step);
+        self.prepare(samples, rows, couplings, step);
         let [x, u, y, v] = *deviation;
-        let (r, q) = (couplings.velocity, couplings.position);
-        let weights = [x, u, y, v, r * x, r * u, q * x, q * u];
         pulp::Arch::new().dispatch(Piece {
             tables: self,
             steady,
-            weights,
+            deviation: *deviation,
             drive: drive_lsb,
             sense: sense_lsb,
         });
         if let Some(all) = samples.checked_sub(1).and_then(|k| self.powers.get(k)) {
             let (d, s) = (&all.drive, &all.sense);
-            let c = all.by_velocity * r + all.by_position * q;
+            let c = all.coupled(couplings);
             *deviation = [
                 d.m11 * x + d.m12 * u,
                 d.m21 * x + d.m22 * u,
@@ -265,7 +273,7 @@ impl pulp::WithSimd for Carrier<'_> {
 struct Piece<'a> {
     tables: &'a Tables,
     steady: [[f64; 2]; 2],
-    weights: [f64; 8],
+    deviation: [f64; 4],
     drive: &'a mut [f64],
     sense: &'a mut [f64],
 }
@@ -279,10 +287,10 @@ impl pulp::WithSimd for Piece<'_> {
         let (sense, sense_rest) = self.sense.as_chunks_mut::<WIDTH>();
         let whole = drive.len();
         for (chunk, (drive, sense)) in drive.iter_mut().zip(sense).enumerate() {
-            (*drive, *sense) = self.tables.eight(chunk, self.steady, self.weights);
+            (*drive, *sense) = self.tables.eight(chunk, self.steady, self.deviation);
         }
         if !drive_rest.is_empty() {
-            let (drive, sense) = self.tables.eight(whole, self.steady, self.weights);
+            let (drive, sense) = self.tables.eight(whole, self.steady, self.deviation);
             drive_rest.copy_from_slice(&drive[..drive_rest.len()]);
             sense_rest.copy_from_slice(&sense[..sense_rest.len()]);
         }
