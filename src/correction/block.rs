@@ -4,7 +4,7 @@
 //! The state needs no preparation beyond zeros: a step before which there was none restarts by itself.
 
 use super::formats::Formats;
-use super::plan::{MOST_INPUTS, MOST_OF_A_KIND, Plan, Term};
+use super::plan::{MOST_OF_A_KIND, Plan, Term};
 use super::rate_terms::{OnRate, passes};
 use super::states::Followed;
 use super::terms::{OnBias, Slots, exact, raw};
@@ -42,10 +42,6 @@ const DECAYS: Names = [
 ];
 const RELAYS: Names = [
     "relay_1", "relay_2", "relay_3", "relay_4", "relay_5", "relay_6", "relay_7", "relay_8",
-];
-/// Names of the inputs.
-pub const INPUTS: [&str; MOST_INPUTS] = [
-    "input_1", "input_2", "input_3", "input_4", "input_5", "input_6", "input_7", "input_8",
 ];
 
 /// A plan compiled to one step.
@@ -281,7 +277,8 @@ impl Step {
 
 /// The ports of the inputs in order, of the rate, and of what comes out.
 fn ports(plan: &Plan, formats: &Formats) -> Vec<Port> {
-    let inputs = plan.inputs.iter().zip(&formats.inputs).zip(INPUTS);
+    let names = plan.input_names();
+    let inputs = plan.inputs.iter().zip(&formats.inputs).zip(names);
     let mut ports: Vec<Port> = inputs
         .map(|((input, format), name)| {
             let scale = Scale {

@@ -5,7 +5,6 @@
 //! reading is taken to within half a turn of the offset, every other row to within half a turn of the first one. A
 //! reading whose phase crosses the word's ends has the mean that it would have elsewhere.
 
-use super::block::INPUTS;
 use super::formats::Formats;
 use super::rows::{self, Column, Source};
 use super::run::{Calls, Correction};
@@ -45,6 +44,8 @@ pub struct Conversion {
 #[derive(Debug, Clone)]
 struct Channel {
     column: Column,
+    /// Of what comes out: that of the correction's input.
+    name: &'static str,
     /// Position among the correction's inputs; `None` = its rate.
     input: Option<usize>,
     /// Subtracted from each row, raw.
@@ -150,7 +151,7 @@ impl Conversion {
         facts.extend(self.channels.iter().map(|c| {
             format!(
                 "{} = the mean of {}: {}; at most {} LSB from the exact mean",
-                c.name(),
+                c.name,
                 c.column.source.name(),
                 c.meaning,
                 at_most(c.error_lsb, 3)
@@ -290,7 +291,10 @@ impl Channel {
         let of_rest = (rest_exact - rest_exact.round()).abs();
         let of_multiplier = (multiplier / (factor * pow2(q)) - 1.0).abs() * pow2(width - 1);
         let scaling = chosen.map_or("deg/s".to_owned(), |(input, _)| input.formula());
+        let names = correction.plan.input_names();
+        let name = input.and_then(|k| names.get(k).copied());
         Channel {
+            name: name.unwrap_or("rate"),
             input,
             offset: offset as i128,
             sum: Ring::cyclic(sum_bits, 0),
@@ -302,12 +306,6 @@ impl Channel {
             meaning: format!("{scaling}, {format}, saturated; {}", column.unit()),
             column: column.clone(),
         }
-    }
-
-    /// The name of what comes out, which is that of the correction's input.
-    fn name(&self) -> &'static str {
-        let input = self.input.and_then(|k| INPUTS.get(k));
-        input.copied().unwrap_or("rate")
     }
 
     /// The sum of N rows as a word of the correction.
@@ -347,7 +345,7 @@ impl<A: Arithmetic, const N: usize> Block<A, N, N> for Conversion {
 
     fn outputs(&self) -> [Port; N] {
         std::array::from_fn(|k| match k.checked_sub(1).map(|k| self.channels.get(k)) {
-            Some(Some(c)) => Port::new(c.name(), c.meaning.clone()),
+            Some(Some(c)) => Port::new(c.name, c.meaning.clone()),
             _ => Port::new(
                 "complete",
                 "1 = the words beside it are a reading's, else 0",

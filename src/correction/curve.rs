@@ -24,10 +24,10 @@ pub struct Curve {
 }
 
 impl Curve {
-    /// Number `number` of the plan's curves, its entries and results on 2^-`fraction_bits`.
+    /// Number `number` of the plan's curves over an input of a name, its entries and results on 2^-`fraction_bits`.
     pub fn new(
         number: usize,
-        input: usize,
+        (input, name): (usize, &str),
         input_bits: i32,
         values: &[f64],
         fraction_bits: i32,
@@ -41,8 +41,7 @@ impl Curve {
             table: Table {
                 name: NAMES.get(number).copied().unwrap_or("curve"),
                 note: format!(
-                    "Knots of a curve over {} from -1 to 1, in units of 2^-{fraction_bits}",
-                    name(input)
+                    "Knots of a curve over {name} from -1 to 1, in units of 2^-{fraction_bits}"
                 ),
                 entries: values.iter().map(entry).collect(),
                 fraction_bits,
@@ -102,9 +101,4 @@ impl Curve {
         let (least, largest) = self.range();
         ar.within(sum, least, largest)
     }
-}
-
-/// An input's name in the emitted sources; `k` counts from 0.
-pub(super) fn name(k: usize) -> String {
-    format!("input_{}", k + 1)
 }

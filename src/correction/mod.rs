@@ -11,6 +11,7 @@ pub mod conversion;
 mod curve;
 mod formats;
 mod gain;
+mod names;
 mod plan;
 mod rate_terms;
 pub mod rows;

@@ -1,6 +1,5 @@
 //! A correction in sentences: what the head of its emitted sources says.
 
-use super::curve::name;
 use super::plan::{Plan, Term, in_words};
 use super::run::Correction;
 use crate::text::{at_most, number};
@@ -16,15 +15,18 @@ pub fn facts(correction: &Correction) -> Vec<String> {
         number(formats.noise_dps, 3)
     ));
     let inputs = plan.inputs.iter().zip(&formats.inputs);
-    facts.extend(inputs.enumerate().map(|(k, (input, format))| {
+    let names = plan.input_names();
+    facts.extend(inputs.zip(&names).map(|((input, format), name)| {
         format!(
-            "{} = {}, {format}, rounded and held within -1 to 1",
-            name(k),
+            "{name} = {}, {format}, rounded and held within -1 to 1",
             input.formula()
         )
     }));
-    let mut curves = 0;
-    facts.extend(plan.terms.iter().map(|t| sentence(t, &mut curves)));
+    let mut said = Said {
+        names: &names,
+        curves: 0,
+    };
+    facts.extend(plan.terms.iter().map(|t| said.sentence(t)));
     facts.extend(outlasting(plan));
     let relay = match plan.terms.iter().any(|t| matches!(t, Term::Step { .. })) {
         true => " and no step switches at another reading",
@@ -79,127 +81,186 @@ fn outlasting(plan: &Plan) -> Option<String> {
     ))
 }
 
-/// A term; `curves` counts the tables so far.
-fn sentence(term: &Term, curves: &mut usize) -> String {
-    match term {
-        Term::ScaleBy { .. } | Term::Cubic { .. } | Term::Even { .. } => {
-            format!("error on the rate r: {}", on_rate(term))
-        }
-        _ => {
-            let said = on_bias(term, curves);
-            // What is subtracted with a minus is added.
-            match said.strip_prefix('-') {
-                Some(said) => format!("added: {said}"),
-                None => format!("subtracted: {said}"),
+/// The inputs' names, and how many tables of curves there are so far.
+struct Said<'a> {
+    names: &'a [&'static str],
+    curves: usize,
+}
+
+impl Said<'_> {
+    fn name(&self, input: usize) -> &'static str {
+        self.names.get(input).copied().unwrap_or_default()
+    }
+
+    /// A term.
+    fn sentence(&mut self, term: &Term) -> String {
+        match term {
+            Term::ScaleBy { .. } | Term::Cubic { .. } | Term::Even { .. } => {
+                format!("error on the rate r: {}", self.on_rate(term))
+            }
+            _ => {
+                let said = self.on_bias(term);
+                // What is subtracted with a minus is added.
+                match said.strip_prefix('-') {
+                    Some(said) => format!("added: {said}"),
+                    None => format!("subtracted: {said}"),
+                }
             }
         }
     }
-}
 
-/// What a term on the bias subtracts, deg/s.
-fn on_bias(term: &Term, curves: &mut usize) -> String {
-    match term {
-        Term::Product { gain_dps, factors } => {
-            let powers = factors.iter().map(|(input, power)| match power {
-                1 => format!(" * {}", name(*input)),
-                _ => format!(" * {}^{power}", name(*input)),
-            });
-            format!(
-                "{gain_dps} deg/s{}",
-                powers.collect::<String>(),
-                gain_dps = in_words(*gain_dps)
-            )
-        }
-        Term::Lag {
-            gain_dps,
-            input,
-            tau_s,
-            kept,
-        } => {
-            let x = name(*input);
-            format!(
-                "{gain_dps} deg/s * ({x} - y), y = {x} after {}",
+    /// What a term on the bias subtracts, deg/s.
+    fn on_bias(&mut self, term: &Term) -> String {
+        match term {
+            Term::Product { gain_dps, factors } => {
+                let powers = factors.iter().map(|(input, power)| match power {
+                    1 => format!(" * {}", self.name(*input)),
+                    _ => format!(" * {}^{power}", self.name(*input)),
+                });
+                format!(
+                    "{gain_dps} deg/s{}",
+                    powers.collect::<String>(),
+                    gain_dps = in_words(*gain_dps)
+                )
+            }
+            Term::Lag {
+                gain_dps,
+                input,
+                tau_s,
+                kept,
+            } => {
+                let x = self.name(*input);
+                format!(
+                    "{gain_dps} deg/s * ({x} - y), y = {x} after {}",
+                    lag(*tau_s, *kept),
+                    gain_dps = in_words(*gain_dps)
+                )
+            }
+            Term::LagOfCurve {
+                gain_dps,
+                input,
+                values,
+                tau_s,
+                kept,
+            } => format!(
+                "{gain_dps} deg/s * (c - y), c = {}, y = c after {}",
+                self.curve(*input, values),
                 lag(*tau_s, *kept),
                 gain_dps = in_words(*gain_dps)
-            )
+            ),
+            Term::CurveOfLag {
+                gain_dps,
+                input,
+                values,
+                tau_s,
+                kept,
+            } => {
+                let x = self.name(*input);
+                format!(
+                    "{gain_dps} deg/s * (c({x}) - c(y)), c = {}, y = {x} after {}",
+                    self.curve(*input, values),
+                    lag(*tau_s, *kept),
+                    gain_dps = in_words(*gain_dps)
+                )
+            }
+            Term::Slope {
+                gain_dps_s,
+                input,
+                rows,
+            } => format!(
+                "{gain_dps_s} deg/s per 1/s * slope of {} over the last {rows} readings",
+                self.name(*input),
+                gain_dps_s = in_words(*gain_dps_s)
+            ),
+            Term::Decay { gain_dps, tau_s } => {
+                format!(
+                    "{gain_dps} deg/s * exp(-t / {tau_s} s), t since power-on",
+                    gain_dps = in_words(*gain_dps),
+                    tau_s = in_words(*tau_s)
+                )
+            }
+            Term::Curve { input, values_dps } => {
+                format!("{}, deg/s", self.curve(*input, values_dps))
+            }
+            Term::Step { .. } => self.step(term),
+            // On the rate, not on the bias.
+            Term::ScaleBy { .. } | Term::Cubic { .. } | Term::Even { .. } => self.on_rate(term),
         }
-        Term::LagOfCurve {
-            gain_dps,
-            input,
-            values,
-            tau_s,
-            kept,
-        } => format!(
-            "{gain_dps} deg/s * (c - y), c = {}, y = c after {}",
-            curve(*input, values, curves),
-            lag(*tau_s, *kept),
-            gain_dps = in_words(*gain_dps)
-        ),
-        Term::CurveOfLag {
-            gain_dps,
-            input,
-            values,
-            tau_s,
-            kept,
-        } => {
-            let x = name(*input);
-            format!(
-                "{gain_dps} deg/s * (c({x}) - c(y)), c = {}, y = {x} after {}",
-                curve(*input, values, curves),
-                lag(*tau_s, *kept),
-                gain_dps = in_words(*gain_dps)
-            )
-        }
-        Term::Slope {
-            gain_dps_s,
-            input,
-            rows,
-        } => format!(
-            "{gain_dps_s} deg/s per 1/s * slope of {} over the last {rows} readings",
-            name(*input),
-            gain_dps_s = in_words(*gain_dps_s)
-        ),
-        Term::Decay { gain_dps, tau_s } => {
-            format!(
-                "{gain_dps} deg/s * exp(-t / {tau_s} s), t since power-on",
-                gain_dps = in_words(*gain_dps),
-                tau_s = in_words(*tau_s)
-            )
-        }
-        Term::Curve { input, values_dps } => {
-            format!("{}, deg/s", curve(*input, values_dps, curves))
-        }
-        Term::Step { .. } => step(term),
-        // On the rate, not on the bias.
-        Term::ScaleBy { .. } | Term::Cubic { .. } | Term::Even { .. } => on_rate(term),
     }
-}
 
-fn step(term: &Term) -> String {
-    let Term::Step {
-        gain_dps,
-        input,
-        centre,
-        gap,
-        once,
-    } = term
-    else {
-        return String::new();
-    };
-    let (x, on, off) = (name(*input), centre + gap / 2.0, centre - gap / 2.0);
-    match once {
-        true => format!(
-            "{gain_dps} deg/s from the first {x} >= {on} on, never off again",
-            gain_dps = in_words(*gain_dps),
-            on = in_words(on)
-        ),
-        false => format!(
-            "{gain_dps} deg/s while on: on from {x} >= {on}, off below {off}; at power-on, on from {centre}",
-            gain_dps = in_words(*gain_dps),
-            on = in_words(on),
-            off = in_words(off),
-            centre = in_words(*centre)
-        ),
+    fn step(&self, term: &Term) -> String {
+        let Term::Step {
+            gain_dps,
+            input,
+            centre,
+            gap,
+            once,
+        } = term
+        else {
+            return String::new();
+        };
+        let (x, on, off) = (self.name(*input), centre + gap / 2.0, centre - gap / 2.0);
+        match once {
+            true => format!(
+                "{gain_dps} deg/s from the first {x} >= {on} on, never off again",
+                gain_dps = in_words(*gain_dps),
+                on = in_words(on)
+            ),
+            false => format!(
+                "{gain_dps} deg/s while on: on from {x} >= {on}, off below {off}; at power-on, on from {centre}",
+                gain_dps = in_words(*gain_dps),
+                on = in_words(on),
+                off = in_words(off),
+                centre = in_words(*centre)
+            ),
+        }
+    }
+
+    /// The next curve: its table holds the knots.
+    fn curve(&mut self, input: usize, values: &[f64]) -> String {
+        self.curves += 1;
+        format!(
+            "the line through the {} knots of table curve_{} over {}",
+            values.len(),
+            self.curves,
+            self.name(input)
+        )
+    }
+
+    /// The error that a term has on the rate r, deg/s.
+    fn on_rate(&self, term: &Term) -> String {
+        match term {
+            Term::ScaleBy { input, s0, s1, s2 } => match input.map(|k| self.name(k)) {
+                Some(x) if *s2 == 0.0 => {
+                    format!("r * ({s0}{s1} * {x})", s0 = in_words(*s0), s1 = added(*s1))
+                }
+                Some(x) => format!(
+                    "r * ({s0}{s1} * {x}{s2} * {x}^2)",
+                    s0 = in_words(*s0),
+                    s1 = added(*s1),
+                    s2 = added(*s2)
+                ),
+                None => format!("r * {s0}", s0 = in_words(*s0)),
+            },
+            Term::Cubic { ppm, rate_max_dps } => {
+                format!(
+                    "{ppm} ppm * r * (r / {rate_max_dps} deg/s)^2",
+                    ppm = in_words(*ppm),
+                    rate_max_dps = in_words(*rate_max_dps)
+                )
+            }
+            Term::Even { ppm, absolute, .. } if *absolute => {
+                format!("{ppm} ppm * abs(r)", ppm = in_words(*ppm))
+            }
+            Term::Even {
+                ppm, rate_max_dps, ..
+            } => format!(
+                "{ppm} ppm * r^2 / {rate_max_dps} deg/s",
+                ppm = in_words(*ppm),
+                rate_max_dps = in_words(*rate_max_dps)
+            ),
+            _ => String::new(),
+        }
     }
 }
 
@@ -215,56 +276,10 @@ fn lag(tau_s: f64, kept: bool) -> String {
     )
 }
 
-/// The next curve: its table holds the knots.
-fn curve(input: usize, values: &[f64], curves: &mut usize) -> String {
-    *curves += 1;
-    format!(
-        "the line through the {} knots of table curve_{curves} over {}",
-        values.len(),
-        name(input)
-    )
-}
-
 /// A constant in a sum, with its sign.
 fn added(value: f64) -> String {
     let sign = if value < 0.0 { '-' } else { '+' };
     format!(" {sign} {}", in_words(value.abs()))
-}
-
-/// The error that a term has on the rate r, deg/s.
-fn on_rate(term: &Term) -> String {
-    match term {
-        Term::ScaleBy { input, s0, s1, s2 } => match input.map(name) {
-            Some(x) if *s2 == 0.0 => {
-                format!("r * ({s0}{s1} * {x})", s0 = in_words(*s0), s1 = added(*s1))
-            }
-            Some(x) => format!(
-                "r * ({s0}{s1} * {x}{s2} * {x}^2)",
-                s0 = in_words(*s0),
-                s1 = added(*s1),
-                s2 = added(*s2)
-            ),
-            None => format!("r * {s0}", s0 = in_words(*s0)),
-        },
-        Term::Cubic { ppm, rate_max_dps } => {
-            format!(
-                "{ppm} ppm * r * (r / {rate_max_dps} deg/s)^2",
-                ppm = in_words(*ppm),
-                rate_max_dps = in_words(*rate_max_dps)
-            )
-        }
-        Term::Even { ppm, absolute, .. } if *absolute => {
-            format!("{ppm} ppm * abs(r)", ppm = in_words(*ppm))
-        }
-        Term::Even {
-            ppm, rate_max_dps, ..
-        } => format!(
-            "{ppm} ppm * r^2 / {rate_max_dps} deg/s",
-            ppm = in_words(*ppm),
-            rate_max_dps = in_words(*rate_max_dps)
-        ),
-        _ => String::new(),
-    }
 }
 
 #[cfg(test)]
@@ -290,8 +305,8 @@ mod tests {
                 }
             }
             let head = facts.join("\n");
-            for k in 0..plan.inputs.len() {
-                assert!(head.contains(&name(k)), "{} missing in: {head}", name(k));
+            for name in plan.input_names() {
+                assert!(head.contains(name), "{name} missing in: {head}");
             }
             let outlast = |t: &Term| t.is_kept() || matches!(t, Term::Step { once: true, .. });
             let remembers = plan.terms.iter().any(Term::remembers);
@@ -308,13 +323,16 @@ mod tests {
 
     #[test]
     fn every_term_reads_as_its_equation() {
-        let mut curves = 0;
-        let mut said = |term| sentence(&term, &mut curves);
+        let mut of_terms = Said {
+            names: &["die_temperature", "supply_voltage", "drive_gain"],
+            curves: 0,
+        };
+        let mut said = |term| of_terms.sentence(&term);
         let product = |gain_dps, factors| Term::Product { gain_dps, factors };
         assert_eq!(said(product(1.5, vec![])), "subtracted: 1.5 deg/s");
         assert_eq!(
             said(product(-2.0, vec![(0, 1), (2, 3)])),
-            "added: 2 deg/s * input_1 * input_3^3"
+            "added: 2 deg/s * die_temperature * drive_gain^3"
         );
         let values_dps = vec![0.0, 1.0, 0.5];
         assert_eq!(
@@ -322,7 +340,7 @@ mod tests {
                 input: 1,
                 values_dps
             }),
-            "subtracted: the line through the 3 knots of table curve_1 over input_2, deg/s"
+            "subtracted: the line through the 3 knots of table curve_1 over supply_voltage, deg/s"
         );
         let step = |once| Term::Step {
             gain_dps: 0.25,
@@ -333,7 +351,7 @@ mod tests {
         };
         assert_eq!(
             said(step(false)),
-            "subtracted: 0.25 deg/s while on: on from input_1 >= 0.75, off below 0.25; at power-on, on from 0.5"
+            "subtracted: 0.25 deg/s while on: on from die_temperature >= 0.75, off below 0.25; at power-on, on from 0.5"
         );
         let scale = |input, s2| Term::ScaleBy {
             input,
@@ -344,11 +362,11 @@ mod tests {
         assert_eq!(said(scale(None, 0.0)), "error on the rate r: r * 0.001");
         assert_eq!(
             said(scale(Some(0), 0.0)),
-            "error on the rate r: r * (0.001 + 0.5 * input_1)"
+            "error on the rate r: r * (0.001 + 0.5 * die_temperature)"
         );
         assert_eq!(
             said(scale(Some(0), -0.25)),
-            "error on the rate r: r * (0.001 + 0.5 * input_1 - 0.25 * input_1^2)"
+            "error on the rate r: r * (0.001 + 0.5 * die_temperature - 0.25 * die_temperature^2)"
         );
     }
 }

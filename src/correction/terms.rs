@@ -84,7 +84,8 @@ impl OnBias {
                 kept,
             } => {
                 let bits = lagged_curve_bits(formats, *gain_dps);
-                let x = Following::curve(curve(formats, *input, values, bits, slots), values);
+                let x =
+                    Following::curve(curve((plan, formats), *input, values, bits, slots), values);
                 lag(plan, formats, x, (*gain_dps, *tau_s, *kept), slots)
             }
             Term::CurveOfLag {
@@ -95,7 +96,7 @@ impl OnBias {
                 kept,
             } => {
                 let bits = lagged_curve_bits(formats, *gain_dps);
-                let of = curve(formats, *input, values, bits, slots);
+                let of = curve((plan, formats), *input, values, bits, slots);
                 let x = Following::input(formats, *input).read_through(of, values);
                 lag(plan, formats, x, (*gain_dps, *tau_s, *kept), slots)
             }
@@ -119,7 +120,7 @@ impl OnBias {
                 OnBias::Decay(Box::new(Decay::new(plan, formats, *gain_dps, *tau_s, slot)))
             }
             Term::Curve { input, values_dps } => {
-                OnBias::Curve(curve(formats, *input, values_dps, sum, slots))
+                OnBias::Curve(curve((plan, formats), *input, values_dps, sum, slots))
             }
             Term::Step {
                 gain_dps,
@@ -160,14 +161,16 @@ impl OnBias {
 
 /// The next curve, its results with `fraction_bits`.
 fn curve(
-    formats: &Formats,
+    (plan, formats): (&Plan, &Formats),
     input: usize,
     values: &[f64],
     fraction_bits: i32,
     slots: &mut Slots,
 ) -> Box<Curve> {
     let (number, input_bits) = (next(&mut slots.curves), formats.input_bits(input));
-    Box::new(Curve::new(number, input, input_bits, values, fraction_bits))
+    let name = plan.input_names().get(input).copied().unwrap_or_default();
+    let over = (input, name);
+    Box::new(Curve::new(number, over, input_bits, values, fraction_bits))
 }
 
 /// The next lag: gain, deg/s, time constant, s, and whether its state outlives a restart.

@@ -6,7 +6,7 @@ use super::emitted::EmittedFile;
 use super::files;
 use super::manifest::{self, Header, Manifest, PartEntry};
 use super::{conversion, correction, paths, stepped, vectors};
-use crate::correction::block::{self, INPUTS};
+use crate::correction::block;
 use crate::correction::conversion as glue;
 use crate::correction::rows::Source;
 use crate::correction::{Calls, Conversion, Correction};
@@ -269,8 +269,9 @@ impl Product<'_> {
     /// `complete`, the inputs that the chain has, `rate`.
     fn words(&self) -> Vec<&'static str> {
         let inputs = self.conversion.inputs();
+        let names = self.correction.plan.input_names();
         let mut words = vec!["complete"];
-        words.extend(inputs.iter().filter_map(|k| INPUTS.get(*k).copied()));
+        words.extend(inputs.iter().filter_map(|k| names.get(*k).copied()));
         words.push("rate");
         words
     }
@@ -309,13 +310,8 @@ impl Product<'_> {
         let plan = &self.correction.plan;
         let own = self.conversion.inputs();
         let mut views = Vec::new();
-        for (k, (input, format)) in plan
-            .inputs
-            .iter()
-            .zip(&self.correction.formats.inputs)
-            .enumerate()
-        {
-            let name = INPUTS.get(k).copied().unwrap_or_default();
+        let inputs = plan.inputs.iter().zip(&self.correction.formats.inputs);
+        for (k, ((input, format), name)) in inputs.zip(plan.input_names()).enumerate() {
             let ty = parameter(correct, block::STEP, k + 1)?;
             let is_own = own.contains(&k);
             let argument = |from: &str| {

@@ -203,10 +203,10 @@ mod tests {
     fn the_constants_are_told_with_the_step_of_the_code() {
         let (scale, range) = of_input(&correction(25.017, 50.09, 15));
         let r = Recipe::of(&scale, range).expect("a recipe");
-        let said = sentence("input_1", &scale, range, &r);
+        let said = sentence("die_temperature", &scale, range, &r);
         assert_eq!(
             said,
-            "input_1: code in steps of 0.001 degC (die_degc), C = 25017, M = 702423080, R = 536870912, S = 30, LOW = -32768, \
+            "die_temperature: code in steps of 0.001 degC (die_degc), C = 25017, M = 702423080, R = 536870912, S = 30, LOW = -32768, \
              HIGH = 32767; at most 0.50002 LSB from the exact word; offset = 25.017 degC, lsb = 0.00152862548828125 degC"
         );
         assert!((0.5..0.51).contains(&r.error_lsb), "{r:?}");
@@ -237,7 +237,7 @@ mod tests {
                 .expect("a README");
             for told in [
                 call,
-                "\ninput_1: code in steps of 0.001 degC (die_degc), C = 25017, ",
+                "\ndie_temperature: code in steps of 0.001 degC (die_degc), C = 25017, ",
                 "\nrate: code in steps of ",
             ] {
                 assert!(

@@ -141,15 +141,15 @@ fn all_parts_verify_together_and_the_c_example_runs() {
         let mut wrong = vec![
             ("row.sense_i", "row.sense_q"),
             ("row.phase", "row.phase + 1"),
-            ("words.rate);\n", "words.input_1);\n"),
+            ("words.rate);\n", "words.drive_phase);\n"),
             // The zeroed state restarts by itself.
             ("(reading == 0U) ? 1 : 0", "1"),
             ("words.complete != 0", "words.complete == 0"),
-            ("words.input_1,", "words.input_1 / 2,"),
+            ("words.drive_phase,", "words.drive_phase / 2,"),
         ];
         if phase_loop {
             wrong.push(("g.chain.nco.tuning_word", "g.chain.nco.phase"));
-            wrong.push(("words.input_3,", "0,"));
+            wrong.push(("words.drive_frequency,", "0,"));
         }
         for (from, to) in wrong {
             assert!(check.contains(from), "{from} is not in {check}");
