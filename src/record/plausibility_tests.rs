@@ -49,6 +49,55 @@ fn a_remedy_never_contradicts_the_columns_name() {
 }
 
 #[test]
+fn kelvin_and_fahrenheit_under_another_name_stop_alike() {
+    let read = |degc: fn(f64) -> f64, unit: Option<&str>| {
+        let mut text = "time_s,die_degc,rate_out_dps\n".to_owned();
+        for k in 0..40 {
+            let k = f64::from(k);
+            text.push_str(&format!("{k},{},{}\n", degc(k), wiggle(k)));
+        }
+        let units = unit.map(|unit| ("die_degc".to_owned(), unit.to_owned()));
+        let mapping = RecordMapping {
+            units: units.into_iter().collect(),
+            ..RecordMapping::default()
+        };
+        parse(text.as_bytes(), Path::new("r.csv"), &mapping)
+    };
+    // (readings, what they look like, its unit, the warning where the design states degC)
+    type Case = (fn(f64) -> f64, &'static str, &'static str, &'static str);
+    let cases: [Case; 2] = [
+        (
+            |k| 260.0 + k,
+            "looks like kelvin (K)",
+            "K",
+            "temperature_in_kelvin",
+        ),
+        (
+            |k| 70.0 + 2.5 * k,
+            "looks like Fahrenheit (degF)",
+            "degF",
+            "temperature_in_fahrenheit",
+        ),
+    ];
+    for (degc, like, unit, code) in cases {
+        let text = read(degc, None).unwrap_err().to_string();
+        assert!(text.starts_with("r.csv:1:8: error: "), "{text}");
+        for part in [
+            like.to_owned(),
+            format!("die_degc = {{ column = \"x\", unit = \"{unit}\" }}"),
+            "die_degc = { column = \"die_degc\", unit = \"degC\" }".to_owned(),
+        ] {
+            assert!(text.contains(&part), "no {part} in {text}");
+        }
+        let (record, warnings) = read(degc, Some("degC")).expect("a stated unit");
+        assert!(warnings.iter().any(|w| w.code == code), "{warnings:?}");
+        assert_eq!(record.column("die_degc").map(|c| c[0]), Some(degc(0.0)));
+    }
+    // The hottest chamber that gyros are rated for, with their own heat.
+    assert!(read(|k| -40.0 + 4.5 * k, None).is_ok());
+}
+
+#[test]
 fn each_mistake_has_its_warning() {
     // (column, values, warning)
     type Case = (&'static str, fn(f64) -> f64, Option<&'static str>);

@@ -12,15 +12,19 @@ use crate::statistics::stats;
 /// Hotter than a gyro is, as a rule, degC: industrial parts end at 85, and heat themselves by some kelvin.
 const HOTTEST_DEGC: f64 = 105.0;
 
+/// No die of a gyro is hotter for long, degC: parts are rated to 125 at most, and heat themselves by less than 15 K.
+const NO_GYRO_DEGC: f64 = 140.0;
+
 /// Hotter than any die: silicon thermometers read up to 250 degC. No reading in kelvin is below the second.
 const NO_DIE_DEGC: f64 = 250.0;
 const COLDEST_K: f64 = 150.0;
 
-/// Refuses a thermometer in degC that half of the record's rows put where no die can be: firmware would take its
-/// readings for degC. Columns beside it are only warned of ([`temperature`]).
+/// Refuses a thermometer in degC whose readings put the gyro where none works and are usual ones in another unit:
+/// firmware would take them for degC. Where the design states the unit, and of columns beside it, there is a warning
+/// ([`temperature`]).
 ///
 /// # Errors
-/// Such a column, where its unit is declared: in the design, or in the header.
+/// Such a column, where it is declared: in the design, or in the header.
 pub(super) fn refuse(
     record: &ThermalRecord,
     header: Line<'_>,
@@ -29,20 +33,31 @@ pub(super) fn refuse(
 ) -> Result<()> {
     for name in ["die_degc", "chamber_degc"] {
         let sorted = stats::sorted(record.column(name).unwrap_or(&[]));
-        let quantile = |p: f64| stats::quantile_sorted(&sorted, p);
-        let is_kelvin = !sorted.is_empty()
-            && (NO_DIE_DEGC..=450.0).contains(&quantile(0.5))
-            && quantile(0.05) > COLDEST_K;
-        if !is_kelvin {
+        if sorted.is_empty() || mapping.units.contains_key(name) {
             continue;
         }
+        let quantile = |p: f64| stats::quantile_sorted(&sorted, p);
+        let (low, high) = (quantile(0.05), quantile(0.95));
+        let (why, like, unit) = if (NO_DIE_DEGC..=450.0).contains(&quantile(0.5)) && low > COLDEST_K
+        {
+            let why = format!("no die is at {NO_DIE_DEGC} degC and more in half of the rows");
+            (why, "kelvin (K)", "K")
+        } else if high > NO_GYRO_DEGC && is_fahrenheit(low, high) {
+            let why = format!("no gyro works above {NO_GYRO_DEGC} degC in a twentieth of the rows");
+            (why, "Fahrenheit (degF)", "degF")
+        } else {
+            continue;
+        };
         let message = format!(
-            "{name} runs from {:.2} to {:.2} degC, and no die is at {NO_DIE_DEGC} degC and more in half of the rows: it looks like \
-             kelvin (K)",
+            "{name} runs from {:.2} to {:.2} degC, and {why}: it looks like {like}",
             quantile(0.0),
             quantile(1.0)
         );
-        let help = format!("say the unit: {}", record.unit_in_design(name, "K"));
+        let help = format!(
+            "say the unit: {}; if it is degC all the same, state that: {}",
+            record.unit_in_design(name, unit),
+            record.unit_in_design(name, "degC")
+        );
         if mapping.places.contains_key(name) {
             return Err(columns::in_design(header, mapping, name, message, help).into());
         }
@@ -53,6 +68,16 @@ pub(super) fn refuse(
             .into());
     }
     Ok(())
+}
+
+fn celsius_of_fahrenheit(v: f64) -> f64 {
+    (v - 32.0) / 1.8
+}
+
+/// Whether readings between these are a gyro's in Fahrenheit, and too hot for one, as a rule, in degC.
+fn is_fahrenheit(low: f64, high: f64) -> bool {
+    let celsius = celsius_of_fahrenheit;
+    high > HOTTEST_DEGC && celsius(high) < 100.0 && celsius(low) > -60.0
 }
 
 /// Temperatures in Celsius: a median of 200 to 450 is a Kelvin reading of -73 to 177 degC; no
@@ -71,16 +96,15 @@ pub(super) fn temperature(c: &Column<'_>) -> Option<Warning> {
             ),
         );
     }
-    let celsius = |v: f64| (v - 32.0) / 1.8;
     let (low, high) = (c.quantile(0.05), c.quantile(0.95));
-    if high > HOTTEST_DEGC && celsius(high) < 100.0 && celsius(low) > -60.0 {
+    if is_fahrenheit(low, high) {
         return c.warn(
             "temperature_in_fahrenheit",
             format!(
                 "{name} runs from {range}, where no gyro is rated beyond 125 degC and few are heated beyond {HOTTEST_DEGC}. It \
                  looks like Fahrenheit ({:.1} to {:.1} degC). {}",
-                celsius(c.min()),
-                celsius(c.max()),
+                celsius_of_fahrenheit(c.min()),
+                celsius_of_fahrenheit(c.max()),
                 said("degF")
             ),
         );
