@@ -4,6 +4,7 @@ use crate::selftest::controls::Controls;
 use crate::statistics::blocks::Role;
 use crate::text::number;
 use crate::thermal::close::Closed;
+use crate::thermal::effects::covariate::of_another_axis;
 use crate::thermal::firmware::emitted::Emitted;
 use crate::verdict::{Closure, Verdict};
 use std::collections::BTreeSet;
@@ -137,8 +138,10 @@ fn covariates(c: &Closure) {
         .filter_map(|id| id.strip_prefix("covariate:"))
         .collect();
     for column in columns {
+        let meaning =
+            of_another_axis(column).map_or(String::new(), |meaning| format!(": {meaning}"));
         say!(
-            "covariate:{column}: a column of the record, {column}, that the output follows by a smooth curve. No mechanism is known. The \
+            "covariate:{column}: the output follows the record's column {column} by a smooth curve. No mechanism is known{meaning}. The \
              evidence is under this name in closure.json and report.html."
         );
     }

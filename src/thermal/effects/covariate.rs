@@ -1,7 +1,7 @@
 //! Auxiliary columns: any one of them may be a cause, by a smooth function of it.
 
 use super::{Bias, Candidate, Estimate, Missing, Point, Reported, Sheet, entry};
-use crate::record::columns::is_known;
+use crate::record::columns::{is_known, unit_of};
 use crate::thermal::channels::{Channels, lag, scaled};
 
 /// A candidate for each auxiliary column that moves, and for thermometers beside the model's own.
@@ -11,6 +11,15 @@ pub fn all(c: &Channels) -> Vec<Box<dyn Candidate>> {
         .filter(|name| !is_known(name) && c.moving(name).is_some())
         .map(|name| Box::new(Covariate { name: name.clone() }) as Box<dyn Candidate>)
         .collect()
+}
+
+/// What it means that the output follows a turn rate's column; `None` for other columns. The record cannot tell the two apart.
+pub fn of_another_axis(column: &str) -> Option<String> {
+    (unit_of(column) == "deg/s").then(|| {
+        format!(
+            "if {column} is another axis's rate, it stands for what moves both axes: a turn that both see (cross-axis sensitivity), or,              at rest, a cause that they share"
+        )
+    })
 }
 
 /// A smooth function of one column.
@@ -91,9 +100,9 @@ impl Candidate for Covariate {
             "firmware does not see {name} by itself; if it does in your gyro, give the curve as an [[effects]] formula in \
              {name} with compensable = true"
         );
-        if name.ends_with("_dps") {
+        if let Some(meaning) = of_another_axis(name) {
             said += &format!(
-                "; if {name} is another axis's rate, it is no cause of bias: leave that column out of the record unless it is meant"
+                "; {meaning}. Leave {name} out of the record, and `close` looks for that cause in the other columns"
             );
         }
         Some(said)
@@ -146,4 +155,33 @@ pub fn spline(x: &[f64], degrees: usize) -> Vec<Vec<f64>> {
         out.push(x.iter().map(|x| d(*x, *knot) - d(*x, before)).collect());
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn said(name: &str) -> String {
+        let columns =
+            ["rate_out_dps", "die_degc"].map(|name| (name.to_owned(), vec![1.0, 2.0, 3.0]));
+        let channels = Channels::new(&[0.0, 1.0, 2.0], &columns.into(), "die_degc", |t| t);
+        let channels = channels.expect("channels");
+        let covariate = Covariate { name: name.into() };
+        covariate
+            .obstacle(&channels, &Point::form(0))
+            .expect("an obstacle")
+    }
+
+    #[test]
+    fn another_axis_stands_for_what_moves_both() {
+        let meaning = of_another_axis("gy_dps").expect("a meaning");
+        assert!(meaning.contains("cross-axis sensitivity") && meaning.contains("share"));
+        let text = said("gy_dps");
+        assert!(
+            text.contains(&meaning) && !text.contains("no cause"),
+            "{text}"
+        );
+        assert_eq!(of_another_axis("humidity_pct"), None);
+        assert!(!said("humidity_pct").contains("axis"));
+    }
 }
