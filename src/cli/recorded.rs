@@ -132,7 +132,7 @@ fn ambiguous(inputs: &[PathBuf]) -> Option<String> {
 
 /// A word as a shell reads it back to the same bytes. What could end or garble a comment of the emitted sources (line
 /// ends, `*/`, characters that turn the direction of a line) is written as an escape.
-fn quoted(word: &OsStr) -> String {
+pub(super) fn quoted(word: &OsStr) -> String {
     let plain = |c: char| c.is_alphanumeric() || "-_./=,:+@%".contains(c);
     let simple = |c: char| plain(c) || (c.is_ascii() && !c.is_control());
     match word.to_str() {

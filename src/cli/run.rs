@@ -1,7 +1,7 @@
 //! `gyrogen run`: the main job, end to end.
 
 use super::alternatives;
-use super::recorded::Recorded;
+use super::recorded::{Recorded, quoted};
 use super::stages::Stages;
 use super::terminal::OutputFormat;
 use crate::emit::views::Language;
@@ -12,7 +12,7 @@ use crate::job::bound::Line;
 use crate::job::outcome::{Drift, Outcome};
 use crate::text::{at_most, constant};
 use crate::timing;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Fit the bias to a thermal record, round it to fixed point, emit C and Rust, build and compare them, report.
 ///
@@ -116,6 +116,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         talk!("{}", super::emit::lacks_correction("compensation"));
     }
     if outcome.holds() {
+        talk!("{}", next(arguments));
         return Ok(());
     }
     Err(Error::Check(format!(
@@ -124,7 +125,24 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     )))
 }
 
-fn print(outcome: &Outcome, out: &std::path::Path) {
+/// What comes after a run: the command that looks into the same record.
+fn next(arguments: &Arguments) -> String {
+    let of = |path: &Path| quoted(path.as_os_str());
+    let design = arguments.design.path();
+    let design = design.map_or(String::new(), |path| format!(" {}", of(path)));
+    let made = arguments.out.join("record.csv");
+    let record = of(arguments.record.as_deref().unwrap_or(&made));
+    let undo = match arguments.undo_correction {
+        true => " --undo-correction",
+        false => "",
+    };
+    format!(
+        "next: `gyrogen close{design} --record {record}{undo}` looks for causes of the drift that is left, and writes firmware against \
+         them"
+    )
+}
+
+fn print(outcome: &Outcome, out: &Path) {
     let s = &outcome.summary;
     if let Some([columns, rows]) = &outcome.parts.understood {
         say!("read: {columns}");

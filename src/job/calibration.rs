@@ -94,8 +94,8 @@ fn by_record(fit: &BaselineFit, simulated: bool) -> String {
     let given = format!("order {SIMULATED_ORDER} as given");
     match (simulated, fit.reason.strip_prefix(&given)) {
         (true, Some(rest)) if !rest.is_empty() => format!(
-            "order {SIMULATED_ORDER}, as in Chen et al. (2004), for the simulated run{rest}, which `run --record` of this run's record \
-             takes (fit.order = \"by_record\")"
+            "order {SIMULATED_ORDER}, as in Chen et al. (2004), for the simulated run{rest}, and `run --record` of this run's record takes \
+             that (fit.order = \"by_record\")"
         ),
         (false, _) if fit.order != SIMULATED_ORDER as usize => format!(
             "{} (for its simulated record `run` takes order {SIMULATED_ORDER} instead: fit.order = \"by_record\")",

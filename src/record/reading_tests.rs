@@ -35,6 +35,35 @@ fn what_is_tolerated_reads_the_same() {
 }
 
 #[test]
+fn what_was_read_is_told_in_the_contracts_order() {
+    let text = format!("t_ms,flow,temp,gx_dps\n{}\n", {
+        let rows = (0..20).map(|k| format!("{}000,{k},{},0.{}", k, 20 + k, k % 7));
+        rows.collect::<Vec<_>>().join("\n")
+    });
+    let mut columns = mapping(&[("rate_out_dps", "gx_dps"), ("die_degc", "temp")]);
+    columns.columns.insert("time_s".into(), "t_ms".into());
+    let (record, warnings) = try_parse(text.as_bytes(), &columns).unwrap();
+    assert_eq!(
+        record.understood(&columns),
+        "time_s from t_ms, rate_out_dps from gx_dps, die_degc from temp (degC assumed), flow"
+    );
+    assert_eq!(
+        record.rows_understood(&warnings),
+        "20, one every 1.000 s, not averaged (`average_s` in [record] does)"
+    );
+    // The design states the unit.
+    columns.units.insert("die_degc".into(), "degC".into());
+    let (record, _) = try_parse(text.as_bytes(), &columns).unwrap();
+    assert!(
+        record
+            .understood(&columns)
+            .contains("die_degc from temp, flow"),
+        "{}",
+        record.understood(&columns)
+    );
+}
+
+#[test]
 fn a_last_cell_with_fewer_digits_and_no_line_end_is_told() {
     let plain = RecordMapping::default();
     let whole = with_row(19, "19,0.500,39.0");

@@ -132,26 +132,28 @@ impl ThermalRecord {
         source.is_some_and(|s| s.contains('.')) && !self.columns.contains_key("rate_dps")
     }
 
-    /// Each column with its unit, and what the file calls it where that is another name: for a user to see how the file was
-    /// understood; `mapping` is what it was read with.
+    /// The columns, the contract's first and in its order, with what the file calls them where that is another name: for a user to
+    /// see how the file was understood. A unit is told where it was assumed; `mapping` is what the file was read with.
     pub fn understood(&self, mapping: &RecordMapping) -> String {
         let names = std::iter::once("time_s").chain(self.columns.keys().map(String::as_str));
+        let known = record_columns::KNOWN;
+        let place = |name: &&str| known.iter().position(|(k, _)| k == name);
+        let mut names: Vec<&str> = names.collect();
+        names.sort_by_key(|name| place(name).unwrap_or(known.len()));
         // A log's topics state their units.
         let assumed = |name: &str, file: &str| {
             let is_said = mapping.units.contains_key(name) || units::stated(file, name).is_some();
             !is_said && !self.is_of_log() && record_columns::unit_of(name) != "1"
         };
-        let said = names.map(|name| {
-            let unit = record_columns::unit_of(name);
-            match self.renamed.get(name) {
-                Some(file) if assumed(name, file) => {
-                    format!("{name} in {unit} (from {file}, whose name has no unit)")
-                }
-                Some(file) => format!("{name} in {unit} (from {file})"),
-                // An auxiliary column, whose unit nobody has said.
-                None if unit == "1" => format!("{name} as it is"),
-                None => format!("{name} in {unit}"),
+        let said = names.into_iter().map(|name| match self.renamed.get(name) {
+            Some(file) if assumed(name, file) => {
+                format!(
+                    "{name} from {file} ({} assumed)",
+                    record_columns::unit_of(name)
+                )
             }
+            Some(file) => format!("{name} from {file}"),
+            None => name.to_owned(),
         });
         said.collect::<Vec<_>>().join(", ")
     }
@@ -168,7 +170,7 @@ impl ThermalRecord {
         }
         let steps: Vec<f64> = self.time_s.windows(2).map(|w| w[1] - w[0]).collect();
         format!(
-            "{}, one every {} s (median), each taken as it is (`average_s` in [record] averages them)",
+            "{}, one every {} s, not averaged (`average_s` in [record] does)",
             self.len(),
             number(stats::median(&steps), 4)
         )

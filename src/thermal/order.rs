@@ -95,9 +95,8 @@ pub fn choose(sample: &Sample, wanted: FitOrder, most: usize, blocks: &[Range<us
         FitOrder::Auto | FitOrder::ByRecord => (
             smallest,
             format!(
-                "order {smallest} is the smallest that may be as good as the best: order {best_order} has the least \
-                 held-out error, {best_rms:.4} deg/s rms, which is known to within one standard error, {limit:.4}, and \
-                 order {smallest} is below that"
+                "order {smallest}, the lowest whose held-out error is at most {limit:.4} deg/s rms: that is one standard error \
+                 above the least, {best_rms:.4} by order {best_order}"
             ),
         ),
     };
@@ -112,12 +111,11 @@ pub fn choose(sample: &Sample, wanted: FitOrder, most: usize, blocks: &[Range<us
             .map_or(best_rms, |r| r.0.heldout_clean_rms_dps);
         let given = t.heldout_clean_rms_dps;
         let least = match smallest == best_order {
-            true => "which is the least".to_owned(),
-            false => format!("the least is {best_rms:.4} by order {best_order}"),
+            true => "the least".to_owned(),
+            false => format!("the least is {best_rms:.4}, by order {best_order}"),
         };
         reason.push_str(&format!(
-            "; the lowest order whose held-out error is within one standard error of the least would be order {smallest} \
-             ({by_rule:.4} deg/s rms against {given:.4}; {least})"
+            ". By held-out error it would be order {smallest}: {by_rule:.4} deg/s rms against {given:.4} ({least})"
         ));
     }
     let heldout = chosen.map_or_else(HeldOut::nothing, |(_, h)| h.clone());

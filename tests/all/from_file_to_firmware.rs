@@ -89,6 +89,8 @@ fn a_record_of_each_kind_becomes_compiled_firmware() {
             assert!(said.contains(quantity), "{name}: {said}");
         }
         assert!(said.contains(", 0 mismatches"), "{name}: {said}");
+        let next = format!("next: `gyrogen close --record {name}` ");
+        assert!(complaints.contains(&next), "{name}: {complaints}");
         for file in [
             "firmware/c/manifest.json",
             "firmware/rust/manifest.json",
@@ -207,16 +209,15 @@ fn a_simulated_run_and_its_own_record_say_why_their_orders_differ() {
     let own = of(&["run", "--out", "own"]);
     let again = of(&["run", "--record", "own/record.csv", "--out", "again"]);
     assert!(
-        own.contains(": order 2,")
-            && own.contains("within one standard error of the least would be order 3 ("),
+        own.contains(": order 2,") && own.contains("By held-out error it would be order 3: "),
         "{own}"
     );
     assert!(
-        own.contains("which `run --record` of this run's record takes"),
+        own.contains("`run --record` of this run's record takes that"),
         "{own}"
     );
     assert!(
-        again.contains(": order 3 ")
+        again.contains(": order 3, the lowest ")
             && again.contains("for its simulated record `run` takes order 2 instead"),
         "{again}"
     );
