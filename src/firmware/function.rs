@@ -3,6 +3,7 @@
 use super::emitted::EmittedFile;
 use super::files;
 use super::manifest::{self, Header, Manifest};
+use super::recipe::Recipes;
 use super::vectors::{self, Checked};
 use super::view::View;
 use crate::emit::bundle::{Bundle, Part};
@@ -44,7 +45,7 @@ pub fn emit(what: &Standalone, language: Language) -> Result<Vec<EmittedFile>> {
     facts.push("words are two's complement; ranges beside them are proved, not observed".into());
     let mut view = View::new(&bundle, models, &[what.every], language, banner, facts);
     // The input is a number, no sensor's code.
-    view.recipes.clear();
+    view.recipes = Recipes::default();
     let mut emitted = files::sources(&view, Part::Compensation, language)?;
     emitted.extend_from_slice(what.vectors);
     emitted.push(vectors::of_tables(&view.tables));

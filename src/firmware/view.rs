@@ -1,7 +1,7 @@
 //! Everything that the templates of a bundle see.
 
 use super::example::{ByHand, ExampleView, example};
-use super::recipe;
+use super::recipe::{Recipes, own_words};
 use super::tested::{self, TestView, Tested};
 use super::vectors::{self, Checked};
 use crate::design::Design;
@@ -86,8 +86,10 @@ pub struct View {
     pub(super) long_restart: u64,
     pub(super) long_checksum: String,
     pub(super) example: Option<ExampleView>,
-    /// How a sensor's code becomes a word of the function that is called, a line each.
-    pub(super) recipes: Vec<String>,
+    /// How a sensor's code becomes a word of the function that is called.
+    pub(super) recipes: Recipes,
+    /// Where its words come from, if no sensor's code is one of them.
+    pub(super) own_words: &'static str,
 }
 
 impl View {
@@ -188,7 +190,8 @@ impl View {
             long_restart: stimulus::SEGMENT,
             long_checksum: String::new(),
             example,
-            recipes: called.map_or(Vec::new(), |f| recipe::sentences(&f.inputs)),
+            recipes: called.map_or_else(Recipes::default, |f| Recipes::of(&f.inputs)),
+            own_words: "",
             functions,
             tables,
         }
@@ -222,7 +225,7 @@ impl View {
         self.structs.clear();
         self.functions.clear();
         self.example = None;
-        self.recipes.clear();
+        self.recipes = Recipes::default();
         self.checks.clear();
         self.tests.clear();
         self.chain = false;
@@ -238,6 +241,8 @@ impl View {
     ) -> Self {
         let compensation = design.compensation.as_ref();
         self.fitted = compensation.is_some_and(|c| c.fitted.is_some());
+        let alone = compensation.filter(|_| !bundle.has_chain);
+        self.own_words = alone.map_or("", |c| own_words(&c.input));
         let code = design.circuit.adc.format;
         let code = Interval::new(code.min_raw(), code.max_raw());
         self.code = match language {
