@@ -10,7 +10,7 @@ pub mod proved;
 pub mod remarks;
 pub mod requirements;
 
-use crate::circuit::engine;
+use crate::circuit::{engine, vector_width};
 use crate::cosim::stream::stimulus;
 use crate::cost::{self, Target};
 use crate::design::Design;
@@ -44,7 +44,7 @@ pub fn check(design: &Design, command: &str, samples: usize) -> Result<Check> {
     let predictions = predicted::predict(design, &seen);
     let budget = budget::Budget::new(design, &seen, &predictions);
     let first = seen.first_overflow.as_ref();
-    let nodes: Vec<NodeCheck> = all
+    let mut nodes: Vec<NodeCheck> = all
         .iter()
         .map(|p| {
             let mut node = node(design, p, &budget);
@@ -67,7 +67,12 @@ pub fn check(design: &Design, command: &str, samples: usize) -> Result<Check> {
     let costs = targets.map(|t| cost::of_bundle(&bundle, t)).collect();
     let remarks = remarks::remarks(design, &nodes, &budget);
     let (requirements, confidence) = requirements::requirements(design)?;
-    let mut reasons: Vec<String> = nodes.iter().filter_map(NodeCheck::failure).collect();
+    let of_vector = vector_overflows(design, &mut nodes, samples)?;
+    let others = nodes
+        .iter()
+        .filter(|n| of_vector.is_none() || n.name != vector_width::KEY);
+    let mut reasons: Vec<String> = others.filter_map(NodeCheck::failure).collect();
+    reasons.splice(0..0, of_vector);
     reasons.extend(requirements.iter().filter_map(Requirement::failure));
     Ok(Check {
         schema: "gyrogen.check/1",
@@ -114,8 +119,56 @@ fn node(design: &Design, p: &Proved, budget: &budget::Budget) -> NodeCheck {
             Vec::new()
         },
         witness: None,
+        follows_from: None,
         budget: budget.line(&p.name),
     }
+}
+
+/// Why a CORDIC whose x and y wrap fails. The words that overflow through it alone are marked: the design is run again with
+/// the width that holds x and y.
+fn vector_overflows(
+    design: &Design,
+    nodes: &mut [NodeCheck],
+    samples: usize,
+) -> Result<Option<String>> {
+    let vector = nodes.iter().find(|n| n.name == vector_width::KEY);
+    let Some(vector) = vector.filter(|n| n.overflow == Overflows::Certain) else {
+        return Ok(None);
+    };
+    let Some(short) = vector_width::TooShort::of(design) else {
+        return Ok(None);
+    };
+    let (path, seen) = (vector.path.clone(), vector.seen());
+    let mut wide = design.clone();
+    wide.circuit.cordic.width = short.needs;
+    let (drive, sense) = stimulus(&wide, samples)?;
+    let again = run::run(&wide, &drive, &sense);
+    let again = budget::Budget::new(&wide, &again, &[]);
+    let mut followers = Vec::new();
+    let after = |n: &&mut NodeCheck| n.name != vector_width::KEY && path.contains(&n.name);
+    for node in nodes.iter_mut().filter(after) {
+        let Some(witness) = &node.witness else {
+            continue;
+        };
+        if again.nodes(&node.name).all(|n| n.overflows == 0) {
+            followers.push(format!("{} ({} words)", node.name, witness.words));
+            node.follows_from = Some(vector_width::KEY);
+        }
+    }
+    let mut reason = format!(
+        "{} overflows {} bits: {}. It happened to {seen}",
+        vector_width::KEY,
+        short.has,
+        short.sentence()
+    );
+    if !followers.is_empty() {
+        reason += &format!(
+            ". Overflows that follow from it, and are gone with `width = {}`: {}",
+            short.needs,
+            followers.join(", ")
+        );
+    }
+    Ok(Some(reason))
 }
 
 #[cfg(test)]

@@ -62,6 +62,8 @@ pub struct NodeCheck {
     pub path: Vec<String>,
     /// Overflows that were seen.
     pub witness: Option<Witness>,
+    /// The word whose overflow makes those of this one: without it none is seen here. Null where there is none.
+    pub follows_from: Option<&'static str>,
     /// What the word's own rounding does to the rate; null for a word that rounds nothing.
     pub budget: Option<Line>,
 }
@@ -83,11 +85,23 @@ impl NodeCheck {
 
     /// What makes the check fail, in a sentence.
     pub fn failure(&self) -> Option<String> {
-        if self.overflow != Overflows::Certain {
+        if self.overflow != Overflows::Certain || self.follows_from.is_some() {
             return None;
         }
+        Some(format!(
+            "{} overflows {} ({}): {}; path {}",
+            self.name,
+            self.format,
+            self.mode,
+            self.seen(),
+            self.path.join(" > ")
+        ))
+    }
+
+    /// What overflows, in words.
+    pub fn seen(&self) -> String {
         let [low, high] = self.proved;
-        let what = match &self.witness {
+        match &self.witness {
             Some(w) => {
                 let first = w
                     .sample
@@ -103,14 +117,7 @@ impl NodeCheck {
                 format!("{} words of the design's own gyro{first}", w.words)
             }
             None => format!("every value, {low} to {high}"),
-        };
-        Some(format!(
-            "{} overflows {} ({}): {what}; path {}",
-            self.name,
-            self.format,
-            self.mode,
-            self.path.join(" > ")
-        ))
+        }
     }
 }
 

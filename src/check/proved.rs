@@ -1,6 +1,6 @@
 //! The words of a design with the ranges that the traced program proves for them.
 
-use crate::circuit::CHANNELS;
+use crate::circuit::{CHANNELS, vector_width};
 use crate::design::Design;
 use crate::numeric::format::{Overflow, Rounding};
 use crate::numeric::trace::ir::{Function, Interval, Op, Program};
@@ -247,32 +247,23 @@ fn operands(function: &Function, cast: usize) -> Vec<[i128; 2]> {
     ranges.map(|r| [r.low, r.high]).collect()
 }
 
-/// x and y of the CORDIC: the widest of what comes in, is turned, and comes out of a step.
+/// x and y of the CORDIC. Where they can wrap, the range is what they would need to be whole.
 fn vector(design: &Design, program: &Program, cordic: &Function) -> Option<Proved> {
     let width = design.circuit.cordic.width;
-    let turned = cordic.loops.first().and_then(|l| l.outs.get(2)).copied();
-    let wraps = cordic
-        .nodes
-        .iter()
-        .enumerate()
-        .filter_map(|(id, n)| match n.op {
-            Op::Wrap(a, _) if Some(id) != turned => Some(cordic.nodes[a].range),
-            _ => None,
-        });
-    let widened = program.casts.iter().zip(&program.cast_ranges);
-    let widened = widened
-        .filter(|(c, _)| c.label.key == "circuit.cordic.guard_bits")
-        .filter_map(|(_, range)| *range);
-    let range = wraps.chain(widened).reduce(Interval::join)?;
+    let limits = Interval::of_bits(width);
+    let mut range = vector_width::range(program)?;
+    if !range.is_within(limits.low, limits.high) {
+        range = vector_width::of_a_wide_vector(design).unwrap_or(range);
+    }
     let inputs = cordic.inputs.iter().map(|(_, r)| [r.low, r.high]);
     Some(Proved {
-        name: "circuit.cordic.width".to_owned(),
+        name: vector_width::KEY.to_owned(),
         format: format!("{width} bits"),
         rounding: None,
         mode: "wrap",
         by_design: None,
         range,
-        limits: Interval::of_bits(width),
+        limits,
         operands: inputs.collect(),
     })
 }

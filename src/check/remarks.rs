@@ -3,6 +3,7 @@
 use super::budget::Budget;
 use super::outcome::{NodeCheck, Overflows};
 use crate::circuit::scale::{excitation_is_off, full_scale_is_off};
+use crate::circuit::vector_width::{self, TooShort};
 use crate::cosim::rest::rows_per_s;
 use crate::design::{Compensation, Design};
 use crate::equivalence::overflow;
@@ -178,6 +179,16 @@ fn dead_band(node: &NodeCheck, budget: &Budget, all: &mut Vec<Remark>) {
 /// Wrapping that is no turn of anything.
 fn wraps(design: &Design, node: &NodeCheck, all: &mut Vec<Remark>) {
     if node.overflow != Overflows::Possible || node.mode != "wrap" {
+        return;
+    }
+    let short = TooShort::of(design).filter(|_| node.name == vector_width::KEY);
+    if let Some(short) = short {
+        all.push(Remark {
+            code: "wrap_possible",
+            node: node.name.clone(),
+            message: format!("{}. A word that wraps has the other sign", short.what()),
+            mend: short.mend(),
+        });
         return;
     }
     all.push(Remark {

@@ -78,6 +78,54 @@ fn a_vector_that_is_too_narrow_overflows_for_certain_and_says_so() {
         "{:?}",
         c.reasons
     );
+    // What it needs is that of a vector that does not wrap.
+    assert_eq!(
+        vector.proved,
+        node(&checked(&[]), "circuit.cordic.width").proved
+    );
+    assert!(
+        c.reasons[0].contains("need 31 bits") && c.reasons[0].contains("write `width = 31`"),
+        "{:?}",
+        c.reasons
+    );
+}
+
+#[test]
+fn overflows_that_only_follow_from_a_narrow_vector_are_marked_and_no_reasons() {
+    let c = checked(&[("width = 32", "width = 26")]);
+    let bias = node(&c, "compensation.output bias");
+    assert_eq!(bias.overflow, Overflows::Certain, "{bias:?}");
+    assert_eq!(bias.follows_from, Some("circuit.cordic.width"));
+    assert_eq!(node(&c, "circuit.cordic.width").follows_from, None);
+    assert_eq!(c.reasons.len(), 1, "{:?}", c.reasons);
+    assert!(
+        c.reasons[0].contains("follow from it, and are gone with `width = 31`: compensation."),
+        "{:?}",
+        c.reasons
+    );
+    // An overflow that is there without it stays a reason.
+    let c = checked(&[
+        ("width = 32", "width = 26"),
+        (
+            "output = { format = \"Q12.12\"",
+            "output = { format = \"Q5.12\"",
+        ),
+    ]);
+    assert_eq!(node(&c, "compensation.output bias").follows_from, None);
+    assert!(c.reasons.len() > 1, "{:?}", c.reasons);
+}
+
+#[test]
+fn a_vector_that_may_wrap_is_told_its_width_and_line() {
+    let c = checked(&[("width = 32", "width = 29")]);
+    assert!(c.holds, "{:?}", c.reasons);
+    let remark = c.remarks.iter().find(|r| r.code == "wrap_possible");
+    let mend = &remark.expect("a remark").mend;
+    assert!(
+        mend.starts_with("in the embedded default design, line ")
+            && mend.ends_with(", write `width = 31`"),
+        "{mend}"
+    );
 }
 
 #[test]

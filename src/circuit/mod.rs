@@ -36,6 +36,7 @@ mod sample_lanes;
 #[cfg(target_arch = "x86_64")]
 mod sample_lanes_x86;
 pub mod scale;
+pub mod vector_width;
 
 /// The four channels, in the contract's order.
 pub const CHANNELS: [&str; 4] = ["drive_i", "drive_q", "sense_i", "sense_q"];

@@ -5,6 +5,7 @@ use super::{
     bound, circuit_tables, correction_table, device_tables, limits, study_tables, template,
     user_effects,
 };
+use crate::base_name::name_of;
 use crate::design::schema::*;
 use crate::digest::sha256;
 use crate::error::{Error, InputError, Result};
@@ -133,6 +134,14 @@ impl Design {
         // A design has been read from this text.
         let offset = DeTable::parse(doc.text).map_or(0, |root| locate(root.get_ref(), key));
         doc.error(offset, message)
+    }
+
+    /// The place of a dotted key as words, with the file's base name: `design.toml, line 63`.
+    pub fn place_of(&self, key: &str) -> String {
+        let place = self.error_at(key, "").position();
+        let file = place.file.as_deref();
+        let file = file.map_or("the embedded default design".to_owned(), name_of);
+        format!("{file}, line {}", place.line.unwrap_or(1))
     }
 }
 

@@ -3,6 +3,7 @@
 use super::against::{Against, FirstDifference};
 use super::overflow::{self, Repair};
 use super::predicted::Prediction;
+use crate::circuit::vector_width::{self, TooShort};
 use crate::design::Design;
 use crate::nodes::histogram::Histogram;
 use crate::nodes::node::Node;
@@ -123,6 +124,8 @@ pub struct FirstOverflow {
     pub path: Vec<String>,
     /// The smallest change that removes it; null if there is none within 64 and 127 bits.
     pub repair: Option<Repair>,
+    /// Of a `circuit.cordic.width` that is too short: what it needs, where it stands and what to write; else null.
+    pub mend: Option<String>,
 }
 
 impl FirstOverflow {
@@ -141,6 +144,10 @@ impl FirstOverflow {
             format: overflow::format_of(design, event.label.key),
             path: overflow::path(design, &event.part),
             repair,
+            mend: (event.label.key == vector_width::KEY)
+                .then(|| TooShort::of(design))
+                .flatten()
+                .map(|short| short.sentence()),
         })
     }
 
@@ -155,14 +162,15 @@ impl FirstOverflow {
             self.format,
             operands.join(" and ")
         );
-        match &self.repair {
-            Some(r) => {
+        match (&self.mend, &self.repair) {
+            (Some(mend), _) => text += &format!("; {mend}"),
+            (None, Some(r)) => {
                 text += &format!(
                     ". The smallest change that mends it: {} from {} to {}",
                     r.key, r.from, r.to
                 )
             }
-            None => {
+            (None, None) => {
                 text += ". No wider format within 64 bits a word and 127 an intermediate holds it"
             }
         }

@@ -1,5 +1,6 @@
 //! The first overflow: where it came from, where it goes, and the smallest format that removes it.
 
+use crate::circuit::vector_width::TooShort;
 use crate::design::{Design, limits};
 use crate::nodes::node::Node;
 use crate::nodes::probe::Seen;
@@ -19,7 +20,8 @@ pub struct Repair {
 
 /// The smallest change of the first overflowing node's format that holds every word which this run
 /// brought to it: integer bits are added, fraction bits kept; an unsigned format becomes signed if a
-/// word is negative. `None` if no format of 64 bits does, or the design would then need more than 127 bits.
+/// word is negative. `circuit.cordic.width` becomes what every ADC code needs (proved). `None` if no format of 64 bits does, or
+/// the design would then need more than 127 bits.
 pub fn smallest_repair(design: &Design, seen: &Seen) -> Option<(Repair, Design)> {
     let event = seen.first_overflow.as_ref()?;
     let key = event.label.key;
@@ -28,7 +30,8 @@ pub fn smallest_repair(design: &Design, seen: &Seen) -> Option<(Repair, Design)>
         "circuit.cordic.width" => {
             let width = &mut repaired.circuit.cordic.width;
             let from = *width;
-            *width = seen.needed_width;
+            let proved = TooShort::of(design).map_or(0, |short| short.needs);
+            *width = seen.needed_width.max(proved);
             (from <= 64 && *width <= 64).then(|| (from.to_string(), width.to_string()))?
         }
         "circuit.phase_loop.integrator_bits" => {

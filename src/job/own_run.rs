@@ -5,12 +5,15 @@ use super::points::{Point, Points};
 use super::{clamped_bias, compensation, warning};
 use crate::circuit::engine::{self, ArithmeticKind, Rows};
 use crate::circuit::scale::{excitation_is_off, full_scale_is_off};
+use crate::circuit::vector_width::TooShort;
 use crate::cosim::scale::full_scale_dps;
 use crate::cosim::surroundings::Moment;
 use crate::cosim::{readings, stream};
 use crate::design::{CompensationInput, Design};
 use crate::emit::views::Language;
+use crate::equivalence::outcome::FirstOverflow;
 use crate::error::{Error, InputError, Result};
+use crate::nodes::run;
 use crate::numeric::format::pow2;
 use crate::plant::profile::{Profile, Reading};
 use crate::record::Warning;
@@ -103,7 +106,27 @@ impl OwnRun {
                 format!("{what}. To mend it, {mend}"),
             ));
         }
+        if let Some(said) = self.vector_wraps(design) {
+            warnings.push(warning("cordic_width", said));
+        }
         warnings
+    }
+
+    /// What is to be said where x and y of the CORDIC wrap in this run.
+    fn vector_wraps(&self, design: &Design) -> Option<String> {
+        // Most designs are proved not to, and need no second run.
+        TooShort::of(design)?;
+        let uncompensated = Design {
+            compensation: None,
+            ..design.clone()
+        };
+        let seen = run::run(&uncompensated, &self.stream.drive, &self.stream.sense);
+        let first = FirstOverflow::new(&uncompensated, &seen, None)?;
+        first.mend.as_ref()?;
+        Some(format!(
+            "{}. The drive phase is wrong wherever they wrap, and with it the fit and the drift after compensation",
+            first.sentence()
+        ))
     }
 
     /// Mean thermometer and rate output of each reading, without compensation.
@@ -278,4 +301,35 @@ const TUNING_WORD: usize = 6;
 fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = values.fold((0.0, 0usize), |(s, n), v| (s + v, n + 1));
     sum / count.max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::design::{reader, template};
+
+    /// The words that warn of a width, of the default with this one.
+    fn warned(width: u32) -> Vec<String> {
+        let text = template::DEFAULT
+            .replacen("width = 32", &format!("width = {width}"), 1)
+            .replacen("samples_per_reading = 512", "samples_per_reading = 16", 1)
+            .replacen("readings_per_dwell = 3", "readings_per_dwell = 1", 1)
+            .replacen("step_k = 5.0", "step_k = 35.0", 1);
+        let design = reader::parse(&text, None).unwrap();
+        let warnings = OwnRun::simulate(&design).unwrap().warnings(&design);
+        let of_width = warnings.into_iter().filter(|w| w.code == "cordic_width");
+        of_width.map(|w| w.message).collect()
+    }
+
+    #[test]
+    fn a_run_says_that_its_vectors_wrap_and_what_to_write() {
+        let said = warned(26);
+        assert!(
+            matches!(&said[..], [one] if one.contains("need 31 bits") && one.contains("write `width = 31`")),
+            "{said:?}"
+        );
+        // Not proved to hold every code, and holds those of this run.
+        assert!(warned(30).is_empty());
+        assert!(warned(32).is_empty());
+    }
 }
