@@ -9,3 +9,8 @@ pub fn sha256(bytes: &[u8]) -> String {
         .map(|b| format!("{b:02x}"))
         .collect()
 }
+
+/// A text with LF for CR LF, which git may have made of LF.
+pub fn with_lf(text: &str) -> String {
+    text.replace("\r\n", "\n")
+}

@@ -5,6 +5,7 @@ use super::expected;
 use super::product;
 use super::target::{self, Target};
 use super::toolchain::{self, Harness};
+use crate::digest::{sha256, with_lf};
 use crate::emit::views::Language;
 use crate::error::{Error, InputError, Result, io_error};
 use crate::firmware::files::EmittedFile;
@@ -98,7 +99,7 @@ pub fn verify(
     command: &str,
 ) -> Result<Verification> {
     let folder = Folder::open(path)?;
-    let (manifest, digest) = read_manifest(&folder, path)?;
+    let (manifest, digest, as_it_is) = read_manifest(&folder, path)?;
     let language = expected::language(&manifest);
     if language == Language::Rust && target != Target::Host {
         return Err(InputError::new(format!(
@@ -112,7 +113,9 @@ pub fn verify(
     let own = problems.len();
     let has_foreign = problems.iter().any(|p| expected::is_of_foreign(p));
     if let Some(due) = &against.digest
-        && !due.eq_ignore_ascii_case(&digest)
+        && ![&digest, &as_it_is]
+            .iter()
+            .any(|known| due.eq_ignore_ascii_case(known))
     {
         problems.push(format!("the bundle's digest is {digest}, not {due}"));
     }
@@ -133,7 +136,8 @@ pub fn verify(
     let mut selftest = None;
     let mut not_built = None;
     let is_product = manifest.part == expected::PRODUCT;
-    if !problems.is_empty() || (is_product && !changed_files.is_empty()) {
+    let is_unlike = is_product && !changed_files.is_empty();
+    if !problems.is_empty() || !other_line_ends.is_empty() || is_unlike {
         // What is not what it must be is not run.
         not_built = Some(match is_another {
             true => "nothing was built",
@@ -222,8 +226,8 @@ pub fn verify(
     })
 }
 
-/// The manifest, and its digest.
-fn read_manifest(folder: &Folder, path: &Path) -> Result<(Manifest, String)> {
+/// The manifest; its digest, as `emit` printed it, whatever git made of its line ends since; and that of the file as it is.
+fn read_manifest(folder: &Folder, path: &Path) -> Result<(Manifest, String, String)> {
     let named = path.join(manifest::NAME);
     let text = folder.read_text(manifest::NAME)?;
     let manifest: Manifest = serde_json::from_str(&text).map_err(|e| {
@@ -242,14 +246,15 @@ fn read_manifest(folder: &Folder, path: &Path) -> Result<(Manifest, String)> {
                 .into(),
         );
     }
-    Ok((manifest, crate::digest::sha256(text.as_bytes())))
+    let digest = sha256(with_lf(&text).as_bytes());
+    Ok((manifest, digest, sha256(text.as_bytes())))
 }
 
 /// Files that are missing or not what the manifest says.
 fn changed(manifest: &Manifest, folder: &Folder) -> Vec<String> {
     let differs = |file: &&manifest::FileEntry| {
         let bytes = folder.read(&file.path);
-        bytes.map_or(true, |b| crate::digest::sha256(&b) != file.sha256)
+        bytes.map_or(true, |b| sha256(&b) != file.sha256)
     };
     let files = manifest.files.iter().filter(differs);
     files.map(|file| file.path.clone()).collect()
@@ -259,7 +264,7 @@ fn changed(manifest: &Manifest, folder: &Folder) -> Vec<String> {
 fn in_line_ends(manifest: &Manifest, folder: &Folder, changed: &[String]) -> Vec<String> {
     let is_same = |file: &&manifest::FileEntry| {
         let text = folder.read_text(&file.path);
-        text.is_ok_and(|t| crate::digest::sha256(t.replace("\r\n", "\n").as_bytes()) == file.sha256)
+        text.is_ok_and(|t| sha256(with_lf(&t).as_bytes()) == file.sha256)
     };
     let files = manifest.files.iter().filter(|f| changed.contains(&f.path));
     let files = files.filter(is_same);

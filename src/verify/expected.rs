@@ -1,6 +1,7 @@
 //! What a bundle has to hold, known from its part and its language and from what its sources declare, not from
 //! what its manifest asks for.
 
+use crate::digest::{sha256, with_lf};
 use crate::emit::views::Language;
 use crate::error::Result;
 use crate::firmware::folder::{Folder, is_plain};
@@ -168,7 +169,7 @@ pub(super) fn problems(manifest: &Manifest, folder: &Folder) -> Result<Vec<Strin
     if !only_tables && !is_product {
         declared(manifest, language, folder, &mut problems);
     }
-    if !only_tables && folder.read_text(paths::SUMS).ok() != Some(sums(manifest)) {
+    if !only_tables && !has_sums(manifest, folder) {
         problems.push(format!("{} is not of these files", paths::SUMS));
     }
     banners(manifest, folder, &mut problems);
@@ -194,7 +195,7 @@ fn of_product(manifest: &Manifest, folder: &Folder, problems: &mut Vec<String>) 
             problems.push(format!("{path} is no manifest of a bundle"));
             continue;
         };
-        let digest = crate::digest::sha256(text.as_bytes());
+        let digest = sha256(with_lf(&text).as_bytes());
         let known = |p: &manifest::PartEntry| p.part == part && p.digest == digest;
         if !manifest.parts.iter().any(known) {
             problems.push(format!(
@@ -212,6 +213,12 @@ fn of_product(manifest: &Manifest, folder: &Folder, problems: &mut Vec<String>) 
         due.extend(of_part.files.iter().map(|f| format!("{part}/{}", f.path)));
     }
     due
+}
+
+/// Line ends are no part of what is compared here: a file that git changed them in is told of as such.
+fn has_sums(manifest: &Manifest, folder: &Folder) -> bool {
+    let text = folder.read_text(paths::SUMS);
+    text.is_ok_and(|t| with_lf(&t) == sums(manifest))
 }
 
 /// The lines of the checksums for who has no gyrogen.

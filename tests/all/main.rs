@@ -64,4 +64,5 @@ mod study_spaces;
 mod trace;
 mod verify_damage;
 mod verify_foreign;
+mod verify_line_ends;
 mod verify_targets;

@@ -359,6 +359,18 @@ fn a_product_that_is_not_whole_does_not_verify() {
     std::fs::write(&manifest, format!("{before}{after}")).expect("written");
     fails("its parts are not");
     std::fs::write(&manifest, &text).expect("written");
+    // A part's manifest in other line ends.
+    let part = folder.join("chain/manifest.json");
+    let of_part = std::fs::read_to_string(&part).expect("a manifest");
+    std::fs::write(&part, of_part.replace('\n', "\r\n")).expect("written");
+    let verified = gyrogen(&["verify", "c"], top.path());
+    let said = all_of(&verified);
+    assert_eq!(verified.status.code(), Some(1), "{said}");
+    assert!(
+        said.contains("in their line ends alone (CR LF for LF): chain/manifest.json")
+            && !said.contains("the digest of chain"),
+        "{said}"
+    );
     // A part of another design.
     let other = ["emit", "--part", "chain", "--lang", "c", "--out", "other"];
     assert!(gyrogen(&other, top.path()).status.success());

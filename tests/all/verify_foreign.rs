@@ -25,7 +25,7 @@ terms = [
 "#;
 
 /// The bundle, emitted once, and its digest.
-fn whole() -> &'static (tempfile::TempDir, String) {
+pub(crate) fn whole() -> &'static (tempfile::TempDir, String) {
     static WHOLE: OnceLock<(tempfile::TempDir, String)> = OnceLock::new();
     WHOLE.get_or_init(|| {
         let folder = tempfile::tempdir().expect("a folder");
@@ -43,14 +43,14 @@ fn whole() -> &'static (tempfile::TempDir, String) {
 }
 
 /// A copy of the bundle in a folder of its own.
-fn bundle() -> (tempfile::TempDir, PathBuf) {
+pub(crate) fn bundle() -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().expect("a folder");
     let at = folder.path().join("c");
     copy(&whole().0.path().join("c"), &at);
     (folder, at)
 }
 
-fn sha256(bytes: &[u8]) -> String {
+pub(crate) fn sha256(bytes: &[u8]) -> String {
     gyrogen::digest::sha256(bytes)
 }
 
@@ -84,7 +84,7 @@ fn reseal(at: &Path, change: impl FnOnce(&mut Value)) {
 }
 
 /// `verify` fails with this status and says so.
-fn refused(at: &Path, status: i32, text: &str) {
+pub(crate) fn refused(at: &Path, status: i32, text: &str) {
     let output = gyrogen(&["verify", "c"], at.parent().expect("a parent"));
     assert_eq!(
         output.status.code(),
@@ -234,20 +234,6 @@ fn dropped_outputs_and_states_are_noticed() {
     std::fs::write(&path, text.replace(store, "")).expect("written");
     reseal(&at, |_| ());
     refused(&at, 1, "correct (c): first difference");
-}
-
-#[test]
-fn other_line_ends_are_told_from_an_edited_file() {
-    let (_folder, at) = bundle();
-    let path = at.join("tested_correction.c");
-    let text = std::fs::read_to_string(&path).expect("a source");
-    std::fs::write(&path, text.replace('\n', "\r\n")).expect("written");
-    refused(
-        &at,
-        1,
-        "check failed: files differ from the manifest in their line ends alone (CR LF for LF): tested_correction.c",
-    );
-    refused(&at, 1, "`* -text` in .gitattributes");
 }
 
 #[test]
