@@ -61,12 +61,20 @@ impl Candidate for Covariate {
         )
     }
 
-    fn equation(&self, _c: &Channels, _point: &Point) -> String {
+    fn equation(&self, _c: &Channels, point: &Point) -> String {
         let name = &self.name;
-        format!(
-            "f({name}), a natural cubic spline of one to seven degrees of freedom in the record's column {name}; at once or after a \
-             first-order delay"
-        )
+        let (of, late) = match point.theta.is_empty() {
+            true => (name.clone(), String::new()),
+            false => (
+                "l".to_owned(),
+                format!(", l lags {name}: delay_s dl/dt = {name} - l"),
+            ),
+        };
+        let curve = match DEGREES[point.form % DEGREES.len()] {
+            1 => "a straight line".to_owned(),
+            degrees => format!("a natural cubic spline of {degrees} degrees of freedom"),
+        };
+        format!("f({of}), {curve} in the record's column {name}{late}")
     }
 
     fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing> {

@@ -81,6 +81,19 @@ impl Candidate for Deadband {
         &DEADBAND
     }
 
+    fn equation(&self, _c: &Channels, point: &Point) -> String {
+        let beyond = if subtracts(point) {
+            "-d sign(rate)"
+        } else {
+            "0"
+        };
+        let law = format!("-rate where |rate| <= d, beyond it {beyond}");
+        match is_mean(point) {
+            true => format!("{law}, averaged over each row, in which the rate moves"),
+            false => law,
+        }
+    }
+
     fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing> {
         rate_alone(c)
     }

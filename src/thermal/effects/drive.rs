@@ -77,6 +77,27 @@ impl Candidate for Damping {
         &DAMPING
     }
 
+    fn equation(&self, _c: &Channels, point: &Point) -> String {
+        let (by_gain, bend) = ("k (d - 1)", "share (B(p') - B(p))");
+        let law = match point.form % SHAPES {
+            0 => return format!("{by_gain}, d = g, the drive gain"),
+            1 => bend.to_owned(),
+            _ => format!("{by_gain} + {bend}"),
+        };
+        let (angle, damping) = match point.form >= SHAPES {
+            true => ("m (p - p_r)", "g cos(a) over its value where g is 1"),
+            false => ("p - p_r", "g"),
+        };
+        let off = if point.theta.is_empty() {
+            ""
+        } else {
+            " + resonance_off_rad"
+        };
+        format!(
+            "{law}, p' - p = atan(d tan(a)) - a, a = {angle}, d = {damping}, g the drive gain, p_r a quarter turn{off}"
+        )
+    }
+
     fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing> {
         moving(c, "agc")?;
         Ok(vec!["agc".to_owned()])
@@ -266,6 +287,20 @@ const COUPLING: Sheet = Sheet {
 impl Candidate for Coupling {
     fn sheet(&self) -> &Sheet {
         &COUPLING
+    }
+
+    fn equation(&self, _c: &Channels, point: &Point) -> String {
+        let square = if point.form % 2 == 1 { "^2" } else { "" };
+        let pull = format!("k (g{square} - 1)");
+        let law = match point.theta.is_empty() {
+            true => format!("-{pull} B'(p)"),
+            false => format!("B(p - {pull}) - B(p)"),
+        };
+        let gain = match point.form < 2 {
+            true => "the drive gain",
+            false => "the drive gain over its course in temperature",
+        };
+        format!("{law}, g {gain}")
     }
 
     fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing> {

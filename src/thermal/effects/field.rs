@@ -103,6 +103,28 @@ impl Candidate for Direct {
         &self.sheet
     }
 
+    fn equation(&self, _c: &Channels, point: &Point) -> String {
+        let (v, name) = match self.channel {
+            "supply_v" => ("V", "supply"),
+            _ => ("a", "acceleration"),
+        };
+        let power = |x: &str, n: i32| match n {
+            1 => x.to_owned(),
+            _ => format!("{x}^{n}"),
+        };
+        let law = format!("gain {}", power(v, self.power));
+        let (bend, with_u) = match point.form {
+            0 => return format!("{law}, {v} the {name}"),
+            1 => (power("s", 3 - self.power), ""),
+            2 => (power("s", 3), ""),
+            _ => (
+                format!("{} u", power("s", self.power)),
+                " and u the temperature",
+            ),
+        };
+        format!("{law} + b {bend}, {v} the {name}, s the {name}{with_u} scaled to -1..1")
+    }
+
     fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing> {
         moving(c, self.channel)?;
         Ok(vec![self.channel.to_owned()])

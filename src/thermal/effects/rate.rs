@@ -98,6 +98,14 @@ impl Candidate for ScaleTemperature {
         &SCALE_TEMPERATURE
     }
 
+    fn equation(&self, c: &Channels, point: &Point) -> String {
+        let law = match is_bent(c, point) {
+            true => "rate (slope (T - reference) + curvature (T - reference)^2)",
+            false => "rate slope (T - reference)",
+        };
+        law.to_owned()
+    }
+
     fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing> {
         let mut out = rate_alone(c)?;
         out.push(heated(c)?);
@@ -186,6 +194,11 @@ impl Candidate for Nonlinearity {
         &NONLINEARITY
     }
 
+    fn equation(&self, _c: &Channels, point: &Point) -> String {
+        let linear = if point.form == 0 { "" } else { " + n1 rate" };
+        format!("{}{linear}", NONLINEARITY.equation)
+    }
+
     fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing> {
         rate_alone(c)
     }
@@ -265,6 +278,16 @@ const ASYMMETRY: Sheet = Sheet {
 impl Candidate for Asymmetry {
     fn sheet(&self) -> &Sheet {
         &ASYMMETRY
+    }
+
+    fn equation(&self, _c: &Channels, point: &Point) -> String {
+        let law = match point.form {
+            0 => "n2 rate^2 / rate_max",
+            1 => "n2 |rate|",
+            2 => "n2 (|rate| + rate), which is 0 at negative rates",
+            _ => "n2 (|rate| - rate), which is 0 at positive rates",
+        };
+        law.to_owned()
     }
 
     fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing> {

@@ -168,6 +168,19 @@ impl Candidate for StressJump {
         &STRESS_JUMP
     }
 
+    fn equation(&self, _c: &Channels, point: &Point) -> String {
+        let relay = "the height where T is above T_s, else 0; T_s is higher by the hysteresis on the way up than on the way down";
+        match point.form {
+            SHARP => "the height where T is above T_s, else 0".to_owned(),
+            RELAY => relay.to_owned(),
+            OTHER_SIDE => format!(
+                "{relay}; the record begins within the hysteresis, in the state that its first reading is farther from"
+            ),
+            SPREAD => "height / (1 + exp(-2 (T - T_s) / width))".to_owned(),
+            _ => "0 until T first passes T_s, the height from then on".to_owned(),
+        }
+    }
+
     fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing> {
         Ok(vec![heated(c)?, "time_s".to_owned()])
     }

@@ -59,6 +59,17 @@ impl Candidate for ThirdOrder {
         &THIRD_ORDER
     }
 
+    fn equation(&self, _c: &Channels, point: &Point) -> String {
+        let (higher, names) = match point.form {
+            BENT => (
+                " + l4 P4(u) + l5 P5(u)",
+                ", P4 and P5 Legendre's polynomials",
+            ),
+            _ => ("", ""),
+        };
+        format!("c3 u^3{higher}, u the thermometer's reading scaled to -1..1{names}")
+    }
+
     fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing> {
         Ok(vec![heated(c)?])
     }

@@ -49,6 +49,17 @@ impl Candidate for Warmup {
         &WARMUP
     }
 
+    fn equation(&self, _c: &Channels, point: &Point) -> String {
+        let law = "amplitude exp(-t_on / tau), t_on the time since power-on";
+        match point.form {
+            RESTED => format!(
+                "s {law}, s = 1 at first and less after a power-off that was too short to cool down: what had settled goes back \
+                 with cooling_tau_s"
+            ),
+            _ => law.to_owned(),
+        }
+    }
+
     fn channels(&self, c: &Channels) -> Result<Vec<String>, Missing> {
         let clock = if c.on_known {
             "time_since_power_on_s"
@@ -193,6 +204,15 @@ const AGEING: Sheet = Sheet {
 impl Candidate for Ageing {
     fn sheet(&self) -> &Sheet {
         &AGEING
+    }
+
+    fn equation(&self, _c: &Channels, point: &Point) -> String {
+        let law = if point.form == 0 {
+            "k t"
+        } else {
+            "k ln(1 + t / t0)"
+        };
+        format!("{law}, t the time since the first row")
     }
 
     fn channels(&self, _c: &Channels) -> Result<Vec<String>, Missing> {
