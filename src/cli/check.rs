@@ -7,6 +7,7 @@ use crate::check::outcome::{Check, NodeCheck, Overflows};
 use crate::check::remarks::Remark;
 use crate::check::{self, SAMPLES};
 use crate::error::{Error, Result};
+use crate::numeric::trace::ir::Interval;
 use crate::output::Results;
 use crate::text::{counted, number};
 use crate::timing;
@@ -50,7 +51,12 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     }
     match arguments.format {
         OutputFormat::Json => super::terminal::give(&json),
-        OutputFormat::Text => print(&check),
+        OutputFormat::Text => {
+            print(&check);
+            if let Some(out) = &arguments.out {
+                super::common::wrote(out, &PLANNED[..1]);
+            }
+        }
     }
     if check.holds {
         return Ok(());
@@ -64,9 +70,12 @@ fn print(check: &Check) {
     }
     let mut table = super::terminal::table(&[
         "word",
+        "what it is",
         "format",
         "proved range, raw",
-        "headroom, bits",
+        "has, bits",
+        "needs, bits",
+        "spare, bits",
         "overflow",
         "own rounding, LSB rms",
         "adds to the rate, deg/s rms",
@@ -75,13 +84,13 @@ fn print(check: &Check) {
     for node in &check.nodes {
         table.add_row(row(node));
     }
-    super::terminal::numbers(&mut table, 2..);
+    super::terminal::numbers(&mut table, 3..);
     super::terminal::show(&table);
-    for (name, what) in NAMED_BY_KEY {
-        if check.nodes.iter().any(|n| n.name == name) {
-            say!("{name}: {what}");
-        }
-    }
+    say!(
+        "proved range: every raw word that can come, for every ADC code and state. needs: the bits that hold this range. spare: has less \
+         needs; below 0 the word can overflow. own rounding: the error that the word's rounding makes by itself; after it, what that adds to \
+         the rate, rms and mean. -: does not apply."
+    );
     let open = || {
         let nodes = check.nodes.iter();
         nodes.filter(|n| n.overflow == Overflows::Possible)
@@ -197,17 +206,29 @@ fn verdict(holds: bool, open: usize) -> String {
     }
 }
 
-/// Words of the table that are called by a key of the design, and what they are.
-const NAMED_BY_KEY: [(&str, &str); 2] = [
-    (
-        "circuit.cordic.width",
-        "the CORDIC's x and y, over all iterations",
-    ),
-    (
-        "circuit.cordic.gain_bits",
-        "the CORDIC's magnitude, x times a gain constant of gain_bits bits, rounded",
-    ),
-];
+/// A word as the table names it, and what it is.
+fn named(name: &str) -> (&str, &'static str) {
+    let (key, part) = name.split_once(' ').unwrap_or((name, ""));
+    let what = match (key, part) {
+        ("circuit.nco.phase_bits", _) => "phase of the oscillator",
+        ("circuit.nco.table", _) => "entry of the sine table",
+        ("circuit.demodulator.product", _) => "ADC code times table entry",
+        ("circuit.decimator", _) => "sums of the CIC decimator",
+        ("circuit.decimator.output", _) => "decimated sample",
+        ("circuit.cordic.width", _) => "CORDIC's x and y",
+        ("circuit.cordic", _) => "drive phase",
+        ("circuit.cordic.gain_bits", _) => return ("circuit.cordic magnitude", "drive magnitude"),
+        ("compensation.accumulator", _) => "sums of the polynomial",
+        ("compensation.output", "bias") => "bias by the polynomial",
+        ("compensation.output", "rate") => "compensated rate",
+        ("circuit.phase_loop.integrator_bits", _) => "integrator of the loop",
+        ("circuit.phase_loop", _) => "tuning word with the loop's",
+        ("circuit.amplitude_loop", "integrator") => "integrator of the loop",
+        ("circuit.amplitude_loop", _) => "drive gain",
+        _ => "",
+    };
+    (name, what)
+}
 
 fn requirements(check: &Check) {
     if check.requirements.is_empty() {
@@ -246,28 +267,65 @@ fn requirements(check: &Check) {
     }
 }
 
-/// Bits of headroom, rounded down: a lack of them is never shown as none.
-fn headroom(bits: f64) -> String {
-    match bits < 0.0 {
-        true => format!("{:.2}", (100.0 * bits).floor() / 100.0),
-        false => format!("{bits:.2}"),
+/// Bits that a word has and bits that its proved range needs; `None` where wrapping or limiting is its function.
+fn bits(n: &NodeCheck) -> Option<[u32; 2]> {
+    let is_unsigned = n.limits[0] >= 0;
+    let count = |[low, high]: [i128; 2]| match n.mode {
+        _ if is_unsigned && low >= 0 => Interval::new(low, high).bits() - 1,
+        // A symmetric format lacks the least word.
+        "saturate_symmetric" => Interval::new(-1 - high.max(-low), high).bits(),
+        _ => Interval::new(low, high).bits(),
+    };
+    if n.overflow == Overflows::ByDesign {
+        return None;
     }
+    let (has, needs) = (count(n.limits), count(n.proved));
+    let has_no_sign = is_unsigned && n.proved[0] < 0;
+    Some([
+        has,
+        if has_no_sign {
+            needs.max(has + 1)
+        } else {
+            needs
+        },
+    ])
 }
 
 fn row(n: &NodeCheck) -> Vec<String> {
     let overflow = match n.overflow {
         Overflows::Impossible => "impossible (proved)".to_owned(),
         Overflows::Possible => format!("not excluded ({})", n.mode),
-        Overflows::Certain => format!("CERTAIN ({})", n.mode),
-        Overflows::ByDesign => n.mode.to_owned(),
+        Overflows::Certain => match n.follows_from {
+            Some(key) => format!("follows from {key}"),
+            None => format!("CERTAIN ({})", n.mode),
+        },
+        // Why stands in check.json.
+        Overflows::ByDesign => {
+            let what = n.mode.split(':').next().unwrap_or_default();
+            format!("{what} by design")
+        }
     };
     let some = |v: Option<f64>| v.map_or("-".to_owned(), |v| number(v, 3));
     let line = n.budget.as_ref();
+    let (name, what) = named(&n.name);
+    let [has, needs, spare] = match bits(n) {
+        Some([has, needs]) => [has.into(), needs.into(), i64::from(has) - i64::from(needs)]
+            .map(|v: i64| v.to_string()),
+        None => ["-"; 3].map(str::to_owned),
+    };
+    let format = match n.name == name {
+        true => n.format.clone(),
+        // The engine's own, which no key sets.
+        false => format!("{has} bits, fixed"),
+    };
     vec![
-        n.name.clone(),
-        n.format.clone(),
+        name.to_owned(),
+        what.to_owned(),
+        format,
         format!("{} .. {}", n.proved[0], n.proved[1]),
-        n.headroom_bits.map_or("-".to_owned(), headroom),
+        has,
+        needs,
+        spare,
         overflow,
         line.map_or("-".to_owned(), |l| {
             let rms = l.predicted_rms_lsb.or(l.measured_rms_lsb);
@@ -280,7 +338,62 @@ fn row(n: &NodeCheck) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::verdict;
+    use super::*;
+    use crate::design::{reader, template};
+
+    fn checked(changes: &[(&str, &str)]) -> Check {
+        let mut text = template::DEFAULT.to_owned();
+        for (from, to) in changes {
+            assert!(text.contains(from), "{from}");
+            text = text.replacen(from, to, 1);
+        }
+        check::check(&reader::parse(&text, None).unwrap(), "test", 20_000).unwrap()
+    }
+
+    #[test]
+    fn every_row_says_what_it_is_and_its_bits_agree_with_what_is_proved() {
+        let changes: [&[(&str, &str)]; 3] = [
+            &[],
+            &[("width = 32", "width = 29")],
+            &[
+                ("#[circuit.phase_loop]", "[circuit.phase_loop]"),
+                ("#setpoint_raw = -4194304", "setpoint_raw = -4194304"),
+                ("#proportional =", "proportional ="),
+                ("#integral =", "integral ="),
+                ("#integrator_bits =", "integrator_bits ="),
+            ],
+        ];
+        for changes in changes {
+            let check = checked(changes);
+            for n in &check.nodes {
+                assert!(!named(&n.name).1.is_empty(), "{}", n.name);
+                if let Some([has, needs]) = bits(n) {
+                    let fits = n.overflow == Overflows::Impossible;
+                    assert_eq!(needs <= has, fits, "{n:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_magnitude_is_called_so_and_has_no_format_of_a_key() {
+        let check = checked(&[]);
+        let of = |name: &str| row(check.nodes.iter().find(|n| n.name == name).unwrap());
+        let magnitude = of("circuit.cordic.gain_bits");
+        let due = [
+            "circuit.cordic magnitude",
+            "drive magnitude",
+            "64 bits, fixed",
+        ];
+        assert_eq!(magnitude[..3], due);
+        assert_eq!(magnitude[4..7], ["64", "24", "40"]);
+        assert_eq!(of("circuit.cordic.width")[4..7], ["32", "31", "1"]);
+        assert_eq!(of("compensation.output bias")[4..7], ["24", "25", "-1"]);
+        assert_eq!(
+            of("circuit.cordic phase")[4..8],
+            ["-", "-", "-", "wraps by design"]
+        );
+    }
 
     #[test]
     fn the_verdict_says_what_is_not_proved() {
