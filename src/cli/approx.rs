@@ -307,7 +307,7 @@ fn print(o: &Outcome, out: &std::path::Path) {
         o.cost.cycles,
         spelled(&o.target)
     );
-    say!("wrote {}", out.display());
+    super::common::wrote(out, &["report.html", "c", "rust"]);
 }
 
 fn alternative(a: &Alternative) -> alternatives::Line<'_> {

@@ -75,7 +75,11 @@ pub(super) fn print(
     if let Some(controls) = controls {
         super::controls::print(controls);
     }
-    say!("wrote {}", out.display());
+    let mut next = vec!["report.html"];
+    if c.firmware.compensable {
+        next.extend(["design.toml", "firmware/c", "firmware/rust"]);
+    }
+    super::common::wrote(out, &next);
 }
 
 /// The causes: a table, what its signs and names say, and what each cause adds to the output.

@@ -222,3 +222,35 @@ pub(super) fn comparison_table(compared: &[Compared]) -> comfy_table::Table {
     super::terminal::numbers(&mut table, 2..);
     table
 }
+
+/// The line that ends a command: its folder, and those of its files that a person opens next, as far as they are there.
+pub(super) fn wrote(out: &Path, next: &[&str]) {
+    say!("{}", wrote_line(out, next));
+}
+
+fn wrote_line(out: &Path, next: &[&str]) -> String {
+    let is_there = |name: &&str| out.join(name).exists();
+    let there: Vec<&str> = next.iter().copied().filter(is_there).collect();
+    let colon = if there.is_empty() { "" } else { ": " };
+    format!("wrote {}{colon}{}", out.display(), there.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_line_names_the_files_that_are_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path();
+        std::fs::write(out.join("report.html"), "").unwrap();
+        std::fs::create_dir_all(out.join("firmware/c")).unwrap();
+        let line = |next: &[&str]| wrote_line(out, next);
+        let at = out.display();
+        assert_eq!(
+            line(&["report.html", "design.toml", "firmware/c"]),
+            format!("wrote {at}: report.html, firmware/c")
+        );
+        assert_eq!(line(&["design.toml"]), format!("wrote {at}"));
+    }
+}

@@ -231,7 +231,9 @@ fn print(e: &Equivalence, out: &Path) {
         say!("note: {note}");
     }
     say!("{}", if e.holds { "holds" } else { "does not hold" });
-    say!("wrote {}", out.display());
+    let mut next = vec!["equiv.html"];
+    next.extend(e.counterexample.as_deref());
+    super::common::wrote(out, &next);
 }
 
 fn print_spurs(e: &Equivalence) {

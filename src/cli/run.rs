@@ -232,7 +232,9 @@ fn print(outcome: &Outcome, out: &Path) {
         s.equivalence.compared,
         s.equivalence.mismatches
     );
-    say!("wrote {}", out.display());
+    let mut next = vec!["report.html", "design.toml"];
+    next.extend(outcome.parts.firmware.bundles().map(|(_, folder)| folder));
+    super::common::wrote(out, &next);
 }
 
 fn alternative(line: &Line) -> alternatives::Line<'_> {

@@ -86,7 +86,7 @@ pub fn run(
         OutputFormat::Text => print(&outcome),
     }
     if let (Some(out), OutputFormat::Text) = (&arguments.out, arguments.format) {
-        say!("wrote {}", out.display());
+        super::common::wrote(out, &["selftest.html"]);
     }
     if outcome.holds {
         return Ok(());

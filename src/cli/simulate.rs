@@ -233,7 +233,11 @@ fn print(outcome: &Outcome, out: &Path) {
         );
     }
     print_sentences(outcome);
-    say!("wrote {}", out.display());
+    let mut next = vec!["report.html", "record.csv"];
+    if outcome.parts.calibrated.is_some() {
+        next.push("design.toml");
+    }
+    super::common::wrote(out, &next);
 }
 
 fn print_sentences(outcome: &Outcome) {

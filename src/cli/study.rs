@@ -120,7 +120,10 @@ fn into_folder(
     journal::remove(&arguments.out)?;
     match arguments.format {
         OutputFormat::Json => super::terminal::give(&json),
-        OutputFormat::Text => print(&done.study),
+        OutputFormat::Text => {
+            print(&done.study);
+            super::common::wrote(&arguments.out, &["report.html", "designs"]);
+        }
     }
     let unmet = done.study.chosen.iter().filter(|c| c.point.is_none());
     let unmet: Vec<String> = unmet
