@@ -98,7 +98,8 @@ mod tests {
             ("g_squared_sensitivity", 4),
             ("covariate:pressure_pa", 6),
         ];
-        let all = catalogue(&c);
+        let mut all = catalogue(&c);
+        all.extend(outside::all(&c));
         for candidate in &all {
             let mut points = candidate.points(&c);
             let beside: Vec<Point> = points

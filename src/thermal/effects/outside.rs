@@ -91,6 +91,29 @@ impl Candidate for Outside {
         &OUTSIDE
     }
 
+    fn equation(&self, _c: &Channels, point: &Point) -> String {
+        let u = "u the thermometer's reading scaled to -1..1";
+        let spline = format!(
+            "a natural cubic spline of {} degrees of freedom",
+            point.form
+        );
+        match &self.kind {
+            Kind::Curve => format!("f(u), {spline}, {u}"),
+            Kind::Play => format!(
+                "k y, y stands still until u is the half width of a play away from it and then follows u, {u}"
+            ),
+            Kind::Change => "0 up to one moment, k after it".to_owned(),
+            Kind::Bump => "k exp(-x^2 / 2), x = (t - centre) / width".to_owned(),
+            Kind::Smooth(n) => format!("f({n}), {spline}"),
+            Kind::TimesHeat(n) => format!("(k1 u + k2) {n}, {u}"),
+            Kind::TimesRate(n) => format!("(k1 rate + k2) {n}"),
+            Kind::Late(n) => format!(
+                "k1 (l - v) + k2 v, l lags v: tau dl/dt = v - l, v what {n} has beside a cubic in the temperature"
+            ),
+            Kind::Scale => "k rate".to_owned(),
+        }
+    }
+
     fn id(&self) -> String {
         match &self.kind {
             Kind::Curve => "outside:curve".to_owned(),
