@@ -316,7 +316,7 @@ fn row(n: &NodeCheck) -> Vec<String> {
     let format = match n.name == name {
         true => n.format.clone(),
         // The engine's own, which no key sets.
-        false => format!("{has} bits, fixed"),
+        false => format!("{has} bits, internal"),
     };
     vec![
         name.to_owned(),
@@ -383,7 +383,7 @@ mod tests {
         let due = [
             "circuit.cordic magnitude",
             "drive magnitude",
-            "64 bits, fixed",
+            "64 bits, internal",
         ];
         assert_eq!(magnitude[..3], due);
         assert_eq!(magnitude[4..7], ["64", "24", "40"]);
