@@ -76,7 +76,7 @@ pub(super) fn print(
         super::controls::print(controls);
     }
     let mut next = vec!["report.html"];
-    if c.firmware.compensable {
+    if c.firmware.compensable && c.unit == "deg/s" {
         next.extend(["design.toml", "firmware/c", "firmware/rust"]);
     }
     super::common::wrote(out, &next);
