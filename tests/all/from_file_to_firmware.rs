@@ -196,6 +196,34 @@ fn a_capture_of_each_form_runs_through_the_compiled_firmware() {
 }
 
 #[test]
+fn a_capture_too_short_for_a_row_says_what_it_has_and_what_a_row_needs() {
+    let top = tempfile::tempdir().expect("a folder");
+    for (count, has) in [(0, "has 0 samples"), (31, "has 31 samples")] {
+        let codes: String = (0..count).map(|k| format!("{k},{}\n", 3 * k)).collect();
+        let text = format!("drive_code,sense_code\n{codes}");
+        fs::write(top.path().join("short.csv"), text).expect("written");
+        let all = [
+            "replay",
+            "--capture",
+            "short.csv",
+            "--out",
+            "rows.csv",
+            "--quiet",
+        ];
+        let (status, said, complaints) = gyrogen(top.path(), &all[..5]);
+        assert_eq!(status, Some(0), "{said}{complaints}");
+        assert!(
+            complaints.contains(has) && complaints.contains("one row needs 32"),
+            "{complaints}"
+        );
+        let rows = fs::read_to_string(top.path().join("rows.csv")).expect("rows");
+        assert_eq!(rows.lines().count(), 1, "{rows}");
+        let (status, _, complaints) = gyrogen(top.path(), &all);
+        assert_eq!((status, &complaints[..]), (Some(0), ""));
+    }
+}
+
+#[test]
 fn a_simulated_run_and_its_own_record_say_why_their_orders_differ() {
     let top = tempfile::tempdir().expect("a folder");
     let of = |arguments: &[&str]| {
