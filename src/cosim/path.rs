@@ -122,10 +122,21 @@ impl Units {
     }
 }
 
-/// The nearest f64 of a word, most of which have at most 64 bits.
+/// The nearest f64 of a word, most of which have at most 64 bits. The others are apart, as a compiler takes the
+/// conversion of 128 bits, a call, for both.
 #[inline]
 fn real(word: i128) -> f64 {
-    i64::try_from(word).map_or_else(|_| word as f64, |word| word as f64)
+    #[cold]
+    #[inline(never)]
+    fn wide(word: i128) -> f64 {
+        word as f64
+    }
+    let low = word as i64;
+    if i128::from(low) == word {
+        low as f64
+    } else {
+        wide(word)
+    }
 }
 
 impl Path {

@@ -17,7 +17,8 @@ pub fn all(c: &Channels) -> Vec<Box<dyn Candidate>> {
 pub fn of_another_axis(column: &str) -> Option<String> {
     (unit_of(column) == "deg/s").then(|| {
         format!(
-            "if {column} is another axis's rate, it stands for what moves both axes: a turn that both see (cross-axis sensitivity), or,              at rest, a cause that they share"
+            "if {column} is another axis's rate, it stands for what moves both axes: a turn that both see (cross-axis sensitivity), or, \
+             at rest, a cause that they share"
         )
     })
 }
