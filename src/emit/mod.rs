@@ -10,6 +10,7 @@ mod lower_steps;
 pub mod machine;
 mod modular;
 mod names;
+mod notes;
 pub mod rust;
 pub mod tidy;
 pub mod views;

@@ -1,11 +1,10 @@
 //! What the templates show: strings only, made from the bundle.
 
 use super::bundle::{Bundle, StateType};
-use super::machine::{Lowered, Type, Width};
-use super::{c, rust};
-use crate::numeric::arithmetic::Port;
-use crate::numeric::trace::ir::{Function, Interval, SlotKind};
-use crate::text::{self, Place, constant};
+use super::machine::{Type, Width};
+use super::{c, notes, rust};
+use crate::numeric::trace::ir::{Interval, SlotKind};
+use crate::text::{self, Place};
 
 /// A language to print.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -286,7 +285,10 @@ pub fn structs(bundle: &Bundle, language: Language) -> Vec<StructView> {
                 Language::C => format!("{} {name}", c::type_name(&bundle.prefix, v.ty)),
                 Language::Rust => format!("{name}: {}", rust::type_name(v.ty)),
             };
-            (declaration, text::shown(&meaning(port), Place::Source))
+            (
+                declaration,
+                text::shown(&notes::meaning(port), Place::Source),
+            )
         });
         structs.push(StructView {
             name: function.name.clone(),
@@ -304,47 +306,20 @@ pub fn functions(bundle: &Bundle, language: Language) -> Vec<FunctionView> {
         .collect()
 }
 
-/// A port's name, its range in words and, where its scale is known, in its quantity, and what it means.
-fn described(port: &Port, range: Interval) -> String {
-    let quantity = port.scale.as_ref().map(|s| {
-        let at = |raw: i128| constant(s.offset + s.factor * raw as f64, 7);
-        let range = format!("{} .. {} {}", at(range.low), at(range.high), s.unit);
-        format!(" ({})", range.trim_end())
-    });
-    format!(
-        "{}: {} .. {}{}; {}",
-        port.name,
-        range.low,
-        range.high,
-        quantity.unwrap_or_default(),
-        meaning(port)
-    )
-}
-
-/// What a port's words are, the value of a step apart from the word's own format.
-fn meaning(port: &Port) -> String {
-    let parts = port.meaning.split_once(" = raw * ");
-    let parts = parts.and_then(|(what, rest)| Some((what, rest.split_once(", ")?)));
-    match parts {
-        Some((what, (worth, format))) => format!("{what} = raw * {worth}; word format {format}"),
-        None => port.meaning.clone(),
-    }
-}
-
 fn function(bundle: &Bundle, k: usize, language: Language) -> FunctionView {
     let (function, lowered) = (&bundle.program.functions[k], &bundle.lowered[k]);
     let p = &bundle.prefix;
     let mut notes = Vec::new();
     for (port, range) in &function.inputs {
-        notes.push(format!("in  {}", described(port, *range)));
+        notes.push(format!("in  {}", notes::described(port, *range)));
     }
     for (port, id) in &function.outputs {
         if !port.name.is_empty() {
             let range = function.nodes[*id].range;
-            notes.push(format!("out {}", described(port, range)));
+            notes.push(format!("out {}", notes::described(port, range)));
         }
     }
-    notes.extend(guarantee(&function.name).map(str::to_owned));
+    notes.extend(notes::guarantee(&function.name).map(str::to_owned));
     let notes = notes
         .iter()
         .map(|n| text::shown(n, Place::Source))
@@ -381,7 +356,7 @@ fn function(bundle: &Bundle, k: usize, language: Language) -> FunctionView {
         name: function.name.clone(),
         purpose: function.purpose,
         notes,
-        outside: outside(function, lowered),
+        outside: notes::outside(function, lowered),
         declaration: c::signature(bundle, k),
         definition: match language {
             Language::C => c::definition(bundle, k),
@@ -418,29 +393,6 @@ fn input(range: Interval, ty: String, language: Language) -> InputView {
     }
 }
 
-/// What comes of a word that an input's type holds and its range does not.
-fn outside(function: &Function, lowered: &Lowered) -> String {
-    let mut inputs = function.inputs.iter().zip(&lowered.inputs);
-    let holds_more = inputs
-        .any(|((_, range), ty)| matches!(ty, Type::Signed(width) if width.interval() != *range));
-    // Limits of the function's own are another matter: they are for words of the range.
-    let of = function
-        .inputs
-        .iter()
-        .find(|(port, _)| port.limits.is_some());
-    let of = of.map_or("its range".to_owned(), |(_, range)| {
-        format!(
-            "{} .. {}, which is no word of the format,",
-            range.low, range.high
-        )
-    });
-    match (holds_more, lowered.guarded) {
-        (false, _) => String::new(),
-        (true, true) => format!("an input outside {of} is clamped to it"),
-        (true, false) => format!("an input outside {of} is not clamped: its result may be wrong"),
-    }
-}
-
 /// An expression's low 64 bits, unsigned.
 pub fn word_64(expression: &str, ty: Type, language: Language) -> String {
     match (language, ty) {
@@ -454,50 +406,10 @@ pub fn word_64(expression: &str, ty: Type, language: Language) -> String {
     }
 }
 
-/// What a block's result is worth against real arithmetic on the same inputs.
-fn guarantee(function: &str) -> Option<&'static str> {
-    let base = function.trim_end_matches(|c: char| c == '_' || c.is_ascii_digit());
-    Some(match base {
-        "nco" => "error: phase exact modulo one turn; the table's address drops the low phase bits",
-        "demodulate" | "decimate" => {
-            "error: one rounding to the output's LSB (half an LSB if to nearest), nothing else"
-        }
-        "integrate" | "retune" => "error: none, exact modulo 2^width",
-        "cordic" => {
-            "error: residual angle at most atan(2^-(n-1)), and half a unit for each of n table angles"
-        }
-        "bias" => "error: each step one rounding to the accumulator's LSB",
-        "rate" => "error: one rounding of the input to the output's LSB; the difference is exact",
-        _ => return None,
-    })
-}
-
 /// Start of the FNV-like checksum.
 pub const BASIS: u64 = 0xcbf2_9ce4_8422_2325;
 
 /// One step of the checksum.
 pub fn mix(h: u64, word: u64) -> u64 {
     (h ^ word).wrapping_mul(0x100_0000_01b3)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_port_says_its_range_in_words_and_in_its_quantity() {
-        let port = Port::new("rate", "sense I = raw * 2^-11 deg/s, Q2.22");
-        let plain = described(&port, Interval::new(-2048, 4096));
-        assert_eq!(
-            plain,
-            "rate: -2048 .. 4096; sense I = raw * 2^-11 deg/s; word format Q2.22"
-        );
-        let scaled = described(
-            &port.in_unit("sense I", -11, "deg/s"),
-            Interval::new(-2048, 4096),
-        );
-        assert!(scaled.starts_with("rate: -2048 .. 4096 (-1 .. 2 deg/s); sense I = "));
-        let other = Port::new("carrier", "NCO output, Q1.15");
-        assert!(described(&other, Interval::new(0, 1)).ends_with("; NCO output, Q1.15"));
-    }
 }

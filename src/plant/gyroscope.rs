@@ -26,11 +26,12 @@
 use super::converter::{Channel, Converter};
 use super::device::Device;
 use super::effects;
+use super::modes::Modes;
 use super::motion::{self, Couplings, Power};
 use super::thermal::Temperatures;
 use crate::design::{Gyro, ThermalRun};
 use crate::numeric::turn;
-use nalgebra::{Complex, Matrix2};
+use nalgebra::Complex;
 use std::f64::consts::TAU;
 
 type C = Complex<f64>;
@@ -113,18 +114,6 @@ pub struct Gyroscope {
     deviation: [f64; 4],
 }
 
-/// What depends on the temperature alone.
-#[derive(Debug, Clone, Copy)]
-struct Modes {
-    /// w1, w2, rad/s, and the widths w1/Q1, w2/Q2.
-    w: [f64; 2],
-    width: [f64; 2],
-    /// The electronics' phase that the drive channel adds, rad.
-    electronics_rad: f64,
-    /// The in-phase coupling, deg/s.
-    in_phase_dps: f64,
-}
-
 /// What the steady motion takes from modes and frequency alone.
 #[derive(Debug, Clone, Copy)]
 struct Tuned {
@@ -166,7 +155,13 @@ impl Gyroscope {
         let (w0, w2) = (TAU * gyro.drive_frequency_hz, TAU * gyro.sense_frequency_hz);
         let amplitude_lsb = reference.full_scale_lsb * run.drive_amplitude;
         let lsb_per_dps = reference.full_scale_lsb / run.sense_full_scale_dps;
-        let sense = response(w2, w2 / gyro.sense_q, w0);
+        let modes = Modes {
+            w: [w0, w2],
+            width: [w0 / gyro.drive_q, w2 / gyro.sense_q],
+            electronics_rad: 0.0,
+            in_phase_dps: 0.0,
+        };
+        let sense = modes.sense(w0);
         let error = gyro.demodulation_error_rad;
         let t0 = gyro.reference_temperature_k - super::resonator::ZERO_CELSIUS_K;
         let temperatures = Temperatures {
@@ -191,12 +186,7 @@ impl Gyroscope {
             sense_turn_rad: error - sense.arg(),
             sense_adc: Converter::new(&gyro.effects, Channel::Sense, 2),
             conditions,
-            modes: Modes {
-                w: [w0, w2],
-                width: [w0 / gyro.drive_q, w2 / gyro.sense_q],
-                electronics_rad: 0.0,
-                in_phase_dps: 0.0,
-            },
+            modes,
             tables: motion::Tables::new(Power::identity()),
             tuned: None,
             steady: Steady::default(),
@@ -235,7 +225,7 @@ impl Gyroscope {
     /// The drive gain at which the drive ADC sees `amplitude_lsb` at an excitation of `hz`.
     pub fn gain_for(&self, amplitude_lsb: f64, hz: f64) -> f64 {
         let w = TAU * hz;
-        let x = response(self.modes.w[0], self.modes.width[0], w);
+        let x = self.modes.drive(w);
         amplitude_lsb / (self.force * x.norm())
     }
 
@@ -338,7 +328,7 @@ impl Gyroscope {
 
     /// From a force on the sense mode to what its ADC sees.
     fn sense_response(&self, modes: &Modes, w: f64) -> C {
-        response(modes.w[1], modes.width[1], w) * C::cis(self.sense_turn_rad)
+        modes.sense(w) * C::cis(self.sense_turn_rad)
     }
 
     /// What modes and frequency make of a steady state; the drive's row is that without any turn.
@@ -350,7 +340,7 @@ impl Gyroscope {
         Tuned {
             step,
             ratio: C::new(0.0, w / w0),
-            drive: response(self.modes.w[0], self.modes.width[0], w) * self.force,
+            drive: self.modes.drive(w) * self.force,
             sense: self.sense_response(&self.modes, w),
             untwisted: C::cis(-self.sense_turn_rad),
             per_velocity,
@@ -418,7 +408,7 @@ impl Gyroscope {
         let [relative, hz] = self.device.effects.get("nco_spur")?;
         let w = TAU * hz;
         let m = &self.modes;
-        let x = response(m.w[0], m.width[0], w) * self.force * self.drive.gain * relative;
+        let x = m.drive(w) * self.force * self.drive.gain * relative;
         let u = C::new(0.0, hz / self.device.drive.frequency_hz) * x;
         let response = self.sense_response(m, w);
         let sense = self.rate_phasor(response, u) * self.steady.rate_dps;
@@ -437,14 +427,6 @@ impl Gyroscope {
         let width = [w[0] / c.drive_q, w[1] / self.device.sense.q];
         let w0 = TAU * self.device.drive.frequency_hz;
         let h = 1.0 / self.reference.sample_rate_hz;
-        let mode = |k: usize| Matrix2::new(0.0, w0, -w[k] * w[k] / w0, -width[k]) * h;
-        // The force on v' of the sense mode, by x and by u.
-        let rate_of_change = Power {
-            drive: mode(0),
-            sense: mode(1),
-            by_velocity: Matrix2::new(0.0, 0.0, 0.0, h / w0),
-            by_position: Matrix2::new(0.0, 0.0, h / w0, 0.0),
-        };
         let electronics = self.device.electronics_phase_rad(t.electronics_degc);
         let share = if self.reference.tracking {
             self.device.electronics.loop_share
@@ -458,7 +440,7 @@ impl Gyroscope {
             in_phase_dps: 0.0,
         };
         self.modes.in_phase_dps = self.in_phase_coupling_dps(&self.modes, electronics);
-        self.tables.set(rate_of_change.exp());
+        self.tables.set(self.modes.moved_by(h, w0));
         self.tuned = None;
     }
 
@@ -472,7 +454,7 @@ impl Gyroscope {
         } else {
             TAU * reference.excitation_hz
         };
-        let mut x = response(modes.w[0], modes.width[0], w);
+        let mut x = modes.drive(w);
         let measured_rad = x.arg() + electronics_rad;
         let nominal_lsb = self.force * reference.nominal_gain * self.device.drive.q / (w0 * w0);
         if reference.tracking || reference.held_amplitude {
@@ -495,11 +477,6 @@ impl Gyroscope {
 /// What an ADC whose channel is turned by an angle sees of displacement and velocity.
 fn turned(angle: f64, per_velocity: f64) -> [f64; 2] {
     [angle.cos(), per_velocity * angle.sin()]
-}
-
-/// 1 / (wn^2 - w^2 + i w width): a mode's displacement under a unit force of frequency w (eq. 5).
-fn response(wn: f64, width: f64, w: f64) -> C {
-    C::new(wn * wn - w * w, w * width).inv()
 }
 
 #[cfg(test)]

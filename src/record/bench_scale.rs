@@ -1,7 +1,9 @@
 //! What the columns of a bench capture are in: the scale from volts to codes, and the sample rate from a column of times.
 
-use super::bench_csv::{Named, ROWS_OF_A_TABLE, sidecar_name};
+use super::bench_cells::Named;
 use super::bench_keys::Scale;
+use super::bench_rows::ROWS_OF_A_TABLE;
+use super::capture_meta::sidecar_name;
 use crate::error::{InputError, Result};
 use std::path::Path;
 

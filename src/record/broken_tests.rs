@@ -52,96 +52,76 @@ pub(super) fn try_parse(
     })
 }
 
+/// Name, bytes, mapping, (line, column), parts of the printed error.
+type Case = (
+    &'static str,
+    Vec<u8>,
+    RecordMapping,
+    Option<(usize, usize)>,
+    &'static [&'static str],
+);
+
+/// A case without a mapping.
+fn plain(
+    name: &'static str,
+    bytes: Vec<u8>,
+    place: (usize, usize),
+    parts: &'static [&'static str],
+) -> Case {
+    (name, bytes, RecordMapping::default(), Some(place), parts)
+}
+
 #[test]
 fn broken_records_are_refused_with_their_place() {
-    let plain = RecordMapping::default();
     let map = |pairs: &[(&str, &str)]| mapping(pairs);
     let period = |p: f64| RecordMapping {
         row_period_s: Some(p),
         ..RecordMapping::default()
     };
     let rows = |n: usize| format!("{HEADER}\n{}\n", good_rows()[..n].join("\n")).into_bytes();
-    // name, bytes, mapping, (line, column), parts of the printed error
-    type Case = (
-        &'static str,
-        Vec<u8>,
-        RecordMapping,
-        Option<(usize, usize)>,
-        &'static [&'static str],
-    );
     let cases: Vec<Case> = vec![
-        (
-            "nothing",
-            vec![],
-            plain.clone(),
-            Some((1, 1)),
-            &["empty", "time_s,rate_out_dps"],
-        ),
-        (
-            "blank lines",
-            b"\n \n\r\n".to_vec(),
-            plain.clone(),
-            Some((1, 1)),
-            &["empty"],
-        ),
-        (
-            "comments only",
-            b"# a\n# b\n".to_vec(),
-            plain.clone(),
-            Some((1, 1)),
-            &["empty"],
-        ),
-        (
+        plain("nothing", vec![], (1, 1), &["empty", "time_s,rate_out_dps"]),
+        plain("blank lines", b"\n \n\r\n".to_vec(), (1, 1), &["empty"]),
+        plain("comments only", b"# a\n# b\n".to_vec(), (1, 1), &["empty"]),
+        plain(
             "header only",
             b"# a\ntime_s,rate_out_dps\n".to_vec(),
-            plain.clone(),
-            Some((2, 1)),
+            (2, 1),
             &["nothing after it"],
         ),
-        (
+        plain(
             "no header",
             b"1,2,3\n4,5,6\n".to_vec(),
-            plain.clone(),
-            Some((1, 1)),
+            (1, 1),
             &["no header", "numbers only"],
         ),
-        (
+        plain(
             "semicolons, a bad cell",
             format!("{HEADER}\n{}\n", good_rows().join("\n"))
                 .replace(',', ";")
                 .replace('.', ",")
                 .replace("0;0,000", "0;0,0x")
                 .into_bytes(),
-            plain.clone(),
-            Some((2, 3)),
+            (2, 3),
             &["0;0,0x;20,0", "rate_out_dps is no number"],
         ),
-        (
+        plain(
             "tabs",
             b"time_s\trate_out_dps\n1\t2\n".to_vec(),
-            plain.clone(),
-            Some((1, 1)),
+            (1, 1),
             &["tabs"],
         ),
-        (
-            "utf-16",
-            b"\xFF\xFEt\0i\0".to_vec(),
-            plain.clone(),
-            Some((1, 1)),
-            &["UTF-16"],
-        ),
-        (
+        plain("utf-16", b"\xFF\xFEt\0i\0".to_vec(), (1, 1), &["UTF-16"]),
+        plain(
             "latin-1",
             b"time_s,rate_out_dps,t_\xB0C\n".to_vec(),
-            plain.clone(),
-            Some((1, 23)),
+            (1, 23),
             &["0xB0", "not UTF-8"],
         ),
-        (
+        plain(
             "rate missing",
             with_header("time_s,gyro_x_dps,die_degc"),
-            plain.clone(),
-            Some((1, 1)),
+            (1, 1),
             &[
                 "no column rate_out_dps",
                 "the file has: time_s, gyro_x_dps, die_degc",
@@ -149,11 +129,10 @@ fn broken_records_are_refused_with_their_place() {
                 "rate_out_dps = \"gyro_x_dps\"",
             ],
         ),
-        (
+        plain(
             "time missing",
             with_header("t_ms,rate_out_dps,die_degc"),
-            plain.clone(),
-            Some((1, 1)),
+            (1, 1),
             &[
                 "no column time_s",
                 "row_period_s",
@@ -167,232 +146,205 @@ fn broken_records_are_refused_with_their_place() {
             Some((1, 1)),
             &["no column \"temp\"", "die_degc = \"die_degc\""],
         ),
-        (
+        plain(
             "twice the same",
             with_header("time_s,rate_out_dps,rate_out_dps"),
-            plain.clone(),
-            Some((1, 21)),
+            (1, 21),
             &["two columns are called \"rate_out_dps\": the 2nd and the 3rd"],
         ),
-        (
+        plain(
             "no name",
             with_header("time_s,rate_out_dps,"),
-            plain.clone(),
-            Some((2, 1)),
+            (2, 1),
             &["no name"],
         ),
-        (
+        plain(
             "open quote in the header",
             with_header("time_s,\"rate_out_dps"),
-            plain.clone(),
-            Some((1, 8)),
+            (1, 8),
             &["quote"],
         ),
-        (
+        plain(
             "open quote in a row",
             with_row(3, "3,\"0.1,23"),
-            plain.clone(),
-            Some((5, 3)),
+            (5, 3),
             &["quote"],
         ),
-        (
+        plain(
             "no number",
             with_row(4, "4, N/A ,24"),
-            plain.clone(),
-            Some((6, 4)),
+            (6, 4),
             &[
                 "\"N/A\" in column rate_out_dps is no number",
                 "nan = not measured",
                 "4, N/A ,24",
             ],
         ),
-        (
+        plain(
             "a number with its unit",
             with_row(4, "4,0.1,24 degC"),
-            plain.clone(),
-            Some((6, 7)),
+            (6, 7),
             &["\"24 degC\"", "unit belongs"],
         ),
-        (
+        plain(
             "decimal comma, quoted",
             with_row(0, "0,\"0,5\",20"),
-            plain.clone(),
-            Some((2, 3)),
+            (2, 3),
             &["\"0,5\"", "'.'"],
         ),
-        (
+        plain(
             "decimal comma, bare",
             with_row(0, "0,0,5,20"),
-            plain.clone(),
-            Some((2, 7)),
+            (2, 7),
             &["4 cells, and the header has 3", "decimal comma"],
         ),
-        (
+        plain(
             "typographic minus",
             with_row(0, "0,\u{2212}0.5,20"),
-            plain.clone(),
-            Some((2, 3)),
+            (2, 3),
             &["'-' (ASCII)"],
         ),
-        (
+        plain(
             "infinite",
             with_row(19, "19,-inf,39"),
-            plain.clone(),
-            Some((21, 4)),
+            (21, 4),
             &["not finite", "leave the cell empty"],
         ),
-        (
+        plain(
             "too large",
             with_row(19, "19,1e400,39"),
-            plain.clone(),
-            Some((21, 4)),
+            (21, 4),
             &["not finite"],
         ),
-        (
+        plain(
             "hexadecimal",
             with_row(2, "0x02,0.1,22"),
-            plain.clone(),
-            Some((4, 1)),
+            (4, 1),
             &["\"0x02\" in column time_s"],
         ),
-        (
+        plain(
             "a cell too few",
             with_row(7, "7,0.1"),
-            plain.clone(),
-            Some((9, 6)),
+            (9, 6),
             &["2 cells, and the header has 3", "die_degc"],
         ),
-        (
+        plain(
             "a broken last line",
             with_row(19, "19,0."),
-            plain.clone(),
-            Some((21, 6)),
+            (21, 6),
             &["2 cells", "an empty cell still needs its comma"],
         ),
-        (
+        plain(
             "a file that ends in the middle of a row",
             {
                 let mut text = with_row(19, "19");
                 text.pop();
                 text
             },
-            plain.clone(),
-            Some((21, 3)),
+            (21, 3),
             &["1 cell, and", "the file ends in the middle of this row"],
         ),
-        (
+        plain(
             "a file that ends in the sign of its last cell",
             {
                 let mut text = with_row(19, "19,0.5,-");
                 text.pop();
                 text
             },
-            plain.clone(),
-            Some((21, 8)),
+            (21, 8),
             &[
                 "\"-\" in column die_degc",
                 "the file ends in the middle of this row",
             ],
         ),
-        (
+        plain(
             "a file that ends in a quote of its last row",
             {
                 let mut text = with_row(19, "19,0.5,\"2");
                 text.pop();
                 text
             },
-            plain.clone(),
-            Some((21, 8)),
+            (21, 8),
             &[
                 "quote is not closed",
                 "the file ends in the middle of this row",
             ],
         ),
-        (
+        plain(
             "a last cell that is no beginning of a number",
             {
                 let mut text = with_row(19, "19,0.5,n/a");
                 text.pop();
                 text
             },
-            plain.clone(),
-            Some((21, 8)),
+            (21, 8),
             &["\"n/a\" in column die_degc", "leave the cell empty"],
         ),
-        (
+        plain(
             "a sign alone in a row that ends",
             with_row(19, "19,0.5,-"),
-            plain.clone(),
-            Some((21, 8)),
+            (21, 8),
             &["\"-\" in column die_degc", "leave the cell empty"],
         ),
-        (
+        plain(
             "a comment among the rows",
             with_row(7, "# restarted"),
-            plain.clone(),
-            Some((9, 1)),
+            (9, 1),
             &["comment", "before the header"],
         ),
-        (
+        plain(
             "time decreases",
             with_row(9, "7.5,0.1,29"),
-            plain.clone(),
-            Some((11, 1)),
+            (11, 1),
             &[
                 "time decreases: 7.5 s after 8 s (line 10)",
                 "only this time is out of order",
             ],
         ),
-        (
+        plain(
             "time decreases, and no row shows that it goes on",
             with_row(19, "7.5,0.1,39"),
-            plain.clone(),
-            Some((21, 1)),
+            (21, 1),
             &[
                 "time decreases: 7.5 s after 18 s (line 20)",
                 "time_since_power_on_s",
             ],
         ),
-        (
+        plain(
             "a wild time in the middle",
             with_row(9, "1700000000,0.1,29"),
-            plain.clone(),
-            Some((11, 1)),
+            (11, 1),
             &[
                 "1700000000 s is a wild one",
                 "8 s before it (line 10)",
                 "10 s after it (line 12)",
             ],
         ),
-        (
+        plain(
             "a wild time in the first row",
             with_row(0, "1700000000,0.1,29"),
-            plain.clone(),
-            Some((2, 1)),
+            (2, 1),
             &["1700000000 s is a wild one", "1 s after it (line 3)"],
         ),
-        (
+        plain(
             "a wild time in the last row",
             with_row(19, "1700000000,0.1,29"),
-            plain.clone(),
-            Some((21, 1)),
+            (21, 1),
             &[
                 "1700000000 s of the last row is a wild one",
                 "(line 20) is at 18 s",
             ],
         ),
-        (
+        plain(
             "the header again",
             with_row(9, HEADER),
-            plain.clone(),
-            Some((11, 1)),
+            (11, 1),
             &["the header row again", "two records"],
         ),
-        (
+        plain(
             "the header again, with a mark",
             with_row(9, &format!("\u{feff}{HEADER}")),
-            plain.clone(),
-            Some((11, 1)),
+            (11, 1),
             &["the header row again"],
         ),
         (
@@ -408,39 +360,30 @@ fn broken_records_are_refused_with_their_place() {
             Some((7, 8)),
             &["time decreases: 1 s after 4 s"],
         ),
-        (
+        plain(
             "time stands",
             format!("{HEADER}\n{}", "5,0.1,20\n".repeat(20)).into_bytes(),
-            plain.clone(),
-            Some((21, 1)),
+            (21, 1),
             &["never advances", "row_period_s"],
         ),
-        (
+        plain(
             "no time at all",
             format!("{HEADER}\n{}", ",0.1,20\n".repeat(20)).into_bytes(),
-            plain.clone(),
-            Some((2, 1)),
+            (2, 1),
             &["time_s holds no measured value"],
         ),
-        (
+        plain(
             "no rate at all",
             format!(
                 "{HEADER}\n{}",
                 (0..20).map(|k| format!("{k},nan,20\n")).collect::<String>()
             )
             .into_bytes(),
-            plain.clone(),
-            Some((21, 1)),
+            (21, 1),
             &["only 0 rows"],
         ),
-        (
-            "nine rows",
-            rows(9),
-            plain.clone(),
-            Some((10, 1)),
-            &["only 9 rows", "10"],
-        ),
-        (
+        plain("nine rows", rows(9), (10, 1), &["only 9 rows", "10"]),
+        plain(
             "text among numbers in an auxiliary column",
             format!(
                 "time_s,rate_out_dps,flow\n{}",
@@ -456,18 +399,16 @@ fn broken_records_are_refused_with_their_place() {
                     .collect::<String>()
             )
             .into_bytes(),
-            plain.clone(),
-            Some((7, 7)),
+            (7, 7),
             &["\"low\" in column flow"],
         ),
-        (
+        plain(
             "kelvin under a name that says degC",
             (0..20).fold(format!("{HEADER}\n").into_bytes(), |mut text, k| {
                 text.extend(format!("{k},{:.3},{}\n", 0.1 * f64::from(k % 7), 290 + k).bytes());
                 text
             }),
-            plain.clone(),
-            Some((1, 21)),
+            (1, 21),
             &["looks like kelvin", "unit = \"K\""],
         ),
         (
@@ -525,7 +466,7 @@ fn broken_records_are_refused_with_their_place() {
             assert!(text.contains(part), "{name}: no \"{part}\" in\n{text}");
         }
     }
-    let error = read(Path::new("no/such/record.csv"), &plain).unwrap_err();
+    let error = read(Path::new("no/such/record.csv"), &RecordMapping::default()).unwrap_err();
     assert!(
         error
             .to_string()

@@ -1,7 +1,9 @@
 //! A capture in CSV: its own byte parser, a line at a time out of one bounded buffer.
 
+use super::bench_cells;
 use super::bench_csv;
 use super::bench_keys::{BenchKeys, Scale};
+use super::bench_rows;
 use super::capture::{COLUMNS, Codes, HEADER_HELP};
 use super::capture_header::{Layout, names_a_column, read_comment, read_header, refuse_thermal};
 use super::capture_lines::{Line, Lines};
@@ -89,7 +91,7 @@ impl CsvSource {
                 let text = String::from_utf8_lossy(&bytes);
                 let found = bench_csv::table((path, number), &text, &keys, &mut meta)?;
                 let Some(table) = found.filter(|table| table.before > 0) else {
-                    let why = bench_csv::no_rows((path, number), &text);
+                    let why = bench_rows::no_rows((path, number), &text);
                     return Err(why.map_or(e, Error::from));
                 };
                 // The header's own line is taken already.
@@ -324,7 +326,7 @@ fn slow_row(line: Line<'_>, layout: Layout, codes: Codes) -> Result<[i32; 2]> {
 /// has.
 fn bench_row(line: Line<'_>, layout: Layout, codes: Codes, bench: Bench) -> Result<[i32; 2]> {
     let text = String::from_utf8_lossy(line.bytes);
-    let cells = bench_csv::cells(&text, bench.separator);
+    let cells = bench_cells::cells(&text, bench.separator);
     let start = |cell: usize| -> usize {
         let cells = line.bytes.split(|b| *b == bench.separator).take(cell);
         cells.map(|c| c.len() + 1).sum()
@@ -345,7 +347,7 @@ fn bench_row(line: Line<'_>, layout: Layout, codes: Codes, bench: Bench) -> Resu
         let cell = cells.get(column).map_or("", String::as_str);
         let shown = shorten(cell.as_bytes());
         let refuse = |message: &str| line.refuse(start(column).min(line.bytes.len()), message);
-        let Some(value) = bench_csv::number(cell, bench.separator) else {
+        let Some(value) = bench_cells::number(cell, bench.separator) else {
             let (message, help) = no_reading(cell, name, "finite number");
             return Err(refuse(&message).help(help).into());
         };
@@ -381,7 +383,7 @@ const VOLTS_HELP: &str = "a code is written in digits alone, with a `-` where it
 
 /// A cell that holds no `wanted`: message and remedy.
 fn no_reading(cell: &str, name: &str, wanted: &str) -> (String, String) {
-    if bench_csv::is_mark(cell) {
+    if bench_rows::is_mark(cell) {
         return (
             format!("{name} is `{cell}`: the instrument was overloaded here, or had no reading"),
             "capture again with a larger range. The rows are samples at one rate, so that none in the middle can be left out: else \

@@ -1,10 +1,9 @@
 //! The head of a CSV capture: comment lines with keys, and the header line that names the columns.
 
-use super::bench_csv;
 use super::bench_keys::{BenchKeys, KeyValue};
 use super::capture::{COLUMNS, HEADER_HELP};
 use super::capture_lines::Line;
-use super::capture_meta::{CaptureMeta, Value};
+use super::capture_meta::{CaptureMeta, Value, sidecar_name};
 use super::capture_places::Places;
 use crate::design::record_columns::{is_known, unit_of};
 use crate::design::units;
@@ -112,7 +111,7 @@ pub(super) fn read_header(line: Line<'_>, places: &mut Places) -> Result<Layout>
         let e = InputError::new(message).in_file(line.path);
         let help = format!(
             "{HEADER_HELP}; samples without a header need a side-car: write `item = \"int16\"` into {} beside it",
-            bench_csv::sidecar_name(line.path)
+            sidecar_name(line.path)
         );
         return Err(e.help(help).into());
     }

@@ -215,6 +215,13 @@ pub(super) fn sidecar_of(capture: &Path) -> PathBuf {
     }
 }
 
+/// The name of a capture's side-car.
+pub(super) fn sidecar_name(path: &Path) -> String {
+    let name = sidecar_of(path);
+    name.file_name()
+        .map_or(String::new(), |n| n.to_string_lossy().into_owned())
+}
+
 /// The text of a side-car, `None` if there is no such file.
 fn read_sidecar(path: &Path) -> Result<Option<String>> {
     let failed = |e: std::io::Error| io_error(path, "read the capture's side-car", &e);

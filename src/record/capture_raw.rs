@@ -1,9 +1,9 @@
 //! A capture of raw samples, all channels of a row one after the other, as its side-car says; and the NPY arrays that need
 //! the same keys: real numbers in volts, more than two columns.
 
-use super::bench_csv::sidecar_name;
 use super::bench_keys::{BenchKeys, Item, Scale};
 use super::capture::{COLUMNS, Codes};
+use super::capture_meta::sidecar_name;
 use super::npy_header::{Header, HeaderError};
 use crate::error::{InputError, Result, io_error};
 use std::fs::File;

@@ -1,6 +1,6 @@
 //! Measured records: thermal records and captures (`docs/manual.md`).
 //!
-//! [`thermal`] reads a thermal record; `cells` cuts its lines and reads its numbers, [`columns`]
+//! [`thermal`] reads a thermal record, `thermal_rows` its rows; `cells` cuts its lines and reads its numbers, [`columns`]
 //! says which column plays which part, `clock` puts the rows in time, `plausibility` (with `scale`
 //! and `timing`) and `frozen` look for what is readable but unlikely; `ulog` and `dataflash` read
 //! autopilots' logs, which `averager` makes rows of; `shorten` averages rows; [`read_any`] takes whatever a file is. [`capture`] streams captured ADC codes
@@ -10,8 +10,10 @@
 mod any;
 mod applied;
 mod averager;
+mod bench_cells;
 mod bench_csv;
 mod bench_keys;
+mod bench_rows;
 mod bench_scale;
 pub mod capture;
 mod capture_codes;
@@ -47,6 +49,7 @@ mod stopped;
 mod temperature;
 pub mod thermal;
 mod thermal_record;
+mod thermal_rows;
 mod timing;
 mod ulog;
 mod ulog_fields;
@@ -56,6 +59,8 @@ mod unpack;
 mod visits;
 mod warning;
 
+#[cfg(test)]
+mod bench_binary_tests;
 #[cfg(test)]
 mod bench_tests;
 #[cfg(test)]
@@ -70,6 +75,8 @@ mod capture_tests;
 mod dataflash_tests;
 #[cfg(test)]
 mod log_cases_tests;
+#[cfg(test)]
+mod log_correction_tests;
 #[cfg(test)]
 mod mutation_tests;
 #[cfg(test)]
