@@ -122,3 +122,9 @@ pub fn rms(points: &Points, of: impl Fn(&Point) -> f64) -> f64 {
     let sum: f64 = points.iter().map(|p| of(&p).powi(2)).sum();
     (sum / points.len().max(1) as f64).sqrt()
 }
+
+/// Standard deviation about the mean.
+pub fn deviation(points: &Points, of: impl Fn(&Point) -> f64) -> f64 {
+    let mean = points.iter().map(|p| of(&p)).sum::<f64>() / points.len().max(1) as f64;
+    rms(points, |p| of(p) - mean)
+}
