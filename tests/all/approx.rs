@@ -2,7 +2,7 @@
 
 mod evaluator;
 
-use crate::common::command::gyrogen_here;
+use crate::common::command::{gyrogen_here, told};
 use crate::common::dice::Dice;
 use evaluator::{Evaluator, checksum};
 use serde_json::Value;
@@ -19,7 +19,7 @@ fn approx(folder: &Path, arguments: &[&str]) -> Value {
     ];
     all.extend(arguments);
     let output = gyrogen_here(&all);
-    let told = String::from_utf8_lossy(&output.stderr);
+    let told = told(&output);
     assert!(output.status.success(), "{arguments:?}: {told}");
     let json: Value = serde_json::from_slice(&output.stdout).unwrap();
     let written = std::fs::read_to_string(folder.join("approx.json")).unwrap();
@@ -223,7 +223,7 @@ fn distribution(what: &str, mut ratios: Vec<f64>) {
 fn verified(folder: &Path) {
     for language in ["c", "rust"] {
         let output = gyrogen_here(&["verify", folder.join(language).to_str().unwrap()]);
-        let told = String::from_utf8_lossy(&output.stderr);
+        let told = told(&output);
         assert!(output.status.success(), "{language}: {told}");
     }
 }

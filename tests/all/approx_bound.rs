@@ -1,7 +1,8 @@
 //! `gyrogen approx --bound`: the shortest words that keep the bound, and what is said where none do.
 
+use crate::common::command::{gyrogen, told};
 use serde_json::Value;
-use std::process::{Command, Output};
+use std::process::Output;
 
 const BIAS: [&str; 8] = [
     "approx",
@@ -24,28 +25,23 @@ const SINE: [&str; 8] = [
     "Q1.15",
 ];
 
-fn gyrogen(request: &[&str], more: &[&str]) -> Output {
+fn approx(request: &[&str], more: &[&str]) -> Output {
     let folder = tempfile::tempdir().unwrap();
-    Command::new(env!("CARGO_BIN_EXE_gyrogen"))
-        .args(request)
-        .args(more)
-        .args(["--format", "json", "--out"])
-        .arg(folder.path().join("out"))
-        .output()
-        .unwrap()
+    let own = ["--format", "json", "--out", "out"];
+    gyrogen(&[request, more, &own[..]].concat(), folder.path())
 }
 
 fn made(request: &[&str], more: &[&str]) -> Value {
-    let output = gyrogen(request, more);
-    let told = String::from_utf8_lossy(&output.stderr);
+    let output = approx(request, more);
+    let told = told(&output);
     assert!(output.status.success(), "{more:?}: {told}");
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
 fn refused(request: &[&str], more: &[&str]) -> String {
-    let output = gyrogen(request, more);
+    let output = approx(request, more);
     assert_eq!(output.status.code(), Some(2));
-    String::from_utf8_lossy(&output.stderr).into_owned()
+    told(&output)
 }
 
 fn fraction_bits(json: &Value, which: &str) -> u32 {

@@ -1,6 +1,7 @@
 //! The figures that coefficients must reach or beat: what Sollya's fpminimax gives for the same coefficients'
 //! formats, under ideal evaluation and in the same 16-bit datapath.
 
+use crate::common::command::told;
 use serde_json::Value;
 use std::process::Command;
 use std::time::Instant;
@@ -64,7 +65,7 @@ fn approx(case: &Case, input: &str, output: &str, coefficients: &str) -> Value {
         .arg(folder.path())
         .output()
         .unwrap();
-    let told = String::from_utf8_lossy(&run.stderr);
+    let told = told(&run);
     assert!(run.status.success(), "{} {told}", case.function);
     print!("{:.2} s  ", started.elapsed().as_secs_f64());
     serde_json::from_slice(&run.stdout).unwrap()

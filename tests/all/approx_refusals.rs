@@ -1,6 +1,6 @@
 //! What `gyrogen approx` cannot use is refused with the reason, and nothing is written.
 
-use crate::common::command::gyrogen_here;
+use crate::common::command::{gyrogen_here, told};
 
 #[test]
 fn what_cannot_be_used_is_refused_with_the_reason() {
@@ -200,7 +200,7 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
         let mut all = vec!["approx", "--out", out.to_str().unwrap()];
         all.extend(&arguments);
         let output = gyrogen_here(&all);
-        let told = String::from_utf8_lossy(&output.stderr);
+        let told = told(&output);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {told}");
         for word in expected {
             assert!(

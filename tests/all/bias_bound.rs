@@ -1,12 +1,12 @@
 //! `compensation.bound_dps` as a user meets it: `run`, then everything that takes the design that it writes.
 
-use crate::common::command::gyrogen;
+use crate::common::command::{gyrogen, told};
 use serde_json::Value;
 use std::path::Path;
 
 fn good(arguments: &[&str], folder: &Path) -> String {
     let output = gyrogen(arguments, folder);
-    let talk = String::from_utf8_lossy(&output.stderr);
+    let talk = told(&output);
     assert_eq!(output.status.code(), Some(0), "{arguments:?}: {talk}");
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
@@ -14,7 +14,7 @@ fn good(arguments: &[&str], folder: &Path) -> String {
 fn refused(design: &str, folder: &Path) -> String {
     std::fs::write(folder.join("bad.toml"), design).expect("a file");
     let output = gyrogen(&["run", "bad.toml", "--out", "bad"], folder);
-    let talk = String::from_utf8_lossy(&output.stderr).into_owned();
+    let talk = told(&output);
     assert_eq!(output.status.code(), Some(2), "{talk}");
     assert!(talk.contains("help:"), "{talk}");
     talk

@@ -1,18 +1,16 @@
 //! A bundle in the hands of somebody without gyrogen: `make check`, CMake and `cargo test` pass, and damage fails.
 
-use crate::common::command::{all_of, run};
+use crate::common::command::{all_of, good, run};
 use crate::oracle::harness::binary;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 fn emitted(language: &str, at: &Path) -> PathBuf {
     let folder = at.join(language);
-    let output = Command::new(binary())
-        .args(["emit", "--lang", language, "--out"])
-        .arg(&folder)
-        .output()
-        .expect("the binary under test starts");
-    assert!(output.status.success());
+    good(&run(
+        &binary(),
+        &["emit", "--lang", language, "--out", language],
+        at,
+    ));
     folder
 }
 

@@ -1,7 +1,7 @@
 //! `outside = "flag"`: the emitted firmware, the model and a definition written out here say the same about every
 //! input, and damage to an end of the range is found.
 
-use crate::common::command::{gyrogen, told};
+use crate::common::command::{good, gyrogen, told};
 use serde_json::Value;
 use std::path::Path;
 
@@ -10,7 +10,7 @@ fn design(folder: &Path, range: &str, input: &str) {
     // Never over an existing file.
     let _ = std::fs::remove_file(folder.join("plain.toml"));
     let made = gyrogen(&["init", "plain.toml"], folder);
-    assert!(made.status.success(), "{}", told(&made));
+    good(&made);
     let text = std::fs::read_to_string(folder.join("plain.toml")).unwrap();
     let text = text
         .replace("#outside = \"clamp\"", "outside = \"flag\"")
@@ -57,9 +57,9 @@ fn the_flag_is_the_same_in_c_and_rust_and_damage_to_an_end_is_found() {
                 "emit", "d.toml", "--lang", language, "--part", part, "--out",
             ];
             let made = gyrogen(&[&arguments[..], &[bundle.as_str()]].concat(), at);
-            assert!(made.status.success(), "{}", told(&made));
+            good(&made);
             let verified = gyrogen(&["verify", &bundle], at);
-            assert!(verified.status.success(), "{}", told(&verified));
+            good(&verified);
 
             let rows = vectors(at, &bundle);
             for (word, flag) in &rows {
@@ -122,7 +122,7 @@ fn the_chain_s_rows_carry_the_flag_and_no_other_contract_does() {
             "rows.csv",
         ];
         let made = gyrogen(&arguments, at);
-        assert!(made.status.success(), "{}", told(&made));
+        good(&made);
         let rows = std::fs::read_to_string(at.join("rows.csv")).unwrap();
         let header: Vec<&str> = rows.lines().next().unwrap().split(',').collect();
         assert_eq!(header.last() == Some(&"in_range"), flagged);

@@ -1,7 +1,7 @@
 //! `gyrogen close` of a simulated gyro without any effect beyond the declared model: what its circuit does to the
 //! readings (noise that both channels share, coarse words) is no physical cause.
 
-use crate::common::command::gyrogen_in;
+use crate::common::command::{good, gyrogen_in};
 use gyrogen::design::reader;
 use serde_json::Value;
 use std::f64::consts::TAU;
@@ -44,11 +44,7 @@ fn closed(folder: &Path, text: &str) -> Value {
     for command in [simulate, close] {
         let arguments: Vec<&str> = command.split(' ').collect();
         let out = gyrogen_in(folder, &arguments, &[]);
-        assert!(
-            out.status.success(),
-            "{}",
-            String::from_utf8_lossy(&out.stderr)
-        );
+        good(&out);
     }
     let text = fs::read_to_string(folder.join("closed/closure.json")).unwrap();
     serde_json::from_str(&text).unwrap()

@@ -1,6 +1,6 @@
 //! `gyrogen emit` of a design with a correction and `gyrogen verify` from a design file.
 
-use crate::common::command::gyrogen;
+use crate::common::command::{gyrogen, told};
 use std::path::Path;
 
 const DESIGN: &str = r#"
@@ -44,10 +44,10 @@ fn a_design_with_a_correction_becomes_firmware_that_verifies() {
             &[&["emit", "design.toml"], &part[..]].concat(),
             folder.path(),
         );
-        let said = String::from_utf8_lossy(&emitted.stderr).into_owned();
+        let said = told(&emitted);
         assert!(emitted.status.success(), "{said}");
         let verified = gyrogen(&["verify", language], folder.path());
-        let said = String::from_utf8_lossy(&verified.stderr).into_owned();
+        let said = told(&verified);
         assert!(verified.status.success(), "{said}");
     }
     let manifest = std::fs::read_to_string(folder.path().join("c/manifest.json"));
@@ -69,14 +69,14 @@ fn without_a_correction_there_is_nothing_to_emit() {
     let part = ["emit", "--part", "correction", "--lang", "c", "--out", "c"];
     let emitted = gyrogen(&part, folder.path());
     assert_eq!(emitted.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&emitted.stderr).contains("[correction]"));
+    assert!(told(&emitted).contains("[correction]"));
 }
 
 /// Exit status and talk of an `emit` to C.
 fn emitted(design: &[&str], part: &[&str], folder: &Path) -> (Option<i32>, String) {
     let fixed = ["--lang", "c", "--out", "c"];
     let output = gyrogen(&[&["emit"], design, part, &fixed[..]].concat(), folder);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let said = told(&output);
     (output.status.code(), said)
 }
 

@@ -1,6 +1,7 @@
 //! The cost model against instructions that were counted: the emitted C, compiled at `-O2` for a processor, run
 //! under qemu one instruction at a time. Needs the cross compilers and qemu's user mode; `.ci/run` has them.
 
+use crate::common::command::told;
 use crate::common::dice::Dice;
 use gyrogen::cost::{self, Target};
 use gyrogen::design::{Design, reader, template};
@@ -244,7 +245,7 @@ fn fresh() -> Vec<(String, Design)> {
 fn run(command: &mut Command) -> String {
     let out = command.output();
     let out = out.unwrap_or_else(|e| panic!("{command:?}: {e}; .ci/cross installs it"));
-    let text = String::from_utf8_lossy(&out.stderr);
+    let text = told(&out);
     assert!(out.status.success(), "{command:?}: {}: {text}", out.status);
     String::from_utf8_lossy(&out.stdout).into_owned()
 }

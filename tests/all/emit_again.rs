@@ -1,7 +1,7 @@
 //! A command that is called again with the folder of an earlier call: what is replaced is said, and what somebody edited,
 //! another design's firmware and that of the other language stay unless that is forced.
 
-use crate::common::command::gyrogen_in;
+use crate::common::command::{gyrogen_in, told};
 use std::fs;
 use std::path::Path;
 
@@ -26,7 +26,7 @@ fn edited() -> String {
 /// Status and talk of a command.
 fn gyrogen(folder: &Path, arguments: &[&str]) -> (Option<i32>, String) {
     let out = gyrogen_in(folder, arguments, &[]);
-    let said = String::from_utf8_lossy(&out.stderr).into_owned();
+    let said = told(&out);
     (out.status.code(), said)
 }
 

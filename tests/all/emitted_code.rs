@@ -1,6 +1,7 @@
 //! What the emitted C is to a compiler: equal functions are there once, no argument overflows, a shift is one
 //! instruction, and the chain links beside the correction of the same product.
 
+use crate::common::command::{good, told};
 use crate::common::compiler::cc;
 use gyrogen::design::template::DEFAULT;
 use gyrogen::design::{Design, reader};
@@ -41,7 +42,7 @@ fn compile(folder: &Path, arguments: &[&str]) {
         .args(arguments)
         .output()
         .expect("a C compiler");
-    let said = String::from_utf8_lossy(&out.stderr);
+    let said = told(&out);
     assert!(out.status.success(), "cc {arguments:?}: {said}");
 }
 
@@ -130,11 +131,7 @@ fn no_argument_of_a_parameters_type_overflows() {
     let ran = Command::new(folder.path().join("run"))
         .output()
         .expect("it runs");
-    assert!(
-        ran.status.success(),
-        "{}",
-        String::from_utf8_lossy(&ran.stderr)
-    );
+    good(&ran);
 }
 
 /// The helpers of the header as functions of their own.

@@ -1,5 +1,6 @@
 //! `gyrogen equiv` as a user runs it: repairs, two designs, threads, counterexamples.
 
+use crate::common::command::{gyrogen_here, told};
 use gyrogen::design::{Design, reader};
 use gyrogen::equivalence::job::{Stimulus, counterexample};
 use gyrogen::equivalence::outcome::Emitted;
@@ -9,12 +10,17 @@ use gyrogen::verify::compare::Compared;
 use proptest::prelude::*;
 use serde_json::Value;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
 fn equiv(arguments: &[&str], out: &Path) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gyrogen"));
-    command.arg("equiv").args(arguments).arg("--out").arg(out);
-    command.output().expect("gyrogen starts")
+    gyrogen_here(
+        &[
+            &["equiv"],
+            arguments,
+            &["--out", out.to_str().expect("UTF-8")],
+        ]
+        .concat(),
+    )
 }
 
 fn result(out: &Path) -> Value {
@@ -63,7 +69,7 @@ fn repaired(design: &str, key: &str, from: &str, to: &str, arguments: &[&str]) {
     let mut all = vec![file.to_str().expect("UTF-8")];
     all.extend(arguments);
     let output = equiv(&all, &out);
-    let talk = String::from_utf8_lossy(&output.stderr);
+    let talk = told(&output);
     assert_eq!(output.status.code(), Some(1), "{key}: {talk}");
     assert!(
         talk.contains("overflow at sample") && talk.contains(key),
@@ -89,7 +95,7 @@ fn repaired(design: &str, key: &str, from: &str, to: &str, arguments: &[&str]) {
     }
     std::fs::write(&file, &design).expect("written");
     let output = equiv(&all, &out);
-    let talk = String::from_utf8_lossy(&output.stderr);
+    let talk = told(&output);
     assert_eq!(output.status.code(), Some(0), "{key}: {talk}");
     let json = result(&out);
     assert_eq!(json["first_overflow"], Value::Null);
@@ -163,11 +169,11 @@ fn two_designs_are_compared_word_by_word() {
     assert_eq!(sample.map(|s| s % 32), Some(31));
     let [a, b] = [0, 1].map(|k| first["values"][k].as_i64().expect("an integer"));
     assert_eq!(a - b, 1, "half_up and floor differ by one step");
-    assert!(String::from_utf8_lossy(&output.stderr).contains("differ first at sample"));
+    assert!(told(&output).contains("differ first at sample"));
 
     let output = run(&ratio);
     assert_eq!(output.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&output.stderr).contains("circuit.decimator.ratio"));
+    assert!(told(&output).contains("circuit.decimator.ratio"));
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! A file of each kind that is read goes to compiled firmware without a design, and the choices are printed.
 
-use crate::common::command::gyrogen_in;
+use crate::common::command::{gyrogen_in, told};
 use crate::common::logs;
 use std::fmt::Write as _;
 use std::fs;
@@ -44,7 +44,7 @@ fn zstd(bytes: &[u8]) -> Vec<u8> {
 fn gyrogen(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, String) {
     let out = gyrogen_in(folder, arguments, &[]);
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    (out.status.code(), text(&out.stdout), text(&out.stderr))
+    (out.status.code(), text(&out.stdout), told(&out))
 }
 
 #[test]

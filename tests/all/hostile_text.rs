@@ -6,6 +6,7 @@
 //!
 //! `GYROGEN_HOSTILE=N`: so many texts.
 
+use crate::common::command::told;
 use crate::common::dice::Dice;
 use gyrogen::correction::Correction;
 use gyrogen::design::reader;
@@ -268,7 +269,7 @@ fn two_hundred_hostile_bundles_compile() {
             assert!(
                 output.status.success(),
                 "{round} {columns:?} {command:?}: {}",
-                String::from_utf8_lossy(&output.stderr)
+                told(&output)
             );
         }
     }

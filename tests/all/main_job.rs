@@ -1,6 +1,6 @@
 //! The main job as a user runs it: the embedded default, and real records where they are at hand.
 
-use crate::common::command::{gyrogen_here, text};
+use crate::common::command::{gyrogen_here, text, told};
 use crate::common::json::number;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
@@ -14,7 +14,7 @@ fn run(design: Option<&Path>, record: Option<&Path>, out: &Path) -> Value {
     }
     arguments.extend(["--out", text(out), "--format", "json"]);
     let output = gyrogen_here(&arguments);
-    let talk = String::from_utf8_lossy(&output.stderr);
+    let talk = told(&output);
     assert_eq!(output.status.code(), Some(0), "{talk}");
     let printed: Value = serde_json::from_slice(&output.stdout).expect("JSON on stdout");
     let written = std::fs::read(out.join("summary.json")).expect("summary.json");
@@ -247,7 +247,7 @@ fn a_phase_in_degrees_stops_only_a_fit_over_it() {
     std::fs::write(&record, csv).expect("a record");
     let out = folder.path().join("out");
     let refused = gyrogen_here(&["run", "--record", text(&record), "--out", text(&out)]);
-    let talk = String::from_utf8_lossy(&refused.stderr);
+    let talk = told(&refused);
     assert_eq!(refused.status.code(), Some(2), "{talk}");
     assert!(
         talk.contains("phase_rad") && talk.contains("57.29578"),
@@ -314,7 +314,7 @@ fn gaps_in_the_applied_rate_and_the_fitted_design() {
     let other = folder.path().join("other");
     let own = gyrogen_here(&["run", text(&design), "--out", text(&other)]);
     assert_eq!(own.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&own.stderr).contains("--record"));
+    assert!(told(&own).contains("--record"));
 }
 
 /// What cannot be used ends with status 2, says what to do, and writes nothing.
@@ -365,7 +365,7 @@ fn unusable_input_writes_nothing() {
         arguments.extend(design.map(|d: &PathBuf| text(d)));
         arguments.extend(["--record", text(record), "--out", text(&out)]);
         let output = gyrogen_here(&arguments);
-        let talk = String::from_utf8_lossy(&output.stderr);
+        let talk = told(&output);
         assert_eq!(output.status.code(), Some(2), "{words}: {talk}");
         assert!(talk.contains(words), "{words}: {talk}");
         assert!(

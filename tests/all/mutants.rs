@@ -6,13 +6,13 @@
 //! With esbmc, a model checker of C, on the PATH (or named by `GYROGEN_ESBMC`), those are told that are proved equal.
 //! Harness and model checker have so many seconds of processor time, so that a busy machine does not decide.
 
+use crate::common::command::{good, run};
 use crate::mutation::{Answer, Bundle, Fate, Mutant, mutants};
 use crate::oracle::harness::{binary, setting};
 use crate::oracle::toml_text::Printer;
 use crate::oracle::{edges, golden};
 use crate::rng::Rng;
 use std::path::Path;
-use std::process::Command;
 
 const CORRECTION: &str = r#"
 name = "corrected"
@@ -34,19 +34,6 @@ terms = [
 ]
 "#;
 
-fn gyrogen(arguments: &[&str], folder: &Path) {
-    let output = Command::new(binary())
-        .args(arguments)
-        .current_dir(folder)
-        .output();
-    let output = output.expect("the binary under test starts");
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
-}
-
 /// Emits a bundle by these arguments and makes it ready.
 fn bundle(folder: &Path, name: &str, design: Option<&str>, arguments: &[&str]) -> Bundle {
     let at = folder.join(name);
@@ -54,7 +41,7 @@ fn bundle(folder: &Path, name: &str, design: Option<&str>, arguments: &[&str]) -
     if let Some(design) = design {
         std::fs::write(at.join("design.toml"), design).expect("written");
     }
-    gyrogen(arguments, &at);
+    good(&run(&binary(), arguments, &at));
     let bundle = Bundle::new(at.join("c"), at.join("build"));
     let whole = bundle.whole();
     for check in bundle.checks() {

@@ -1,7 +1,7 @@
 //! Nothing of the user's is lost: inputs are never written over, every failed write is told, an end at any moment leaves
 //! nothing behind.
 
-use crate::common::command::gyrogen_in;
+use crate::common::command::{APPROX, good, gyrogen_in, shell, told};
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -17,20 +17,6 @@ fn capture() -> String {
     }
     csv
 }
-
-const APPROX: [&str; 11] = [
-    "approx",
-    "--function=-x^2",
-    "--domain=-1,1",
-    "--input",
-    "Q1.9",
-    "--output",
-    "Q2.10",
-    "--degree",
-    "2",
-    "--coefficients",
-    "Q2.14",
-];
 
 fn names(folder: &Path) -> Vec<String> {
     let entries = fs::read_dir(folder).expect("a folder").flatten();
@@ -102,7 +88,7 @@ fn no_command_writes_over_its_input() {
         let arguments: Vec<String> = arguments.iter().map(|a| a.replace("{}", &own)).collect();
         let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
         let out = gyrogen_in(here, &arguments, &[]);
-        let said = String::from_utf8_lossy(&out.stderr);
+        let said = told(&out);
         assert_eq!(out.status.code(), Some(2), "{arguments:?}: {said}");
         assert!(
             said.contains("would be written over this input"),
@@ -129,12 +115,7 @@ fn a_link_to_nothing_stays_a_link() {
         &["replay", "--capture", "c.csv", "--out", "link.csv"],
         &[],
     );
-    assert_eq!(
-        out.status.code(),
-        Some(0),
-        "{}",
-        String::from_utf8_lossy(&out.stderr)
-    );
+    good(&out);
     assert!(
         top.path()
             .join("link.csv")
@@ -145,18 +126,10 @@ fn a_link_to_nothing_stays_a_link() {
     assert!(top.path().join("rows.csv").is_file());
 }
 
-/// The status of a shell's line in which `gyrogen` is the program, and what it said.
-fn shell(folder: &Path, line: &str) -> (Option<i32>, String) {
-    let line = line.replace("gyrogen", &format!("'{}'", env!("CARGO_BIN_EXE_gyrogen")));
-    let out = Command::new("bash")
-        .args(["-c", &line])
-        .current_dir(folder)
-        .output()
-        .expect("a shell");
-    (
-        out.status.code(),
-        String::from_utf8_lossy(&out.stderr).into_owned(),
-    )
+/// The status of a shell's line, and what it said.
+fn line_told(line: &str, folder: &Path) -> (Option<i32>, String) {
+    let out = shell(line, folder);
+    (out.status.code(), told(&out))
 }
 
 #[test]
@@ -168,12 +141,12 @@ fn what_cannot_be_printed_is_an_error_unless_nobody_reads() {
         "gyrogen --help".to_owned(),
         format!("{approx} --format json"),
     ] {
-        let (status, said) = shell(top.path(), &format!("{line} > /dev/full"));
+        let (status, said) = line_told(&format!("{line} > /dev/full"), top.path());
         assert_eq!(status, Some(2), "{line}: {said}");
         assert!(said.contains("standard output"), "{line}: {said}");
-        let (status, said) = shell(top.path(), &format!("{line} 2> /dev/full > /dev/null"));
+        let (status, said) = line_told(&format!("{line} 2> /dev/full > /dev/null"), top.path());
         assert_eq!(status, Some(0), "{line}: {said}");
-        let (status, said) = shell(top.path(), &format!("set -o pipefail; {line} | true"));
+        let (status, said) = line_told(&format!("set -o pipefail; {line} | true"), top.path());
         assert_eq!(status, Some(0), "{line}: {said}");
     }
     assert_eq!(
@@ -198,7 +171,7 @@ fn a_full_disk_leaves_no_half_bundle() {
         fs::create_dir_all(top.path().join("old")).expect("a folder");
         fs::write(top.path().join("old/approx.json"), "earlier").expect("a file");
         let line = format!("trap '' XFSZ; ulimit -f {limit}; {approx} --out {out}");
-        let (status, said) = shell(top.path(), &line);
+        let (status, said) = line_told(&line, top.path());
         assert_eq!(status, Some(2), "{said}");
         assert_eq!(names(top.path()), ["old"], "{limit}");
         assert_eq!(names(&top.path().join("old")), ["approx.json"], "{limit}");
@@ -287,12 +260,7 @@ fn the_next_run_removes_what_a_kill_has_left() {
     waited("the compilers' end", || running(&place) == 0);
     let equiv = ["equiv", "--samples", "2000", "--out", "new/results"];
     let out = gyrogen_in(&work, &equiv, &[("TMPDIR", &place)]);
-    assert_eq!(
-        out.status.code(),
-        Some(0),
-        "{}",
-        String::from_utf8_lossy(&out.stderr)
-    );
+    good(&out);
     assert_eq!(names(&work), ["new"]);
     assert!(names(&top.path().join("temporary")).is_empty());
 }

@@ -1,6 +1,6 @@
 //! `run` and `equiv` with a compiler for one language, with none, and with one that is none.
 
-use crate::common::command::gyrogen_in;
+use crate::common::command::{gyrogen_in, told};
 use serde_json::Value;
 use std::path::Path;
 use std::process::Output;
@@ -15,7 +15,7 @@ fn what_can_be_built_is_compared_and_the_rest_is_said() {
     let folder = tempfile::tempdir().expect("a folder");
     let here = folder.path();
     let output = equiv(here, &[], &[("RUSTC", "/bin/false")]);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let said = told(&output);
     assert!(
         said.contains("note: only the emitted code of one language (c)")
             && said.contains("/bin/false")
@@ -28,12 +28,12 @@ fn what_can_be_built_is_compared_and_the_rest_is_said() {
     assert_eq!(json["model_vs_c"]["mismatches"], 0);
 
     let output = equiv(here, &["--lang", "c"], &[("RUSTC", "/bin/false")]);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let said = told(&output);
     assert!(!said.contains("/bin/false"), "{said}");
 
     let output = equiv(here, &[], &[("CC", "/bin/false"), ("RUSTC", "/bin/false")]);
     assert_eq!(output.status.code(), Some(2));
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let said = told(&output);
     assert!(
         said.contains("which CC names") && !said.contains("there is no compiler"),
         "{said}"

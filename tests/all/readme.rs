@@ -1,5 +1,6 @@
 //! What the README and the tour show is what the commands print, and the README's C compiles.
 
+use crate::common::command::{gyrogen, told};
 use crate::common::compiler::cc;
 use std::path::Path;
 use std::process::Command;
@@ -29,14 +30,8 @@ fn words(text: &str) -> String {
 
 /// What the tool prints on stdout in a folder.
 fn printed(arguments: &[&str], folder: &Path) -> String {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gyrogen"));
-    let done = command
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .unwrap();
-    let said = String::from_utf8_lossy(&done.stderr);
-    assert!(done.status.success(), "{arguments:?}: {said}");
+    let done = gyrogen(arguments, folder);
+    assert!(done.status.success(), "{arguments:?}: {}", told(&done));
     String::from_utf8(done.stdout).unwrap()
 }
 

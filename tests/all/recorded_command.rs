@@ -1,9 +1,8 @@
 //! The same bytes wherever a command is started, and the recorded command makes them again.
 
-use crate::common::command::gyrogen_in;
+use crate::common::command::{APPROX, gyrogen_in, shell, told};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 /// Every file under a folder but for the wall times, by its path.
 fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
@@ -45,25 +44,6 @@ fn recorded(made: &BTreeMap<PathBuf, Vec<u8>>) -> String {
     commands.remove(0)
 }
 
-/// Runs a line as a shell does in a folder.
-fn shell(line: &str, folder: &Path) {
-    let binary = Path::new(env!("CARGO_BIN_EXE_gyrogen"));
-    let path = std::env::var("PATH").unwrap_or_default();
-    let path = format!("{}:{path}", binary.parent().expect("a folder").display());
-    let mut command = Command::new("bash");
-    let out = command
-        .args(["-c", line])
-        .env("PATH", path)
-        .current_dir(folder)
-        .output()
-        .expect("a shell");
-    assert!(
-        matches!(out.status.code(), Some(0 | 1)),
-        "{line}: {}",
-        String::from_utf8_lossy(&out.stderr)
-    );
-}
-
 /// Starts the command far from its inputs, named by their whole paths, and again as it was recorded in the folder
 /// of the inputs; the bytes are the same and name no place.
 fn made_again(inputs: &[(&str, &[u8])], arguments: &[&str], own_folder: &str) {
@@ -86,7 +66,7 @@ fn made_again(inputs: &[(&str, &[u8])], arguments: &[&str], own_folder: &str) {
     assert!(
         matches!(out.status.code(), Some(0 | 1)),
         "{arguments:?}: {}",
-        String::from_utf8_lossy(&out.stderr)
+        told(&out)
     );
     let first = files(&far.join("results"));
     assert!(far.join("results/timing.json").exists() || arguments[0] == "emit");
@@ -100,7 +80,12 @@ fn made_again(inputs: &[(&str, &[u8])], arguments: &[&str], own_folder: &str) {
         );
     }
     let line = recorded(&first);
-    shell(&line, &near);
+    let again = shell(&line, &near);
+    assert!(
+        matches!(again.status.code(), Some(0 | 1)),
+        "{line}: {}",
+        told(&again)
+    );
     let second = files(&near.join(own_folder));
     assert_eq!(
         first.keys().collect::<Vec<_>>(),
@@ -115,20 +100,6 @@ fn made_again(inputs: &[(&str, &[u8])], arguments: &[&str], own_folder: &str) {
         );
     }
 }
-
-const APPROX: [&str; 11] = [
-    "approx",
-    "--function=-x^2",
-    "--domain=-1,1",
-    "--input",
-    "Q1.9",
-    "--output",
-    "Q2.10",
-    "--degree",
-    "2",
-    "--coefficients",
-    "Q2.14",
-];
 
 #[test]
 fn approx_is_made_again() {

@@ -1,6 +1,6 @@
 //! `gyrogen schema NAME` against what is really written.
 
-use crate::common::command::gyrogen;
+use crate::common::command::{gyrogen, told};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -26,7 +26,7 @@ fn errors(schema: &Value, instance: &Value) -> Vec<String> {
 /// Runs a command that writes `file` into `out`, and holds the file against the schema of `name`.
 fn holds(name: &str, arguments: &[&str], folder: &Path, file: &str) -> Value {
     let done = gyrogen(arguments, folder);
-    let text = String::from_utf8_lossy(&done.stderr);
+    let text = told(&done);
     assert_ne!(done.status.code(), Some(2), "{arguments:?}: {text}");
     let written = read(&folder.join(file));
     let found = errors(&schema(name), &written);

@@ -1,6 +1,6 @@
 //! `simulate` as a user runs it: the published figures, both drive modes, files, refusals.
 
-use crate::common::command::{gyrogen_here, text};
+use crate::common::command::{gyrogen_here, text, told};
 use crate::common::json::number;
 use serde_json::Value;
 use std::path::Path;
@@ -10,7 +10,7 @@ fn simulate(arguments: &[&str], out: &Path) -> Value {
     all.extend(arguments);
     all.extend(["--out", text(out), "--format", "json"]);
     let output = gyrogen_here(&all);
-    let talk = String::from_utf8_lossy(&output.stderr);
+    let talk = told(&output);
     assert_eq!(output.status.code(), Some(0), "{talk}");
     let written = std::fs::read(out.join("simulate.json")).expect("simulate.json");
     assert_eq!(output.stdout, written, "stdout and simulate.json differ");
@@ -253,7 +253,7 @@ fn what_cannot_be_simulated_is_refused() {
         let mut all = vec!["simulate", "--out", text(&out)];
         all.extend(arguments);
         let output = gyrogen_here(&all);
-        let talk = String::from_utf8_lossy(&output.stderr).into_owned();
+        let talk = told(&output);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {talk}");
         assert!(talk.contains(words), "{arguments:?}: {talk}");
         assert!(!out.exists(), "{arguments:?}");

@@ -1,5 +1,6 @@
 //! `gyrogen study` as a user runs it, on spaces that are small enough to be searched whole.
 
+use crate::common::command::{good, gyrogen_here, text, told};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -19,9 +20,7 @@ fn design(folder: &Path, exhaustive: u32, more: &str) -> PathBuf {
 }
 
 fn study(arguments: &[&str], out: &Path) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gyrogen"));
-    command.arg("study").args(arguments).arg("--out").arg(out);
-    command.output().expect("gyrogen starts")
+    gyrogen_here(&[&["study"], arguments, &["--out", text(out)]].concat())
 }
 
 fn bytes(out: &Path) -> Vec<u8> {
@@ -40,11 +39,7 @@ fn whole() -> &'static Vec<u8> {
         let file = design(folder.path(), 2000, "");
         let out = folder.path().join("out");
         let done = study(&[file.to_str().expect("UTF-8"), "--threads", "2"], &out);
-        assert!(
-            done.status.success(),
-            "{}",
-            String::from_utf8_lossy(&done.stderr)
-        );
+        good(&done);
         assert!(!out.join("study.journal").exists());
         assert!(out.join("report.html").exists());
         // Every point's file is a design, and says what the point says.
@@ -86,11 +81,7 @@ fn the_search_finds_the_front_of_the_whole_space() {
     let file = design(folder.path(), 0, "");
     let out = folder.path().join("out");
     let done = study(&[file.to_str().expect("UTF-8")], &out);
-    assert!(
-        done.status.success(),
-        "{}",
-        String::from_utf8_lossy(&done.stderr)
-    );
+    good(&done);
     let searched = json(&bytes(&out));
     assert_eq!(searched["method"], "search");
     assert!(front(&whole).len() >= 2);
@@ -115,17 +106,13 @@ fn threads_shards_and_a_kill_leave_the_same_bytes() {
         .collect();
     for (k, part) in parts.iter().enumerate() {
         let done = study(&[file, "--shard", &format!("{}/3", k + 1)], part);
-        assert!(
-            done.status.success(),
-            "{}",
-            String::from_utf8_lossy(&done.stderr)
-        );
+        good(&done);
     }
     let names: Vec<&str> = parts.iter().map(|p| p.to_str().expect("UTF-8")).collect();
     let out = folder.path().join("merged");
     let some = study(&[file, "--merge", names[0], names[2]], &out);
     assert_eq!(some.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&some.stderr).contains("2/3 is missing"));
+    assert!(told(&some).contains("2/3 is missing"));
     let all = study(
         &[
             file,
@@ -138,11 +125,7 @@ fn threads_shards_and_a_kill_leave_the_same_bytes() {
         ],
         &out,
     );
-    assert!(
-        all.status.success(),
-        "{}",
-        String::from_utf8_lossy(&all.stderr)
-    );
+    good(&all);
     assert!(&bytes(&out) == whole(), "merged");
 
     let out = folder.path().join("killed");
@@ -161,11 +144,7 @@ fn threads_shards_and_a_kill_leave_the_same_bytes() {
     let _ = running.wait();
     let known = lines();
     let again = study(&[file], &out);
-    assert!(
-        again.status.success(),
-        "{}",
-        String::from_utf8_lossy(&again.stderr)
-    );
+    good(&again);
     assert!(&bytes(&out) == whole(), "resumed after {known} lines");
 }
 
@@ -182,11 +161,7 @@ fn limits_are_met_by_the_cheapest_or_the_word_in_the_way_is_named() {
     let file = file.to_str().expect("UTF-8");
     let out = folder.path().join("out");
     let done = study(&[file, "--for", &format!("noise_dps_rthz<={limit}")], &out);
-    assert!(
-        done.status.success(),
-        "{}",
-        String::from_utf8_lossy(&done.stderr)
-    );
+    good(&done);
     let result = json(&bytes(&out));
     let number = result["chosen"][0]["point"].as_u64().expect("a point") as usize;
     let chosen = &result["front"][number - 1];
@@ -197,7 +172,7 @@ fn limits_are_met_by_the_cheapest_or_the_word_in_the_way_is_named() {
     assert_eq!(steps.len(), 6);
     let done = study(&[file, "--for", "noise_dps_rthz<=1e-9 bias_dps<=0.5"], &out);
     assert_eq!(done.status.code(), Some(1));
-    let said = String::from_utf8_lossy(&done.stderr).into_owned();
+    let said = told(&done);
     assert!(
         said.contains("noise_dps_rthz cannot be met") && said.contains("limited by `"),
         "{said}"
@@ -254,7 +229,7 @@ fn designs_with_a_phase_loop_a_coarse_converter_and_a_free_tuning_word_are_studi
         let file = changed(folder.path(), changes);
         let out = folder.path().join("out");
         let done = study(&[file.to_str().expect("UTF-8")], &out);
-        let said = String::from_utf8_lossy(&done.stderr).into_owned();
+        let said = told(&done);
         assert!(done.status.success(), "{what}: {said}");
         let result = json(&bytes(&out));
         // A phase loop sets the tuning word itself: there is no detuned run.
@@ -293,17 +268,8 @@ fn designs_with_a_phase_loop_a_coarse_converter_and_a_free_tuning_word_are_studi
             assert!(start <= limit * merit, "{what}: {start} of {limit}");
         }
         let point = out.join(points[0]["design"].as_str().expect("a file"));
-        let check = Command::new(env!("CARGO_BIN_EXE_gyrogen"))
-            .arg("check")
-            .arg(&point)
-            .args(["--samples", "20000"])
-            .output()
-            .expect("gyrogen starts");
-        assert!(
-            check.status.success(),
-            "{what}: {}",
-            String::from_utf8_lossy(&check.stderr)
-        );
+        let check = gyrogen_here(&["check", text(&point), "--samples", "20000"]);
+        assert!(check.status.success(), "{what}: {}", told(&check));
     }
 }
 
@@ -315,7 +281,7 @@ fn what_cannot_be_had_is_named_with_its_word_and_what_can_is_the_cheapest() {
     let out = folder.path().join("out");
     let refused = |limits: &str, expected: &[&str]| {
         let done = study(&[file, "--for", limits], &out);
-        let said = String::from_utf8_lossy(&done.stderr).into_owned();
+        let said = told(&done);
         assert_eq!(done.status.code(), Some(1), "{limits}: {said}");
         for text in expected {
             assert!(said.contains(text), "{limits}: {said}");
@@ -368,11 +334,7 @@ fn what_cannot_be_had_is_named_with_its_word_and_what_can_is_the_cheapest() {
     );
     // Bytes and cycles alone: the finest design that holds them.
     let done = study(&[file, "--for", &few], &out);
-    assert!(
-        done.status.success(),
-        "{}",
-        String::from_utf8_lossy(&done.stderr)
-    );
+    good(&done);
     let result = json(&bytes(&out));
     let chosen = &result["chosen"][0];
     assert!(
@@ -385,11 +347,7 @@ fn what_cannot_be_had_is_named_with_its_word_and_what_can_is_the_cheapest() {
     assert!(cycles(&result) <= most);
     // A met limit with the whole of the interval.
     let done = study(&[file, "--for", "noise_dps_rthz<=5e-4"], &out);
-    assert!(
-        done.status.success(),
-        "{}",
-        String::from_utf8_lossy(&done.stderr)
-    );
+    good(&done);
     let result = json(&bytes(&out));
     let number = result["chosen"][0]["point"].as_u64().expect("a point") as usize;
     assert!(result["front"][number - 1]["bounds"]["noise_dps_rthz"][1].as_f64() <= Some(5e-4));
@@ -404,7 +362,7 @@ fn what_cannot_be_had_is_named_with_its_word_and_what_can_is_the_cheapest() {
         ],
         &out,
     );
-    let said = String::from_utf8_lossy(&done.stderr).into_owned();
+    let said = told(&done);
     assert!(
         done.status.code() == Some(2) && said.contains("names no processor"),
         "{said}"
@@ -423,7 +381,7 @@ fn an_overflow_is_said_first_and_a_wrong_word_in_its_place() {
     std::fs::write(&path, narrow).expect("writes");
     let done = study(&[path.to_str().expect("UTF-8")], &folder.path().join("out"));
     assert_eq!(done.status.code(), Some(1));
-    let said = String::from_utf8_lossy(&done.stderr).into_owned();
+    let said = told(&done);
     assert!(
         said.contains("overflow") && said.contains("smallest change that mends it"),
         "{said}"
@@ -432,7 +390,7 @@ fn an_overflow_is_said_first_and_a_wrong_word_in_its_place() {
     std::fs::write(&path, "[study]\nwords = [\"circuit.adc\"]\n").expect("writes");
     let done = study(&[path.to_str().expect("UTF-8")], &folder.path().join("out"));
     assert_eq!(done.status.code(), Some(2));
-    let said = String::from_utf8_lossy(&done.stderr).into_owned();
+    let said = told(&done);
     assert!(said.contains("wrong.toml:2:"), "{said}");
     // A study that does not begin leaves no folder.
     let out = folder.path().join("merged");

@@ -1,6 +1,7 @@
 //! What takes minutes or other programs: every reported point run again by other commands with other noise, budgets of
 //! random designs, GNU parallel and Slurm. By hand: `cargo test --release --test all -- --ignored study_slow::`.
 
+use crate::common::command::{good, gyrogen_here, text, told};
 use crate::common::dice::Dice;
 use gyrogen::design::{Design, reader, template};
 use gyrogen::study::budget::budget;
@@ -11,14 +12,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 fn gyrogen(arguments: &[&str], out: &Path) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gyrogen"));
-    command.args(arguments).arg("--out").arg(out);
-    command.output().expect("gyrogen starts")
-}
-
-fn good(done: &Output) {
-    let said = String::from_utf8_lossy(&done.stderr);
-    assert!(done.status.success(), "{said}");
+    gyrogen_here(&[arguments, &["--out", text(out)]].concat())
 }
 
 fn json(path: &Path) -> Value {
@@ -100,7 +94,7 @@ fn every_reported_point_meets_its_figures_with_other_noise() {
         let results = folder.path().join("results");
         let equiv = gyrogen(&["equiv", other, "--samples", "1000000"], &results);
         if !equiv.status.success() {
-            let said = String::from_utf8_lossy(&equiv.stderr).into_owned();
+            let said = told(&equiv);
             wrong.push(format!("point {}: equiv: {said}", point["number"]));
         }
         good(&gyrogen(&["simulate", other], &results));

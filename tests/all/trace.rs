@@ -1,6 +1,6 @@
 //! `simulate --trace`: the trace holds the words that `replay` computes from the traced codes.
 
-use crate::common::command::{gyrogen_here, text};
+use crate::common::command::{gyrogen_here, text, told};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Output;
@@ -91,7 +91,7 @@ fn nodes_are_chosen_by_name_and_unknown_ones_refused() {
     let none = folder.path().join("none");
     let output = simulate(&none, &["--trace", "circuit.cordic phas"]);
     assert_eq!(output.status.code(), Some(2));
-    let message = String::from_utf8_lossy(&output.stderr);
+    let message = told(&output);
     assert!(
         message.contains("did you mean `circuit.cordic phase`"),
         "{message}"

@@ -1,6 +1,7 @@
 //! `gyrogen verify` finds small damage in emitted code: exit 1, and stderr names the table or
 //! function and the first input that differs.
 
+use crate::common::command::told;
 use crate::common::files::copy;
 use std::path::PathBuf;
 
@@ -103,7 +104,7 @@ fn found(bundle: &Bundle, damage: &Damage, folder: PathBuf) -> Result<(), String
         manifest: bundle.manifest.clone(),
     };
     let output = damaged.verify();
-    let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+    let stderr = told(&output);
     let difference = format!(
         "{} ({}): first difference at",
         damage.named,

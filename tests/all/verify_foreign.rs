@@ -1,7 +1,7 @@
 //! `gyrogen verify` knows what a bundle must hold, takes nothing on trust that comes with it, and waits for no
 //! program without end.
 
-use crate::common::command::{gyrogen, gyrogen_in, told};
+use crate::common::command::{good, gyrogen, gyrogen_in, told};
 use crate::common::files::copy;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -34,7 +34,7 @@ pub(crate) fn whole() -> &'static (tempfile::TempDir, String) {
             &["emit", "design.toml", "--lang", "c", "--out", "c"],
             folder.path(),
         );
-        assert!(emitted.status.success(), "{}", told(&emitted));
+        good(&emitted);
         let digest = told(&emitted)
             .lines()
             .find_map(|l| l.strip_prefix("digest ").map(str::to_owned));
@@ -111,7 +111,7 @@ fn a_bundle_holds_against_its_digest_and_its_design() {
         ],
         folder.path(),
     );
-    assert!(output.status.success(), "{}", told(&output));
+    good(&output);
     let json = std::fs::read_to_string(folder.path().join("verify.json")).expect("a result");
     assert!(json.contains(digest), "{json}");
     let (other, at) = bundle();
@@ -148,7 +148,7 @@ fn a_bundle_holds_against_its_digest_and_its_design() {
     }
     reseal(&at, |m| m["command"] = command.into());
     let output = gyrogen(&["verify", "c"], other.path());
-    assert!(output.status.success(), "{}", told(&output));
+    good(&output);
     let output = gyrogen(&["verify", "c", "--digest", digest], other.path());
     assert_eq!(output.status.code(), Some(1));
     assert!(told(&output).contains("digest"), "{}", told(&output));
@@ -267,7 +267,7 @@ fn a_changed_file_is_named_also_where_it_does_not_compile() {
         "{said}"
     );
     // No file of somebody's own is there to be moved.
-    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    let told = told(&output);
     assert!(
         !told.contains("files of your own") && told.contains("`gyrogen emit"),
         "{told}"
@@ -399,7 +399,7 @@ fn a_folder_with_the_name_of_an_option_is_a_folder() {
     let folder = tempfile::tempdir().expect("a folder");
     copy(&whole().0.path().join("c"), &folder.path().join("-dir"));
     let output = gyrogen(&["verify", "--", "-dir"], folder.path());
-    assert!(output.status.success(), "{}", told(&output));
+    good(&output);
 }
 
 #[cfg(unix)]
@@ -408,7 +408,7 @@ fn a_compiler_may_have_arguments_and_may_not_hang() {
     let (folder, _) = bundle();
     let here = folder.path();
     let output = gyrogen_in(here, &["verify", "c"], &[("CC", "cc -O1")]);
-    assert!(output.status.success(), "{}", told(&output));
+    good(&output);
     let output = gyrogen_in(here, &["verify", "c"], &[("CC", "/bin/false")]);
     assert_eq!(output.status.code(), Some(2));
     assert!(

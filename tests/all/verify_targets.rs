@@ -1,23 +1,19 @@
 //! `gyrogen verify --target`: the same bundle on other processors, under emulation where this machine can.
 
-use crate::common::command::told;
+use crate::common::command::{good, gyrogen_in, text, told};
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output};
 
 fn gyrogen(arguments: &[&str], path: Option<&Path>) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gyrogen"));
-    command.args(arguments);
-    if let Some(path) = path {
-        command.env("PATH", path);
-    }
-    command.output().expect("gyrogen runs")
+    let path = path.map(|p| ("PATH", text(p)));
+    gyrogen_in(Path::new("."), arguments, path.as_slice())
 }
 
 fn emit(folder: &Path, language: &str) -> String {
     let out = folder.join(language).to_str().expect("a name").to_owned();
     let made = gyrogen(&["emit", "--lang", language, "--out", &out], None);
-    assert!(made.status.success(), "{}", told(&made));
+    good(&made);
     out
 }
 
@@ -106,7 +102,7 @@ fn all_parts_hold_on_other_processors_and_damage_is_found_there() {
     std::fs::write(&design, CORRECTED).unwrap();
     let part = ["emit", &design, "--part", "all", "--lang", "c"];
     let made = gyrogen(&[&part[..], &["--out", &bundle]].concat(), None);
-    assert!(made.status.success(), "{}", told(&made));
+    good(&made);
     let source = folder.path().join("all/correction/gyro_correction.c");
     let whole = std::fs::read_to_string(&source).unwrap();
     let damaged = whole.replacen(" - ", " + ", 1);

@@ -21,6 +21,17 @@ pub fn gyrogen_here(arguments: &[&str]) -> Output {
     gyrogen(arguments, Path::new("."))
 }
 
+/// Runs a line of a shell in a folder, in which `gyrogen` is the program.
+pub fn shell(line: &str, folder: &Path) -> Output {
+    let program = Path::new(env!("CARGO_BIN_EXE_gyrogen"));
+    let own = program.parent().expect("a folder").display();
+    let path = std::env::var("PATH").unwrap_or_default();
+    let mut command = Command::new("bash");
+    command.args(["-c", line]).current_dir(folder);
+    command.env("PATH", format!("{own}:{path}"));
+    command.output().expect("a shell")
+}
+
 /// Runs another program in a folder.
 pub fn run(program: &str, arguments: &[&str], folder: &Path) -> Output {
     let output = Command::new(program)
@@ -28,6 +39,11 @@ pub fn run(program: &str, arguments: &[&str], folder: &Path) -> Output {
         .current_dir(folder)
         .output();
     output.unwrap_or_else(|e| panic!("{program}: {e}"))
+}
+
+/// Fails with what was said if the program did.
+pub fn good(output: &Output) {
+    assert!(output.status.success(), "{}", told(output));
 }
 
 /// What was said on stderr.
@@ -39,6 +55,21 @@ pub fn told(output: &Output) -> String {
 pub fn all_of(output: &Output) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned() + &told(output)
 }
+
+/// A small call of `approx`.
+pub const APPROX: [&str; 11] = [
+    "approx",
+    "--function=-x^2",
+    "--domain=-1,1",
+    "--input",
+    "Q1.9",
+    "--output",
+    "Q2.10",
+    "--degree",
+    "2",
+    "--coefficients",
+    "Q2.14",
+];
 
 /// A path as an argument.
 pub fn text(path: &Path) -> &str {
