@@ -15,7 +15,6 @@ use super::chain::{Chain, FastState};
 use super::demodulator::Mixer;
 use super::sample_lanes::{CarrierPair, Portable, SampleLanes, carrier_pair};
 use crate::numeric::cast::{End, Kernel};
-use crate::numeric::lane::Lane;
 
 #[cfg(test)]
 #[path = "block_kernel_tests.rs"]
@@ -168,7 +167,7 @@ impl<const N: usize> BlockKernel<N> {
     }
 
     /// Runs a block whose number of samples leaves nothing over.
-    pub fn run<R: Lane>(&mut self, state: &mut FastState<R, N>, drive: &[i32], sense: &[i32]) {
+    pub fn run(&mut self, state: &mut FastState<i64, N>, drive: &[i32], sense: &[i32]) {
         match self.instructions {
             #[cfg(target_arch = "x86_64")]
             Instructions::Avx512 => {
@@ -187,16 +186,16 @@ impl<const N: usize> BlockKernel<N> {
     }
 
     #[inline(always)]
-    fn in_lanes<S: SampleLanes, R: Lane>(
+    fn in_lanes<S: SampleLanes>(
         &mut self,
         simd: S,
-        state: &mut FastState<R, N>,
+        state: &mut FastState<i64, N>,
         drive: &[i32],
         sense: &[i32],
     ) {
         let oscillator = &mut state.oscillator;
-        let phase = (oscillator.phase.wide() as u64) << self.phase_spare_bits;
-        let step = (oscillator.tuning.wide() as u64) << self.phase_spare_bits;
+        let phase = (oscillator.phase as u64) << self.phase_spare_bits;
+        let step = (oscillator.tuning as u64) << self.phase_spare_bits;
         let walk = Walk {
             phase: phase.wrapping_add(self.half_step),
             step,
@@ -208,14 +207,13 @@ impl<const N: usize> BlockKernel<N> {
             form::ROUNDED => self.moments::<S, { form::ROUNDED }>(simd, walk, known, codes),
             _ => self.moments::<S, { form::ANY }>(simd, walk, known, codes),
         };
-        let advance = oscillator.tuning.times(R::low(drive.len() as i128));
-        oscillator.phase = oscillator.phase.plus(advance);
+        let advance = oscillator.tuning.wrapping_mul(drive.len() as i64);
+        oscillator.phase = oscillator.phase.wrapping_add(advance);
 
         self.grow_over(drive.len() / S::PARTS);
         let growth = &self.growth.1;
-        let mut integrators: [[i64; 4]; N] = std::array::from_fn(|k| {
-            std::array::from_fn(|c| state.cics[c].integrators[k].wide() as i64)
-        });
+        let mut integrators: [[i64; 4]; N] =
+            std::array::from_fn(|k| std::array::from_fn(|c| state.cics[c].integrators[k]));
         for part in [0, 1].into_iter().take(S::PARTS) {
             let old = integrators;
             for k in 0..N {
@@ -230,7 +228,7 @@ impl<const N: usize> BlockKernel<N> {
         }
         for (c, cic) in state.cics.iter_mut().enumerate() {
             for (to, from) in cic.integrators.iter_mut().zip(&integrators) {
-                *to = R::low(i128::from(from[c]));
+                *to = from[c];
             }
         }
     }
@@ -436,16 +434,16 @@ impl Kernel<i64> {
 /// A run of a block in given lanes: an object, because closures are not inlined into functions that
 /// are compiled for wider SIMD.
 #[cfg(target_arch = "x86_64")]
-struct InLanes<'a, S, R, const N: usize>(
+struct InLanes<'a, S, const N: usize>(
     S,
     &'a mut BlockKernel<N>,
-    &'a mut FastState<R, N>,
+    &'a mut FastState<i64, N>,
     &'a [i32],
     &'a [i32],
 );
 
 #[cfg(target_arch = "x86_64")]
-impl<S: SampleLanes, R: Lane, const N: usize> pulp::NullaryFnOnce for InLanes<'_, S, R, N> {
+impl<S: SampleLanes, const N: usize> pulp::NullaryFnOnce for InLanes<'_, S, N> {
     type Output = ();
 
     #[inline(always)]

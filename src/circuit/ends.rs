@@ -11,6 +11,7 @@ use crate::numeric::fixed::{Fixed, Overflowed};
 use crate::numeric::float::Float;
 use crate::numeric::format::pow2;
 use crate::numeric::lane::Lane;
+use std::any::Any;
 
 /// What turns a float row into the contract's units.
 #[derive(Debug, Clone, Copy)]
@@ -101,7 +102,11 @@ impl<W: HasKernel, R: Lane, const IDLE: bool> Ends for Fixed<W, R, IDLE> {
         state: &mut FastState<R, N>,
         [drive, sense]: [&[i32]; 2],
     ) {
-        kernel.run(state, drive, sense);
+        // A kernel is for residues in 64 bits, and is compiled for these alone.
+        let state: &mut dyn Any = state;
+        if let Some(state) = state.downcast_mut::<FastState<i64, N>>() {
+            kernel.run(state, drive, sense);
+        }
     }
     #[inline(always)]
     fn at(&self, sample: u64) {
