@@ -11,6 +11,7 @@ use crate::numeric::fixed::{Fixed, Overflowed};
 use crate::numeric::float::Float;
 use crate::numeric::format::pow2;
 use crate::numeric::lane::Lane;
+use crate::numeric::trace::ir::Interval;
 use std::any::Any;
 
 /// What turns a float row into the contract's units.
@@ -30,11 +31,17 @@ impl FloatScale {
     }
 }
 
+/// The codes that an ideal ADC makes of inputs in LSB: the nearest ones, ties up, saturating.
+pub(super) fn quantised(inputs_lsb: &[f64], range: Interval) -> Vec<i32> {
+    let [low, high] = [range.low as f64, range.high as f64];
+    // Of at most 32 bits: the sum with a half is exact.
+    let code = |lsb: &f64| (lsb.max(low).min(high) + 0.5).floor().min(high) as i32;
+    inputs_lsb.iter().map(code).collect()
+}
+
 /// How an arithmetic meets the outside: codes in, columns out, overflows.
 pub(super) trait Ends: Arithmetic {
     fn code(&self, code: i32, fraction_bits: i32) -> Self::Word;
-    /// An ADC input in LSB; `limits` are the codes'.
-    fn input(&self, lsb: f64, fraction_bits: i32, limits: [f64; 2]) -> Self::Word;
     /// A phase or step of a ring of `bits` in 2^-64 turn.
     fn turns(residue: Self::Residue, bits: u32) -> u64;
     /// A residue as [`super::engine::Front`] holds it.
@@ -50,7 +57,7 @@ pub(super) trait Ends: Arithmetic {
         _codes: [&[i32]; 2],
     ) {
     }
-    /// Runs a whole period of inputs without quantisation.
+    /// Runs inputs of one period, LSB, without quantisation.
     fn run_inputs<const N: usize>(
         _kernel: &mut FloatKernel<N>,
         _chain: &Chain<N>,
@@ -77,11 +84,6 @@ impl<W: HasKernel, R: Lane, const IDLE: bool> Ends for Fixed<W, R, IDLE> {
     #[inline(always)]
     fn code(&self, code: i32, _fraction_bits: i32) -> W {
         W::from_i32(code)
-    }
-    #[inline(always)]
-    fn input(&self, lsb: f64, _fraction_bits: i32, [low, high]: [f64; 2]) -> W {
-        // Of at most 32 bits: the sum with a half is exact.
-        W::from_i32((lsb.max(low).min(high) + 0.5).floor().min(high) as i32)
     }
     fn turns(residue: R, bits: u32) -> u64 {
         (residue.wide() as u64) << (64 - bits)
@@ -133,17 +135,23 @@ impl Ends for Float {
     fn code(&self, code: i32, fraction_bits: i32) -> f64 {
         f64::from(code) * pow2(-fraction_bits)
     }
-    #[inline(always)]
-    fn input(&self, lsb: f64, fraction_bits: i32, _limits: [f64; 2]) -> f64 {
-        lsb * pow2(-fraction_bits)
-    }
     fn run_inputs<const N: usize>(
         kernel: &mut FloatKernel<N>,
         chain: &Chain<N>,
         state: &mut FastState<i128, N>,
-        inputs: [&[f64]; 2],
+        [drive, sense]: [&[f64]; 2],
     ) {
-        kernel.run(chain, state, inputs);
+        if kernel.samples() == drive.len() {
+            kernel.run(chain, state, [drive, sense]);
+            return;
+        }
+        let lsb = pow2(-chain.code_fraction_bits);
+        // A copy that does not escape lives in registers.
+        let mut local = *state;
+        for (d, s) in drive.iter().zip(sense) {
+            chain.sample(&Float, &mut local, [d * lsb, s * lsb]);
+        }
+        *state = local;
     }
     fn turns(residue: i128, _bits: u32) -> u64 {
         // One turn is the whole 128-bit circle.

@@ -4,7 +4,7 @@
 use super::block_kernel::{BlockKernel, Instructions};
 pub use super::chain::Front;
 use super::chain::{Chain, FastState, Held, SlowState};
-use super::ends::{Ends, FloatScale};
+use super::ends::{Ends, FloatScale, quantised};
 use super::float_kernel::FloatKernel;
 use super::row_batch::{RowBatch, Stages};
 use crate::design::Design;
@@ -250,7 +250,7 @@ struct Running<F: Arithmetic, S: Arithmetic<Residue = F::Residue>, const N: usiz
     scale: FloatScale,
     /// What runs codes at the sample rate, where it applies.
     kernel: Option<BlockKernel<N>>,
-    /// What runs whole periods of inputs without quantisation.
+    /// What runs inputs without quantisation, where the arithmetic has none.
     float_kernel: Option<FloatKernel<N>>,
     /// Rows that wait; none do between two calls.
     batch: Option<RowBatch<N>>,
@@ -302,16 +302,20 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Runnin
         Some(S::gain(gain, &self.scale))
     }
 
-    /// Samples inside one period: nothing but the fast state changes. `word` makes a word of a code.
+    /// Codes inside one period: nothing but the fast state changes.
     #[inline(always)]
-    fn block<T: Copy>(&mut self, drive: &[T], sense: &[T], word: impl Fn(&F, T) -> F::Word) {
+    fn block(&mut self, drive: &[i32], sense: &[i32]) {
+        let fraction_bits = self.chain.code_fraction_bits;
         // A copy that does not escape lives in registers.
         let mut state = self.fast_state;
         for (k, (d, s)) in drive.iter().zip(sense).enumerate() {
             if self.watched {
                 self.fast.at(self.samples + k as u64);
             }
-            let codes = [word(&self.fast, *d), word(&self.fast, *s)];
+            let codes = [
+                self.fast.code(*d, fraction_bits),
+                self.fast.code(*s, fraction_bits),
+            ];
             self.chain.sample(&self.fast, &mut state, codes);
         }
         self.fast_state = state;
@@ -325,12 +329,9 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Runnin
             Some(kernel) => kernel.left_over(drive.len()),
             None => drive.len(),
         };
-        let fraction_bits = self.chain.code_fraction_bits;
         let (single, drive) = drive.split_at(left_over);
         let (single_sense, sense) = sense.split_at(left_over);
-        self.block(single, single_sense, |ar, code| {
-            ar.code(code, fraction_bits)
-        });
+        self.block(single, single_sense);
         if let Some(kernel) = self.kernel.as_mut().filter(|_| !drive.is_empty()) {
             F::run_kernel(kernel, &mut self.fast_state, [drive, sense]);
             self.samples += drive.len() as u64;
@@ -453,20 +454,19 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Engine
         sense_lsb: &[f64],
         rows: &mut Rows,
     ) -> Result<(), Box<Overflowed>> {
-        let fraction_bits = self.chain.code_fraction_bits;
-        let range = self.chain.code_range;
-        let limits = [range.low as f64, range.high as f64];
+        if self.float_kernel.is_none() {
+            let [drive, sense] =
+                [drive_lsb, sense_lsb].map(|lsb| quantised(lsb, self.chain.code_range));
+            return self.process(&drive, &sense, rows);
+        }
         let block = |running: &mut Self, drive: &[f64], sense: &[f64]| {
             let Running {
                 chain, fast_state, ..
             } = running;
-            match &mut running.float_kernel {
-                Some(kernel) if kernel.samples() == drive.len() => {
-                    F::run_inputs(kernel, chain, fast_state, [drive, sense]);
-                    running.samples += drive.len() as u64;
-                }
-                _ => running.block(drive, sense, |ar, lsb| ar.input(lsb, fraction_bits, limits)),
+            if let Some(kernel) = &mut running.float_kernel {
+                F::run_inputs(kernel, chain, fast_state, [drive, sense]);
             }
+            running.samples += drive.len() as u64;
         };
         self.periods(drive_lsb, sense_lsb, block, |running| running.row(rows))?;
         self.put_waiting(rows);
