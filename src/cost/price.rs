@@ -1,10 +1,9 @@
 //! One number of a cost: what is to be small.
 
 use super::{Cost, Target};
-use serde::Serialize;
 
 /// What each part of a cost weighs.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Weights {
     /// A cycle for a row.
     pub cycle: f64,
@@ -27,7 +26,7 @@ pub struct Weights {
 }
 
 /// What is to be small, and on which processor.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Objective {
     /// The processor of the cycles and bytes.
     pub target: Target,

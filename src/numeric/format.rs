@@ -7,7 +7,7 @@ use std::fmt;
 use std::str::FromStr;
 
 /// A fixed-point format: `Qm.n` or `UQm.n`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
 #[serde(into = "String")]
 pub struct Format {
     /// False for `UQm.n`.
@@ -207,10 +207,7 @@ impl Rounding {
 }
 
 /// What becomes of a value outside its format.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize, schemars::JsonSchema,
-)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Overflow {
     /// Modulo 2^(m+n).
     Wrap,
@@ -244,7 +241,7 @@ impl Overflow {
 }
 
 /// A format with its rounding and overflow: all that one quantiser does.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Quantizer {
     /// The format of the result.
     pub format: Format,

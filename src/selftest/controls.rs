@@ -59,7 +59,7 @@ pub struct Shown<'a> {
 }
 
 /// A column without meaning.
-#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FakeSeen {
     /// Its column.
     pub name: String,
@@ -76,7 +76,7 @@ pub struct FakeSeen {
 }
 
 /// The negative control.
-#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Negative {
     /// Of the closing without fakes: effect and probability of each step.
     pub steps: Vec<(String, f64)>,
@@ -96,7 +96,7 @@ pub struct Negative {
 }
 
 /// An effect that was planted in what the closing left.
-#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Planted {
     /// Its id.
     pub effect: String,
@@ -123,7 +123,7 @@ pub struct Planted {
 }
 
 /// What the controls of a closing say.
-#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Controls {
     /// Columns without meaning.
     pub negative: Negative,

@@ -16,8 +16,7 @@ use crate::numeric::cast::{Cast, Label, Target};
 use crate::numeric::format::{Format, Quantizer, Rounding, pow2};
 
 /// How a table is read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// The entry.
     Plain,
