@@ -7,8 +7,7 @@ use std::fmt;
 use std::str::FromStr;
 
 /// A fixed-point format: `Qm.n` or `UQm.n`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
-#[serde(into = "String")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Format {
     /// False for `UQm.n`.
     pub signed: bool,
@@ -88,12 +87,6 @@ impl fmt::Display for Format {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let u = if self.signed { "" } else { "U" };
         write!(f, "{u}Q{}.{}", self.integer_bits, self.fraction_bits)
-    }
-}
-
-impl From<Format> for String {
-    fn from(f: Format) -> String {
-        f.to_string()
     }
 }
 
