@@ -75,6 +75,36 @@ impl Trace {
         self.close(outer, block.outputs(), outputs)
     }
 
+    /// Notes the call of a function, with the name and the type of its state: the call's number, and the results' ranges.
+    fn called(
+        &self,
+        function: usize,
+        instance: &'static str,
+        state: &'static str,
+        arguments: Vec<Id>,
+    ) -> (usize, Vec<Interval>) {
+        let outputs = {
+            let recorder = self.recorder.borrow();
+            let callee = &recorder.program.functions[function];
+            let ranges = callee.outputs.iter().map(|(_, id)| callee.nodes[*id].range);
+            ranges.collect()
+        };
+        let number = self.with(|frame| {
+            let (members, calls) = (&mut frame.function.members, &mut frame.function.calls);
+            if !state.is_empty() && !members.iter().any(|(m, _)| *m == instance) {
+                members.push((instance, state));
+            }
+            calls.push(CallSite {
+                function,
+                instance: if state.is_empty() { "" } else { instance },
+                arguments,
+            });
+            calls.len() - 1
+        });
+        self.push(Op::Call(number), Interval::point(0));
+        (number, outputs)
+    }
+
     /// What was recorded.
     pub fn finish(self) -> Program {
         self.recorder.into_inner().program
@@ -433,27 +463,7 @@ impl Arithmetic for Trace {
     ) -> [Id; O] {
         let ranges = inputs.map(|id| self.range(id));
         let function = self.record(block, state, ranges);
-        let outputs: Vec<Interval> = {
-            let recorder = self.recorder.borrow();
-            let callee = &recorder.program.functions[function];
-            callee
-                .outputs
-                .iter()
-                .map(|(_, id)| callee.nodes[*id].range)
-                .collect()
-        };
-        let number = self.with(|frame| {
-            if !B::STATE.is_empty() && !frame.function.members.iter().any(|(m, _)| *m == instance) {
-                frame.function.members.push((instance, B::STATE));
-            }
-            frame.function.calls.push(CallSite {
-                function,
-                instance: if B::STATE.is_empty() { "" } else { instance },
-                arguments: inputs.to_vec(),
-            });
-            frame.function.calls.len() - 1
-        });
-        self.push(Op::Call(number), Interval::point(0));
+        let (number, outputs) = self.called(function, instance, B::STATE, inputs.to_vec());
         std::array::from_fn(|k| self.push(Op::CallOut(number, k), outputs[k]))
     }
 }
