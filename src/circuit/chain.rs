@@ -7,8 +7,10 @@ use super::cordic::Vectoring;
 use super::decimator::{Cic, CicState, Decimate, Integrate};
 use super::demodulator::Mixer;
 use super::in_range::InRange;
-use super::nco::{Detuning, Oscillator, OscillatorState, Retune};
+use super::nco::{Oscillator, OscillatorState};
 use super::phase_loop::{PhaseLoop, PhaseLoopState};
+use super::row_blocks::RowBlocks;
+pub use super::row_blocks::{Held, Row, SlowState, compensated};
 use crate::design::{Circuit, Compensation, CompensationInput, Design};
 use crate::numeric::arithmetic::{Arithmetic, Block, Port};
 use crate::numeric::cast::Cast;
@@ -56,41 +58,6 @@ pub struct FastState<R, const N: usize> {
 
 /// What a period leaves at the sample rate: the last integrators by channel, all that the combs take.
 pub type Front = [i128; 4];
-
-/// What changes after every R samples only.
-#[derive(Debug, Clone, Copy)]
-pub struct SlowState<W> {
-    /// The phase loop's.
-    pub phase_loop: Option<PhaseLoopState<W>>,
-    /// The amplitude loop's.
-    pub amplitude_loop: Option<AmplitudeLoopState<W>>,
-}
-
-/// The words of one decimated sample.
-#[derive(Debug, Clone, Copy)]
-pub struct Row<W> {
-    /// Drive I, drive Q, sense I, sense Q.
-    pub channels: [W; 4],
-    /// Drive phase.
-    pub phase: W,
-    /// Drive magnitude.
-    pub magnitude: W,
-    /// Bias and compensated rate.
-    pub compensation: Option<[W; 2]>,
-    /// 1 where the thermometer is inside the calibrated range, else 0.
-    pub in_range: Option<W>,
-    /// Drive gain.
-    pub gain: Option<W>,
-}
-
-/// Where the loops rest: what a warm start puts into them.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Held {
-    /// What the phase loop adds to the design's tuning word, steps.
-    pub correction_steps: f64,
-    /// Drive gain, 0 to 1.
-    pub gain: f64,
-}
 
 /// Names of the decimators in the state, by channel.
 const CIC_MEMBERS: [&str; 4] = ["cic_drive_i", "cic_drive_q", "cic_sense_i", "cic_sense_q"];
@@ -223,7 +190,7 @@ impl<const N: usize> Chain<N> {
     }
 
     /// Puts the loops where they hold a tuning word correction (steps) and a drive gain (0 to 1)
-    /// with no error, and the oscillator at that tuning word; gives the gain that is then put out.
+    /// with no error; gives the gain that is then put out.
     pub fn hold<A: Arithmetic>(
         &self,
         ar: &A,
@@ -231,22 +198,8 @@ impl<const N: usize> Chain<N> {
         slow: &mut SlowState<A::Word>,
         held: Held,
     ) -> Option<A::Word> {
-        if let (Some(block), Some(state)) = (&self.phase_loop, &mut slow.phase_loop) {
-            *state = block.holding(ar, held.correction_steps);
-            // A step at the setpoint has no error: it leaves the integrator and puts out the rest.
-            let [correction] = ar.call(block, "phase_loop", state, [block.setpoint(ar)]);
-            let [] = ar.call(
-                &Retune(&self.nco),
-                "nco",
-                &mut fast.oscillator,
-                [correction],
-            );
-        }
-        let (block, state) = (self.amplitude_loop.as_ref()?, &mut slow.amplitude_loop);
-        let state = state.as_mut()?;
-        *state = block.holding(ar, held.gain);
-        let [gain] = ar.call(block, "amplitude_loop", state, [block.setpoint(ar)]);
-        Some(gain)
+        let blocks = self.row_blocks();
+        blocks.hold(ar, &mut fast.oscillator, slow, held)
     }
 
     /// One ADC sample: drive and sense code.
@@ -307,7 +260,12 @@ impl<const N: usize> Chain<N> {
         slow: &mut SlowState<A::Word>,
     ) -> Row<A::Word> {
         let channels = self.decimated(ar, fast);
-        let blocks = RowBlocks {
+        let blocks = self.row_blocks();
+        blocks.row(ar, channels, &mut fast.oscillator, slow)
+    }
+
+    fn row_blocks(&self) -> RowBlocks<'_> {
+        RowBlocks {
             nco: &self.nco,
             cordic: &self.cordic,
             compensation: self.compensation.as_ref(),
@@ -315,80 +273,8 @@ impl<const N: usize> Chain<N> {
             by_tuning_word: self.by_tuning_word,
             phase_loop: self.phase_loop.as_ref(),
             amplitude_loop: self.amplitude_loop.as_ref(),
-        };
-        blocks.row(ar, channels, &mut fast.oscillator, slow)
-    }
-}
-
-/// What works on the channels of a decimated sample. It is the same for every number of stages, so that it is compiled once.
-struct RowBlocks<'a> {
-    nco: &'a Oscillator,
-    cordic: &'a Vectoring,
-    compensation: Option<&'a (Bias, Rate)>,
-    in_range: Option<&'a InRange>,
-    by_tuning_word: bool,
-    phase_loop: Option<&'a PhaseLoop>,
-    amplitude_loop: Option<&'a AmplitudeLoop>,
-}
-
-impl RowBlocks<'_> {
-    fn row<A: Arithmetic>(
-        &self,
-        ar: &A,
-        channels: [A::Word; 4],
-        oscillator: &mut OscillatorState<A::Residue>,
-        slow: &mut SlowState<A::Word>,
-    ) -> Row<A::Word> {
-        let [drive_i, drive_q, sense_i, _] = channels;
-        let [phase, magnitude] = ar.call(self.cordic, "", &mut (), [drive_i, drive_q]);
-        let thermometer = if self.compensation.is_some() && self.by_tuning_word {
-            ar.call(&Detuning(self.nco), "nco", oscillator, [])
-        } else {
-            [phase]
-        };
-        let blocks = (self.compensation, self.in_range);
-        let (compensation, in_range) = compensated(ar, blocks, sense_i, thermometer);
-        if let (Some(block), Some(state)) = (self.phase_loop, &mut slow.phase_loop) {
-            let [correction] = ar.call(block, "phase_loop", state, [phase]);
-            let [] = ar.call(&Retune(self.nco), "nco", oscillator, [correction]);
-        }
-        let gain = match (self.amplitude_loop, &mut slow.amplitude_loop) {
-            (Some(block), Some(state)) => {
-                let [gain] = ar.call(block, "amplitude_loop", state, [magnitude]);
-                Some(gain)
-            }
-            _ => None,
-        };
-        Row {
-            channels,
-            phase,
-            magnitude,
-            compensation,
-            in_range,
-            gain,
         }
     }
-}
-
-/// Bias and compensated rate, and whether the thermometer is inside the calibrated range, where
-/// the design asks for them.
-#[inline(always)]
-pub fn compensated<A: Arithmetic>(
-    ar: &A,
-    (compensation, in_range): (Option<&(Bias, Rate)>, Option<&InRange>),
-    sense_i: A::Word,
-    thermometer: [A::Word; 1],
-) -> (Option<[A::Word; 2]>, Option<A::Word>) {
-    let Some((bias, rate)) = compensation else {
-        return (None, None);
-    };
-    let [bias] = ar.call(bias, "", &mut (), thermometer);
-    let [rate] = ar.call(rate, "", &mut (), [sense_i, bias]);
-    let in_range = in_range.map(|block| {
-        let [inside] = ar.call(block, "", &mut (), thermometer);
-        inside
-    });
-    (Some([bias, rate]), in_range)
 }
 
 /// The columns of a decimated sample that are words, in the contract's order (bias is not one of the

@@ -32,6 +32,7 @@ pub mod in_range;
 pub mod nco;
 pub mod phase_loop;
 mod row_batch;
+mod row_blocks;
 mod sample_lanes;
 #[cfg(target_arch = "x86_64")]
 mod sample_lanes_x86;
