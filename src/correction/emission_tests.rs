@@ -70,7 +70,7 @@ fn a_bundle_verifies_from_its_files_and_damage_to_a_constant_shows() {
         let mut unseen = Vec::new();
         let count = multipliers(&file.text, language).len();
         // Both languages print the same program; compiling Rust takes longer.
-        let every = if language == Language::C { 2 } else { 12 };
+        let every = if language == Language::C { 4 } else { 20 };
         let ks = (0..count).step_by(every);
         for (k, share) in ks.flat_map(|k| [(k, 256), (k, i64::MAX)]) {
             let (what, damaged) = damage(&file.text, language, k, share);

@@ -70,7 +70,7 @@ fn flat() -> BaselineFit {
 fn what_is_kept_is_certified_and_no_word_is_beyond_it() {
     let fit = flat();
     let (mut raised, mut forms) = (0, std::collections::BTreeSet::new());
-    for seed in 0..60 {
+    for seed in 0..30 {
         let mut design = random(seed);
         let asked = design.bound.unwrap();
         let (kept, said) = keep(&mut design, &fit)
@@ -115,8 +115,8 @@ fn what_is_kept_is_certified_and_no_word_is_beyond_it() {
         assert_eq!(back.compensation, design.compensation, "seed {seed}");
         assert_eq!(back.bound, design.bound);
     }
-    println!("{raised} of 60 raised; {forms:?}");
-    assert!(raised > 10, "{raised}");
+    println!("{raised} of 30 raised; {forms:?}");
+    assert!(raised > 5, "{raised}");
     assert!(forms.len() > 2, "{forms:?}");
 }
 

@@ -17,7 +17,7 @@ use crate::rng::Rng;
 /// Seed of the first random design.
 const SEED: u64 = 20_261_121;
 /// Designs in an ordinary test run.
-const DESIGNS: u64 = 5;
+const DESIGNS: u64 = 3;
 /// Failures that are told before the test gives up.
 const MOST_FAILURES: usize = 6;
 
