@@ -273,19 +273,25 @@ impl Path {
             self.sample,
             [&mut self.drive_lsb, &mut self.sense_lsb],
         );
-        self.add_noise(noise);
+        let [drive_rms, sense_rms] = self.noise_lsb;
+        if drive_rms != 0.0 || sense_rms != 0.0 {
+            noise.fill(self.sample, self.noise.each_mut().map(|n| &mut n[..]));
+        }
         self.sample += self.drive_lsb.len() as u64;
         clear(&mut self.rows);
+        let [drive_adc, sense_adc] = &self.converters;
+        let [drive_noise, sense_noise] = &self.noise;
         match self.kind {
             ArithmeticKind::Float => {
+                drive_adc.front_end(&mut self.drive_lsb, drive_rms, drive_noise);
+                sense_adc.front_end(&mut self.sense_lsb, sense_rms, sense_noise);
                 self.engine
                     .process_inputs(&self.drive_lsb, &self.sense_lsb, &mut self.rows)
             }
             ArithmeticKind::Fixed => {
                 let [d, s] = &mut self.codes;
-                let [drive, sense] = &self.converters;
-                drive.codes(&self.drive_lsb, d);
-                sense.codes(&self.sense_lsb, s);
+                drive_adc.codes(&self.drive_lsb, drive_rms, drive_noise, d);
+                sense_adc.codes(&self.sense_lsb, sense_rms, sense_noise, s);
                 self.engine.process(d, s, &mut self.rows)
             }
         }
@@ -309,17 +315,6 @@ impl Path {
     /// The codes of the last period, drive and sense (bit-accurate path only).
     pub fn codes(&self) -> [&[i32]; 2] {
         [&self.codes[0], &self.codes[1]]
-    }
-
-    fn add_noise(&mut self, noise: &impl Pairs) {
-        let [drive_rms, sense_rms] = self.noise_lsb;
-        if drive_rms != 0.0 || sense_rms != 0.0 {
-            noise.fill(self.sample, self.noise.each_mut().map(|n| &mut n[..]));
-        }
-        let [drive_adc, sense_adc] = &self.converters;
-        let [drive_noise, sense_noise] = &self.noise;
-        drive_adc.front_end(&mut self.drive_lsb, drive_rms, drive_noise);
-        sense_adc.front_end(&mut self.sense_lsb, sense_rms, sense_noise);
     }
 }
 

@@ -124,16 +124,16 @@ impl Converter {
         pulp::Arch::new().dispatch(FrontEnd {
             converter: *self,
             inputs,
-            rms_lsb,
-            noise,
+            noisy: Noisy { rms_lsb, noise },
         });
     }
 
-    /// [`code`](Self::code) of as many inputs as there are codes.
-    pub fn codes(&self, inputs: &[f64], codes: &mut [i32]) {
+    /// The [`code`](Self::code)s of the same, as many as there are inputs.
+    pub fn codes(&self, inputs: &[f64], rms_lsb: f64, noise: &[f32], codes: &mut [i32]) {
         pulp::Arch::new().dispatch(Codes {
             converter: *self,
             inputs,
+            noisy: Noisy { rms_lsb, noise },
             codes,
         });
     }
@@ -202,12 +202,18 @@ impl Bend {
     }
 }
 
-/// Inputs with their noise, in the widest SIMD that the processor has; the same values with each.
+/// Noise of an rms, LSB, by noise of rms 1.
+#[derive(Clone, Copy)]
+struct Noisy<'a> {
+    rms_lsb: f64,
+    noise: &'a [f32],
+}
+
+/// Inputs with their noise through the front end, in the widest SIMD that the processor has; the same values with each.
 struct FrontEnd<'a> {
     converter: Converter,
     inputs: &'a mut [f64],
-    rms_lsb: f64,
-    noise: &'a [f32],
+    noisy: Noisy<'a>,
 }
 
 impl pulp::WithSimd for FrontEnd<'_> {
@@ -215,9 +221,10 @@ impl pulp::WithSimd for FrontEnd<'_> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _simd: S) {
-        if self.rms_lsb != 0.0 {
-            for (input, noise) in self.inputs.iter_mut().zip(self.noise) {
-                *input += self.rms_lsb * f64::from(*noise);
+        let Noisy { rms_lsb, noise } = self.noisy;
+        if rms_lsb != 0.0 {
+            for (input, noise) in self.inputs.iter_mut().zip(noise) {
+                *input += rms_lsb * f64::from(*noise);
             }
         }
         if let Some(bend) = &self.converter.bend {
@@ -232,6 +239,7 @@ impl pulp::WithSimd for FrontEnd<'_> {
 struct Codes<'a> {
     converter: Converter,
     inputs: &'a [f64],
+    noisy: Noisy<'a>,
     codes: &'a mut [i32],
 }
 
@@ -240,15 +248,16 @@ impl pulp::WithSimd for Codes<'_> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _simd: S) {
-        let both = self.codes.iter_mut().zip(self.inputs);
-        if self.converter.missing.is_some() {
-            for (code, input) in both {
-                *code = self.converter.code(*input);
+        let (adc, Noisy { rms_lsb, noise }) = (&self.converter, self.noisy);
+        let all = self.codes.iter_mut().zip(self.inputs.iter().zip(noise));
+        if adc.bend.is_none() && adc.missing.is_none() {
+            for (code, (input, noise)) in all {
+                *code = adc.quantiser.code(input + rms_lsb * f64::from(*noise));
             }
             return;
         }
-        for (code, input) in both {
-            *code = self.converter.quantiser.code(*input);
+        for (code, (input, noise)) in all {
+            *code = adc.code(adc.analog(input + rms_lsb * f64::from(*noise)));
         }
     }
 }
