@@ -54,9 +54,17 @@ impl Power {
         }
     }
 
-    /// From (x, u) to (y, v) under these couplings.
-    fn coupled(&self, couplings: Couplings) -> Matrix2<f64> {
-        self.by_velocity * couplings.velocity + self.by_position * couplings.position
+    /// This so many times, by squares.
+    fn times_over(&self, mut times: usize) -> Power {
+        let (mut all, mut square) = (Power::identity(), *self);
+        while times > 0 {
+            if times % 2 == 1 {
+                all = square.after(&all);
+            }
+            square = square.after(&square);
+            times /= 2;
+        }
+        all
     }
 
     fn times(&self, factor: f64) -> Power {
@@ -94,7 +102,7 @@ impl Power {
 }
 
 /// How the drive acts on the sense mode: by its velocity and by its displacement.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Couplings {
     /// Of the velocity u.
     pub velocity: f64,
@@ -102,29 +110,22 @@ pub struct Couplings {
     pub position: f64,
 }
 
-/// No samples.
-const NOT_MADE: (usize, Rows, Couplings) = {
-    let couplings = Couplings {
-        velocity: 0.0,
-        position: 0.0,
-    };
-    (0, [[0.0; 2]; 2], couplings)
-};
-
 /// What an ADC sees of the motion: of (x, u) the drive's, of (y, v) the sense channel's.
 pub type Rows = [[f64; 2]; 2];
 
 /// Free motion and carrier by sample.
 #[derive(Debug, Clone)]
 pub struct Tables {
-    /// M^n for n from 1 on, as many as blocks so far needed.
-    powers: Vec<Power>,
     /// M.
     one: Power,
-    /// What the outputs are made for: samples, and what they are seen by.
-    made: (usize, Rows, Couplings),
-    /// What the ADCs see after n samples: the drive's of x and u; the sense channel's of y and v, of x and u.
-    outputs: [Values; 6],
+    /// M^n of a whole piece, and of the number of samples that was last asked for beside it.
+    whole: [(usize, Power); 2],
+    rows: Rows,
+    /// Samples that the outputs are made for.
+    made: usize,
+    /// What the ADCs see after n samples: the drive's of x and u; the sense channel's of y and v, of x and u
+    /// by the velocity, of x and u by the displacement.
+    outputs: [Values; 8],
     /// What the excitation's phase advances by, 2^-64 turn, and for how many samples the next are made.
     carrier: (u64, usize),
     /// Sine and cosine of n steps.
@@ -136,10 +137,11 @@ impl Tables {
     /// For both modes moved on by one sample.
     pub fn new(one: Power) -> Self {
         Tables {
-            powers: Vec::new(),
             one,
-            made: NOT_MADE,
-            outputs: [NO_VALUES; 6],
+            whole: [(0, Power::identity()); 2],
+            rows: [[0.0; 2]; 2],
+            made: 0,
+            outputs: [NO_VALUES; 8],
             carrier: (0, 0),
             sine: NO_VALUES,
             cosine: NO_VALUES,
@@ -149,8 +151,8 @@ impl Tables {
     /// Other modes; the carrier stays.
     pub fn set(&mut self, one: Power) {
         self.one = one;
-        self.powers.clear();
-        self.made = NOT_MADE;
+        self.whole = [(0, Power::identity()); 2];
+        self.made = 0;
     }
 
     /// Both modes moved on by one sample.
@@ -158,28 +160,15 @@ impl Tables {
         &self.one
     }
 
-    fn prepare(&mut self, samples: usize, rows: Rows, couplings: Couplings, step: u64) {
-        while self.powers.len() < samples {
-            let next = match self.powers.last() {
-                Some(last) => self.one.after(last),
-                None => self.one,
-            };
-            self.powers.push(next);
-        }
-        if self.made.0 < samples || (self.made.1, self.made.2) != (rows, couplings) {
-            let [[dx, du], [dy, dv]] = rows;
-            let seen = |m: &Matrix2<f64>, a, b| [a * m.m11 + b * m.m21, a * m.m12 + b * m.m22];
-            for (n, power) in self.powers.iter().enumerate().take(samples) {
-                let pairs = [
-                    seen(&power.drive, dx, du),
-                    seen(&power.sense, dy, dv),
-                    seen(&power.coupled(couplings), dy, dv),
-                ];
-                for (to, value) in self.outputs.iter_mut().zip(pairs.as_flattened()) {
-                    to.as_flattened_mut()[n] = *value;
-                }
-            }
-            self.made = (samples, rows, couplings);
+    fn prepare(&mut self, samples: usize, rows: Rows, step: u64) {
+        if self.made < samples || self.rows != rows {
+            pulp::Arch::new().dispatch(Seen {
+                one: self.one,
+                rows,
+                chunks: samples.div_ceil(WIDTH),
+                outputs: &mut self.outputs,
+            });
+            (self.made, self.rows) = (samples, rows);
         }
         if self.carrier.0 != step || self.carrier.1 < samples {
             let sine = &mut self.sine.as_flattened_mut()[..samples];
@@ -195,19 +184,19 @@ impl Tables {
         &self,
         chunk: usize,
         [drive, sense]: [[f64; 2]; 2],
-        [x, u, y, v]: [f64; 4],
+        [x, u, y, v, rx, ru, qx, qu]: [f64; 8],
     ) -> ([f64; WIDTH], [f64; WIDTH]) {
         let mut seen = ([0.0; WIDTH], [0.0; WIDTH]);
         if chunk >= PIECE / WIDTH {
             return seen;
         }
         let (sine, cosine) = (&self.sine[chunk], &self.cosine[chunk]);
-        let [a, b, c, d, e, f] = self.outputs.each_ref().map(|o| &o[chunk]);
+        let [a, b, c, d, e, f, g, h] = self.outputs.each_ref().map(|o| &o[chunk]);
         for n in 0..WIDTH {
             seen.0[n] = drive[0] * cosine[n] + drive[1] * sine[n] + (x * a[n] + u * b[n]);
         }
         for n in 0..WIDTH {
-            let free = (y * c[n] + v * d[n]) + (x * e[n] + u * f[n]);
+            let free = (y * c[n] + v * d[n]) + (rx * e[n] + ru * f[n]) + (qx * g[n] + qu * h[n]);
             seen.1[n] = sense[0] * cosine[n] + sense[1] * sine[n] + free;
         }
         seen
@@ -228,24 +217,93 @@ impl Tables {
         sense_lsb: &mut [f64],
     ) {
         let samples = drive_lsb.len();
-        self.prepare(samples, rows, couplings, step);
+        self.prepare(samples, rows, step);
         let [x, u, y, v] = *deviation;
+        let (r, q) = (couplings.velocity, couplings.position);
+        let weights = [x, u, y, v, r * x, r * u, q * x, q * u];
         pulp::Arch::new().dispatch(Piece {
             tables: self,
             steady,
-            deviation: *deviation,
+            weights,
             drive: drive_lsb,
             sense: sense_lsb,
         });
-        if let Some(all) = samples.checked_sub(1).and_then(|k| self.powers.get(k)) {
-            let (d, s) = (&all.drive, &all.sense);
-            let c = all.coupled(couplings);
-            *deviation = [
-                d.m11 * x + d.m12 * u,
-                d.m21 * x + d.m22 * u,
-                c.m11 * x + c.m12 * u + s.m11 * y + s.m12 * v,
-                c.m21 * x + c.m22 * u + s.m21 * y + s.m22 * v,
-            ];
+        let all = self.over(samples);
+        let (d, s) = (&all.drive, &all.sense);
+        let c = all.by_velocity * r + all.by_position * q;
+        *deviation = [
+            d.m11 * x + d.m12 * u,
+            d.m21 * x + d.m22 * u,
+            c.m11 * x + c.m12 * u + s.m11 * y + s.m12 * v,
+            c.m21 * x + c.m22 * u + s.m21 * y + s.m22 * v,
+        ];
+    }
+
+    /// M^n of a piece of n samples.
+    fn over(&mut self, samples: usize) -> &Power {
+        let (kept, power) = &mut self.whole[usize::from(samples != PIECE)];
+        if *kept != samples {
+            (*kept, *power) = (samples, self.one.times_over(samples));
+        }
+        power
+    }
+}
+
+/// What the ADCs see after 1, 2, ... samples, as [`Tables::outputs`]: eight one by one, and from eight the next eight. The same with
+/// every instruction set, as [`Carrier`].
+struct Seen<'a> {
+    one: Power,
+    rows: Rows,
+    chunks: usize,
+    outputs: &'a mut [Values; 8],
+}
+
+impl Seen<'_> {
+    /// Rows that see what `power` moves on, by lane.
+    #[inline(always)]
+    fn moved<const N: usize>(
+        power: &Power,
+        [dx, du, sy, sv, vx, vu, px, pu]: [[f64; N]; 8],
+    ) -> [[f64; N]; 8] {
+        let (d, s) = (&power.drive, &power.sense);
+        let (v, p) = (&power.by_velocity, &power.by_position);
+        let mut to = [[0.0; N]; 8];
+        for n in 0..N {
+            to[0][n] = dx[n] * d.m11 + du[n] * d.m21;
+            to[1][n] = dx[n] * d.m12 + du[n] * d.m22;
+            to[2][n] = sy[n] * s.m11 + sv[n] * s.m21;
+            to[3][n] = sy[n] * s.m12 + sv[n] * s.m22;
+            to[4][n] = (vx[n] * d.m11 + vu[n] * d.m21) + (sy[n] * v.m11 + sv[n] * v.m21);
+            to[5][n] = (vx[n] * d.m12 + vu[n] * d.m22) + (sy[n] * v.m12 + sv[n] * v.m22);
+            to[6][n] = (px[n] * d.m11 + pu[n] * d.m21) + (sy[n] * p.m11 + sv[n] * p.m21);
+            to[7][n] = (px[n] * d.m12 + pu[n] * d.m22) + (sy[n] * p.m12 + sv[n] * p.m22);
+        }
+        to
+    }
+}
+
+impl pulp::WithSimd for Seen<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _simd: S) {
+        let [[dx, du], [sy, sv]] = self.rows;
+        let mut one = [[dx], [du], [sy], [sv], [0.0], [0.0], [0.0], [0.0]];
+        let mut eight = [[0.0; WIDTH]; 8];
+        for n in 0..WIDTH {
+            one = Self::moved(&self.one, one);
+            for (to, [value]) in eight.iter_mut().zip(one) {
+                to[n] = value;
+            }
+        }
+        let by_eight = self.one.times_over(WIDTH);
+        for chunk in 0..self.chunks.min(PIECE / WIDTH) {
+            if chunk > 0 {
+                eight = Self::moved(&by_eight, eight);
+            }
+            for (to, values) in self.outputs.iter_mut().zip(&eight) {
+                to[chunk] = *values;
+            }
         }
     }
 }
@@ -273,7 +331,7 @@ impl pulp::WithSimd for Carrier<'_> {
 struct Piece<'a> {
     tables: &'a Tables,
     steady: [[f64; 2]; 2],
-    deviation: [f64; 4],
+    weights: [f64; 8],
     drive: &'a mut [f64],
     sense: &'a mut [f64],
 }
@@ -287,10 +345,10 @@ impl pulp::WithSimd for Piece<'_> {
         let (sense, sense_rest) = self.sense.as_chunks_mut::<WIDTH>();
         let whole = drive.len();
         for (chunk, (drive, sense)) in drive.iter_mut().zip(sense).enumerate() {
-            (*drive, *sense) = self.tables.eight(chunk, self.steady, self.deviation);
+            (*drive, *sense) = self.tables.eight(chunk, self.steady, self.weights);
         }
         if !drive_rest.is_empty() {
-            let (drive, sense) = self.tables.eight(whole, self.steady, self.deviation);
+            let (drive, sense) = self.tables.eight(whole, self.steady, self.weights);
             drive_rest.copy_from_slice(&drive[..drive_rest.len()]);
             sense_rest.copy_from_slice(&sense[..sense_rest.len()]);
         }
