@@ -145,35 +145,55 @@ struct Sums<'a, const N: usize> {
     inputs: [&'a [f64]; 2],
 }
 
+impl<const N: usize> Sums<'_, N> {
+    /// Takes eight samples of both inputs into sums by input, integrator, cosine or sine, and lane: no sum waits for another.
+    #[inline(always)]
+    fn take(&self, sums: &mut [[[Eight; 2]; N]; 2], chunk: usize, eights: [&Eight; 2]) {
+        for k in 0..N {
+            for part in 0..2 {
+                let Some(weight) = self.kernel.weights[k][part].get(chunk) else {
+                    return;
+                };
+                for input in 0..2 {
+                    for lane in 0..WIDTH {
+                        sums[input][k][part][lane] += eights[input][lane] * weight[lane];
+                    }
+                }
+            }
+        }
+    }
+}
+
 impl<const N: usize> pulp::WithSimd for Sums<'_, N> {
     type Output = [[[f64; 2]; N]; 2];
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _simd: S) -> [[[f64; 2]; N]; 2] {
-        let mut sums = [[[0.0; 2]; N]; 2];
-        for (sums, input) in sums.iter_mut().zip(self.inputs) {
-            let (whole, rest) = input.as_chunks::<WIDTH>();
-            let mut last = [0.0; WIDTH];
-            last[..rest.len()].copy_from_slice(rest);
-            for (sums, weights) in sums.iter_mut().zip(&self.kernel.weights) {
-                for (sum, weights) in sums.iter_mut().zip(weights) {
-                    let mut eight = [0.0; WIDTH];
-                    for (input, weight) in whole.iter().zip(weights) {
-                        for lane in 0..WIDTH {
-                            eight[lane] += input[lane] * weight[lane];
-                        }
-                    }
-                    if let Some(weight) = weights.get(whole.len()) {
-                        for lane in 0..WIDTH {
-                            eight[lane] += last[lane] * weight[lane];
-                        }
-                    }
-                    let [a, b, c, d, e, f, g, h] = eight;
-                    *sum = ((a + e) + (c + g)) + ((b + f) + (d + h));
-                }
-            }
+        let [drive, sense] = self.inputs;
+        let (drive, drive_rest) = drive.as_chunks::<WIDTH>();
+        let (sense, sense_rest) = sense.as_chunks::<WIDTH>();
+        let mut sums = [[[[0.0; WIDTH]; 2]; N]; 2];
+        for (chunk, (drive, sense)) in drive.iter().zip(sense).enumerate() {
+            self.take(&mut sums, chunk, [drive, sense]);
         }
-        sums
+        if !drive_rest.is_empty() {
+            let mut last = [[0.0; WIDTH]; 2];
+            for (last, rest) in last.iter_mut().zip([drive_rest, sense_rest]) {
+                last[..rest.len()].copy_from_slice(rest);
+            }
+            self.take(&mut sums, drive.len(), last.each_ref());
+        }
+        let mut added = [[[0.0; 2]; N]; 2];
+        for (added, sums) in added
+            .as_flattened_mut()
+            .as_flattened_mut()
+            .iter_mut()
+            .zip(sums.as_flattened().as_flattened())
+        {
+            let [a, b, c, d, e, f, g, h] = *sums;
+            *added = ((a + e) + (c + g)) + ((b + f) + (d + h));
+        }
+        added
     }
 }
 

@@ -279,13 +279,17 @@ impl Quantiser {
     }
 
     /// The code of an input in LSB. The limits are integers, so limiting first changes nothing.
+    ///
+    /// A sum with 1.5 * 2^52 has the nearest integer, ties to even, in its low bits. A conversion to an integer, which saturates,
+    /// would be compiled for one lane at a time.
     #[inline(always)]
     fn code(&self, lsb: f64) -> i32 {
+        const INTEGERS: f64 = 6_755_399_441_055_744.0;
         let limited = lsb.max(self.low).min(self.high);
-        let toward_zero = limited as i32;
-        // Exact: at most 52 bits are left.
-        let rest = limited - f64::from(toward_zero);
-        toward_zero + i32::from(rest >= 0.5) - i32::from(rest < -0.5)
+        let sum = limited + INTEGERS;
+        // Exact: at most 52 bits are left. It is a half where a tie went down.
+        let rest = limited - (sum - INTEGERS);
+        (sum.to_bits() as i32).wrapping_add(i32::from(rest >= 0.5))
     }
 }
 
