@@ -33,10 +33,10 @@ pub fn run(design: &Design, seconds: f64, threads: usize, progress: Progress) ->
     let least_s = 10.0 / rows_per_s(design);
     if !(seconds >= least_s && seconds <= LONGEST_S) {
         return Err(InputError::new(format!(
-            "a run of {seconds} s is not between {} (ten decimated samples) and {LONGEST_S} s",
+            "`--duration` is {seconds} s; it has to be {} (ten decimated samples) to {LONGEST_S} s",
             number(least_s, 3)
         ))
-        .help("give `--duration` in seconds")
+        .help("give it in seconds, such as `--duration 30`")
         .into());
     }
     let records = (seconds.floor() as u64).max(10);

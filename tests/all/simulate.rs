@@ -242,11 +242,12 @@ fn what_cannot_be_simulated_is_refused() {
         of.replace("setpoint_raw = -4194304", "setpoint_raw = 4194304"),
     )
     .expect("written");
-    let cases: [(&[&str], &str); 5] = [
+    let cases: [(&[&str], &str); 6] = [
         (&["--profile", text(&profile)], "bad.csv:3:3"),
         (&["--profile", "nowhere.csv"], "nowhere.csv"),
-        (&["--duration", "0"], "0 s"),
-        (&["--duration", "nan"], "NaN s"),
+        (&["--duration", "0"], "error: `--duration` is 0 s; it has"),
+        (&["--duration", "-5"], "error: `--duration` is -5 s; it has"),
+        (&["--duration", "nan"], "error: `--duration` is NaN s; it has"),
         (&[text(&broken)], "setpoint"),
     ];
     for (arguments, words) in cases {
