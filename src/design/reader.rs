@@ -182,13 +182,30 @@ fn syntax(doc: &Doc, e: &toml::de::Error) -> Error {
     let bracket = ["unclosed", "between array elements"];
     let open = bracket.iter().any(|word| said.contains(word));
     let help = Some(doc.text)
-        .filter(|_| open)
-        .and_then(|text| open_bracket(text, offset))
+        .filter(|_| !said.contains("string"))
+        .and_then(|text| odd_quotes(text, offset))
+        .or_else(|| open.then(|| open_bracket(doc.text, offset)).flatten())
         .or_else(|| of_value(doc.text, offset))
         .unwrap_or(help.to_owned());
     doc.error(offset, format!("this is not TOML: {said}"))
         .help(help)
         .into()
+}
+
+/// What to ask where the line of a mistake has an odd number of quotes, with and without what looks like its comment.
+fn odd_quotes(text: &str, offset: usize) -> Option<String> {
+    let start = text.get(..offset)?.rfind('\n').map_or(0, |p| p + 1);
+    let line = text.get(start..)?.lines().next()?;
+    let is_odd = |part: &str| part.replace("\\\"", "").matches('"').count() % 2 == 1;
+    let odd = is_odd(line) && line.split('#').next().is_some_and(is_odd);
+    // Three quotes begin a text of several lines.
+    (odd && !line.contains("\"\"\"")).then(|| {
+        let before = match line.contains(',') {
+            true => " before the comma",
+            false => "",
+        };
+        format!("is a quote missing{before} in this line? It has an odd number of them")
+    })
 }
 
 /// What to do about a value in brackets that is open at a mistake.

@@ -18,6 +18,9 @@ const BROKEN: &[Case] = &[
     ("seed = 20040024", "seed = 2¦,5", "not TOML", "as a point: `seed = 2.5`"),
     ("name = \"gyro\"", "name = ¦flag", "not TOML", "double quotes: `name = \"flag\"`"),
     ("step_k = 5.0", "step_k = ¦5 K", "not TOML", "the number alone, the key's name has the unit: `step_k = 5`"),
+    ("[record]", "[record]\ncolumns.time_s = { column = \"t_ms, unit = \"¦ms\" }", "not TOML", "is a quote missing before the comma in this line?"),
+    ("[record]", "[record]\ncolumns.time_s = ¦t_ms\"", "not TOML", "is a quote missing in this line?"),
+    ("seed = 20040024", "seed = 2¦,5 # 3\" tube", "not TOML", "as a point: `seed = 2.5`"),
     // Unknown keys and tables.
     ("sample_rate_hz = ", "¦sample_rate_khz = ", "unknown key `sample_rate_khz` in `[circuit]`", "`sample_rate_hz`? Its value is in Hz: multiply by 1e3"),
     ("tuning_word = ", "¦tunning_word = ", "unknown key `tunning_word`", "did you mean `tuning_word`?"),
