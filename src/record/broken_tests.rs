@@ -196,7 +196,16 @@ fn broken_records_are_refused_with_their_place() {
             "decimal comma, bare",
             with_row(0, "0,0,5,20"),
             (2, 7),
-            &["4 cells, and the header has 3", "decimal comma"],
+            &[
+                "4 cells, and the header has 3",
+                "this looks like decimal commas: export with decimal points, or with semicolons between cells",
+            ],
+        ),
+        plain(
+            "a cell too many",
+            with_row(0, "0,0.5,20,7"),
+            (2, 10),
+            &["4 cells, and the header has 3", "remove what is too much"],
         ),
         plain(
             "typographic minus",

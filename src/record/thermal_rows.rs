@@ -236,12 +236,17 @@ fn wrong_width(
     source: Lines<'_>,
 ) -> InputError {
     let width = roles.columns.len();
+    // Numbers that lost their decimal marks to the commas between cells: up to two cells each.
+    let is_whole = |cell: &cells::Cell<'_>| {
+        !cell.text.contains('.') && cell.text.parse::<f64>().is_ok_and(f64::is_finite)
+    };
+    let commas = cells.len() <= 2 * width && cells.iter().all(is_whole);
     let (column, help) = match cells.get(width) {
-        Some(extra) => (
+        Some(extra) if commas => (
             extra.column,
-            "remove what is too much; if it is a decimal comma, export with decimal points"
-                .to_owned(),
+            "this looks like decimal commas: export with decimal points, or with semicolons between cells".to_owned(),
         ),
+        Some(extra) => (extra.column, "remove what is too much".to_owned()),
         None if source.is_cut(*line) => (line.text.chars().count() + 1, CUT_HELP.to_owned()),
         None => (
             line.text.chars().count() + 1,

@@ -247,7 +247,10 @@ fn what_cannot_be_simulated_is_refused() {
         (&["--profile", "nowhere.csv"], "nowhere.csv"),
         (&["--duration", "0"], "error: `--duration` is 0 s; it has"),
         (&["--duration", "-5"], "error: `--duration` is -5 s; it has"),
-        (&["--duration", "nan"], "error: `--duration` is NaN s; it has"),
+        (
+            &["--duration", "nan"],
+            "error: `--duration` is NaN s; it has",
+        ),
         (&[text(&broken)], "setpoint"),
     ];
     for (arguments, words) in cases {
