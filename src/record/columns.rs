@@ -159,7 +159,16 @@ fn lacking(
         line.path.display()
     ))
     .at_position(place)
-    .help(format!("{meant}{}", guesses::listed(names)))
+    .help(format!(
+        "{meant}{}\n  name one of these in [record.columns]{}",
+        guesses::listed(names),
+        match role {
+            "time_s" | "rate_out_dps" => "",
+            _ if THERMOMETERS.contains(&role) =>
+                ", or take the line away; a record without a thermometer: `gyrogen close --record` does without",
+            _ => ", or take the line away",
+        }
+    ))
 }
 
 /// A place in a row in words: `2nd`.

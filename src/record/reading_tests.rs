@@ -137,9 +137,33 @@ fn a_column_that_the_design_misspells_is_shown_in_the_design() {
     let said = error.to_string();
     for part in [
         "hub.toml:3:16: error: the record r.csv has no column \"gyro_x\"",
-        "did you mean \"gyro_z\"? the file has: time_s, gyro_z, die_degc",
+        "did you mean \"gyro_z\"? the file has: time_s, gyro_z, die_degc\n  name one of these in [record.columns]",
     ] {
         assert!(said.contains(part), "{part}: {said}");
+    }
+    // The output is needed, other columns are not.
+    assert!(!said.contains("take the line away"), "{said}");
+    for (role, column, help) in [
+        (
+            "die_degc",
+            "temp",
+            "take the line away; a record without a thermometer: `gyrogen close --record`",
+        ),
+        (
+            "agc",
+            "gain",
+            "name one of these in [record.columns], or take the line away",
+        ),
+    ] {
+        let design =
+            format!("[record.columns]\nrate_out_dps = \"gyro_z\"\n{role} = \"{column}\"\n");
+        let design = crate::design::reader::parse(&design, Some(std::path::Path::new("hub.toml")));
+        let error = try_parse(text.as_bytes(), &design.unwrap().record).unwrap_err();
+        let said = error.to_string();
+        assert!(
+            said.contains(help) && error.line == Some(3),
+            "{help}: {said}"
+        );
     }
 }
 
