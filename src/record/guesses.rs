@@ -78,7 +78,7 @@ pub(super) fn listed(names: &[&str]) -> String {
 
 /// The line of a design that maps `role` to a column, with the unit where the column's name states another than the
 /// contract's.
-fn mapped(role: &str, column: &str) -> String {
+pub fn mapped(role: &str, column: &str) -> String {
     match units::stated(column, role) {
         Some(unit) if unit.of == unit_of(role) && !unit.is_own() => format!(
             "{role} = {{ column = \"{column}\", unit = \"{}\" }}",

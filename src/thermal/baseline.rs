@@ -8,7 +8,7 @@ use crate::design::{FitOptions, FitOrder, RecordMapping};
 use crate::error::{InputError, Result};
 use crate::numeric::polynomial;
 use crate::record::columns::{self, THERMOMETERS};
-use crate::record::guesses::guess;
+use crate::record::guesses::{guess, mapped};
 use crate::record::thermal::LEAST_ROWS;
 use crate::record::{ThermalRecord, Warning};
 use crate::statistics::correlation::{NoiseModel, Rows};
@@ -217,9 +217,14 @@ fn without_thermometer(record: &ThermalRecord, has: &[&str]) -> String {
         false => "add to [record.columns] of the design which one is the thermometer: ",
     };
     format!(
-        "the file has: {columns}\n  {said}die_degc = \"{}\"\n  a record without a thermometer: `gyrogen close --record` does without",
-        guess("die_degc", has).unwrap_or("NAME_IN_THE_FILE")
+        "the file has: {columns}\n  {said}{}\n  a record without a thermometer: `gyrogen close --record` does without",
+        line_of_thermometer(has).unwrap_or_else(|| mapped("die_degc", "NAME_IN_THE_FILE"))
     )
+}
+
+/// The line of `[record.columns]` that makes the column a thermometer that is named like one; `None`: none of `has` is.
+pub fn line_of_thermometer(has: &[&str]) -> Option<String> {
+    guess("die_degc", has).map(|column| mapped("die_degc", column))
 }
 
 /// Fits the bias model.

@@ -196,11 +196,15 @@ fn channels_of(
     let name = thermometer(record, &design.record)?;
     let mut columns = record.columns.clone();
     let name = name.unwrap_or_else(|| {
-        warnings.push(Warning::general(
-            "no_thermometer",
-            "the record has no thermometer: the declared bias is a constant, and effects of temperature \
-             cannot be seen",
-        ));
+        let has: Vec<&str> = record.columns.keys().map(String::as_str).collect();
+        let line = baseline::line_of_thermometer(&has).filter(|_| !record.is_of_log());
+        let help = line.map_or(String::new(), |line| {
+            format!(". If this column is one, add to [record.columns] of the design: {line}")
+        });
+        let said = format!(
+            "the record has no thermometer: the declared bias is a constant, and effects of temperature cannot be seen{help}"
+        );
+        warnings.push(Warning::general("no_thermometer", said));
         columns.insert(NONE.to_owned(), vec![0.0; record.len()]);
         NONE.to_owned()
     });

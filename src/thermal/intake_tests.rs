@@ -130,3 +130,24 @@ fn a_column_that_is_nearly_empty_is_no_thermometer() {
         assert_eq!(intake.channels.thermometer, expected, "{every}");
     }
 }
+
+#[test]
+fn a_column_that_is_named_like_a_thermometer_is_told_with_the_line_that_makes_it_one() {
+    for (name, line) in [
+        ("temp_degC", Some("die_degc = \"temp_degC\"")),
+        (
+            "temp_degF",
+            Some("die_degc = { column = \"temp_degF\", unit = \"degF\" }"),
+        ),
+        ("humidity", None),
+    ] {
+        let record = record(name, &triangle(200), &vec![0.0; 200]);
+        let intake = Intake::of(&record, &design(), Vec::new()).unwrap();
+        let said = intake.warnings.iter().find(|w| w.code == "no_thermometer");
+        let said = &said.expect("a warning").message;
+        match line {
+            Some(line) => assert!(said.ends_with(&format!("of the design: {line}")), "{said}"),
+            None => assert!(said.ends_with("cannot be seen"), "{said}"),
+        }
+    }
+}
