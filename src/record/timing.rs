@@ -1,4 +1,4 @@
-//! Is the clock of a record in seconds since its start?
+//! Is the clock of a record in seconds since its start, and were there rows all the time?
 
 use super::thermal::ThermalRecord;
 use super::warning::Warning;
@@ -16,8 +16,51 @@ const MOST_STEP_S: f64 = 3600.0;
 /// Movement that counts as such, K.
 const LEAST_MOVE_K: f64 = 10.0;
 
-/// A warning for a clock in another unit, or of calendar time.
-pub(super) fn check(record: &ThermalRecord) -> Option<Warning> {
+/// Shorter pauses between rows are not told, s: few lags of a gyro end sooner (convention).
+const LEAST_GAP_S: f64 = 60.0;
+
+/// Pauses are that much longer than the median step (convention).
+const LEAST_GAP_STEPS: f64 = 20.0;
+
+/// One pause in so many steps, and three in all, are gaps; more of them are a program that has pauses (convention).
+const STEPS_A_GAP: usize = 50;
+const MOST_GAPS: usize = 3;
+
+/// Warnings for a clock in another unit, or of calendar time, and for a gap.
+pub(super) fn check(record: &ThermalRecord) -> Vec<Warning> {
+    let found = unit(record);
+    let clock_leaps = found.as_ref().map(|w| w.code) == Some("time_step_implausible");
+    let gap = gap(record).filter(|_| !clock_leaps);
+    found.into_iter().chain(gap).collect()
+}
+
+/// The longest gap of a record that has few.
+fn gap(record: &ThermalRecord) -> Option<Warning> {
+    let steps: Vec<f64> = record.time_s.windows(2).map(|w| w[1] - w[0]).collect();
+    let least_s = LEAST_GAP_S.max(LEAST_GAP_STEPS * stats::median(&steps));
+    let gaps = steps.iter().enumerate().filter(|(_, s)| **s > least_s);
+    let count = gaps.clone().count();
+    let (before, gap_s) = gaps.max_by(|a, b| a.1.total_cmp(b.1))?;
+    let others = match count {
+        1 => String::new(),
+        n => format!(" (the longest of {n} gaps)"),
+    };
+    (count <= (steps.len() / STEPS_A_GAP).clamp(1, MOST_GAPS)).then(|| {
+        Warning::on(
+            "time_gap",
+            "time_s",
+            format!(
+                "{} is {} s after {}{others}: what happened between was not measured, and a lag or a slow walk across it may be wrong",
+                record.place(before + 1),
+                number(*gap_s, 4),
+                record.place(before)
+            ),
+        )
+    })
+}
+
+/// A clock in another unit, or of calendar time.
+fn unit(record: &ThermalRecord) -> Option<Warning> {
     let (first, last) = (*record.time_s.first()?, *record.time_s.last()?);
     if first > 1e8 {
         return Some(Warning::on(
@@ -304,8 +347,49 @@ mod tests {
             let (_, warnings) = parse(text.as_bytes(), Path::new("r.csv"), &mapping).unwrap();
             let place = format!("between {}.0 and {at}.0 s (line {})", at - 1, at + 2);
             assert!(warnings[0].message.contains(&place), "{warnings:?}");
-            assert!(codes(header, row(600.0)).is_empty(), "{at}");
+            // With its pause it is one session with a gap.
+            assert_eq!(codes(header, row(600.0)), ["time_gap"], "{at}");
         }
+    }
+
+    #[test]
+    fn a_gap_is_told_once_with_its_rows_and_a_program_of_pauses_is_none() {
+        let said = |time_s: &dyn Fn(f64) -> f64| {
+            let rows: String = (0..400)
+                .map(f64::from)
+                .map(|k| format!("{},{},{}\n", time_s(k), (k * 1.7).sin(), 20.0 + 0.1 * k))
+                .collect();
+            let text = format!("time_s,rate_out_dps,die_degc\n{rows}");
+            let mapping = RecordMapping::default();
+            let (_, warnings) = parse(text.as_bytes(), Path::new("r.csv"), &mapping).unwrap();
+            let told = warnings.iter().map(|w| (w.code, w.message.clone()));
+            told.collect::<Vec<_>>()
+        };
+        let paused = |k: f64, at: f64, pause_s: f64| if k < at { 0.0 } else { pause_s };
+        let one = said(&|k| 0.25 * k + paused(k, 200.0, 3599.75));
+        assert_eq!(one.len(), 1, "{one:?}");
+        assert_eq!(one[0].0, "time_gap");
+        assert_eq!(
+            one[0].1,
+            "line 202 is 3600 s after line 201: what happened between was not measured, and a lag or a slow walk across it may be \
+             wrong"
+        );
+        // The longer of two.
+        let two = said(&|k| k + paused(k, 100.0, 99.0) + paused(k, 300.0, 199.0));
+        let start = "line 302 is 200 s after line 301 (the longest of 2 gaps): ";
+        assert!(two.len() == 1 && two[0].1.starts_with(start), "{two:?}");
+        // Too short a pause; rows as far apart as the pause; a pause every tenth row, as at a chamber's set points.
+        for time_s in [
+            &(|k: f64| 0.25 * k + paused(k, 200.0, 50.0)) as &dyn Fn(f64) -> f64,
+            &|k: f64| 10.0 * k + paused(k, 200.0, 150.0),
+            &|k: f64| 10.0 * k + 900.0 * (k / 10.0).floor(),
+        ] {
+            let told = said(time_s);
+            assert!(told.is_empty(), "{told:?}");
+        }
+        // A clock that was set leaves no gap.
+        let set = said(&|k| k + paused(k, 100.0, 1.7e9));
+        assert!(set.iter().all(|w| w.0 != "time_gap"), "{set:?}");
     }
 
     #[test]

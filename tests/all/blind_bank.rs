@@ -83,6 +83,10 @@ fn every_record_is_readable_and_plausible() {
                 || r.truth.planted.iter().any(|p| p.id == "output_saturation");
             let expected = match w.code {
                 "repeated_times" => true,
+                "time_gap" => {
+                    let time_s = column(&r.csv, "time_s");
+                    time_s.windows(2).any(|w| w[1] - w[0] > 60.0)
+                }
                 "rows_without_rate" => {
                     r.csv.contains(",nan") || r.csv.contains(",,") || r.csv.contains(",\n")
                 }
