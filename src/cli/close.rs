@@ -122,6 +122,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         (None, None) => Ok(()),
     };
     let mut results = super::common::claim(out, &PLANNED, recorded, look)?;
+    let mut of_record = Vec::new();
     let (closure, said, compared, controls) = if let Some(path) = &arguments.capture {
         watch.stage("closing");
         let closed = capture::close(path, &design, &recorded.command)?;
@@ -134,6 +135,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
             crate::verify::firmware::refuse_edited(out)?;
         }
         let (record, warnings) = crate::record::read_any(path, &design.record)?;
+        of_record.clone_from(&warnings);
         watch.stage("closing");
         if arguments.format == OutputFormat::Text {
             say!("read: {}", record.understood(&design.record));
@@ -148,6 +150,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         if arguments.format == OutputFormat::Text {
             say!("rows: {}", record.rows_understood(&closed.closure.warnings));
         }
+        super::warnings(&super::common::parted(&closed.closure.warnings, &of_record).0);
         watch.stage("emitting and verifying");
         let prefix = correction::prefix(&design.name);
         let augmented = augmented(&closed, &design);
@@ -203,7 +206,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
             out,
         ),
     }
-    super::warnings(&closure.warnings);
+    super::warnings(&super::common::parted(&closure.warnings, &of_record).1);
     let differences = compared.map_or(Vec::new(), |c| c.differences());
     let mut failures = Vec::new();
     if !differences.is_empty() {

@@ -160,6 +160,14 @@ pub(super) fn languages(asked: Option<Language>) -> Result<Vec<Language>> {
     Ok(found)
 }
 
+/// Warnings that stand before the results, for what makes these mean something else: those of the file as it was read,
+/// `of_record`, and of a thermometer that is none. Then the others.
+pub(super) fn parted(all: &[Warning], of_record: &[Warning]) -> (Vec<Warning>, Vec<Warning>) {
+    const OF_THERMOMETER: [&str; 2] = ["no_thermometer", "thermometer_constant"];
+    let is_first = |w: &Warning| of_record.contains(w) || OF_THERMOMETER.contains(&w.code);
+    all.iter().cloned().partition(is_first)
+}
+
 /// What the user should know of, a line each on stderr.
 pub(super) fn warnings(all: &[Warning]) {
     for warning in all {

@@ -107,11 +107,18 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let note = super::earlier::note(&arguments.out, "summary.json", &json);
     results.finish()?;
     note.iter().for_each(|note| talk!("{note}"));
+    let parts = &outcome.parts;
+    if let (Some([columns, rows]), OutputFormat::Text) = (&parts.understood, arguments.format) {
+        say!("read: {columns}");
+        say!("rows: {rows}");
+    }
+    let (first, others) = super::common::parted(&outcome.summary.warnings, &parts.of_record);
+    super::warnings(&first);
     match arguments.format {
         OutputFormat::Json => super::terminal::give(&json),
         OutputFormat::Text => print(&outcome, &arguments.out),
     }
-    super::warnings(&outcome.summary.warnings);
+    super::warnings(&others);
     if design.correction.is_some() {
         talk!("{}", super::emit::lacks_correction("compensation"));
     }
@@ -144,10 +151,6 @@ fn next(arguments: &Arguments) -> String {
 
 fn print(outcome: &Outcome, out: &Path) {
     let s = &outcome.summary;
-    if let Some([columns, rows]) = &outcome.parts.understood {
-        say!("read: {columns}");
-        say!("rows: {rows}");
-    }
     super::terminal::show(&super::comparison_table(&s.equivalence.functions));
     say!(
         "words compared: per call its results, its state and its fault number; per row of the chain its words; per table its entries."

@@ -61,6 +61,7 @@ pub fn run(
         }
     };
 
+    let of_record = warnings.clone();
     say("fitting the bias polynomial");
     let calibration = calibration::calibrate(&mut design, &record, simulated.is_some())?;
     Warning::add_of_fit(&mut warnings, calibration.warnings);
@@ -113,6 +114,7 @@ pub fn run(
         understood,
         record_csv,
         fit,
+        of_record,
         warnings,
         chosen,
         rounded,

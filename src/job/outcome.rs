@@ -35,6 +35,8 @@ pub struct Parts {
     pub record_csv: Option<String>,
     /// The fit.
     pub fit: BaselineFit,
+    /// Of the record, as its reader said them.
+    pub of_record: Vec<Warning>,
     /// Of record and fit.
     pub warnings: Vec<Warning>,
     /// Formats that were chosen for the design, with the reason; empty if it had its own.

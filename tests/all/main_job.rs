@@ -1,6 +1,6 @@
 //! The main job as a user runs it: the embedded default, and real records where they are at hand.
 
-use crate::common::command::{gyrogen_here, text, told};
+use crate::common::command::{all_of, gyrogen_here, shell, text, told};
 use crate::common::json::number;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
@@ -261,6 +261,35 @@ fn a_phase_in_degrees_stops_only_a_fit_over_it() {
         codes.iter().any(|w| w["code"] == "phase_in_degrees"),
         "{codes:?}"
     );
+}
+
+/// A record of 60 rows, in a folder: its times, and what its thermometer shows.
+fn sixty(folder: &Path, step_s: i32, die_degc: fn(i32) -> f64) {
+    let mut csv = String::from("time_s,die_degc,rate_out_dps\n");
+    for k in 0..60 {
+        let noise = 0.01 * f64::from(k * 7919 % 13 - 6);
+        let rate = 0.8 + 0.01 * f64::from(k) + noise;
+        csv += &format!("{},{},{rate}\n", step_s * k, die_degc(k));
+    }
+    std::fs::write(folder.join("record.csv"), csv).expect("a record");
+}
+
+/// Milliseconds that nobody marked change what every result means.
+#[test]
+fn what_is_said_of_the_record_comes_before_the_results() {
+    let folder = tempfile::tempdir().expect("a folder");
+    sixty(folder.path(), 10_000, |k| 20.0 + 0.5 * f64::from(k));
+    for (command, result) in [
+        ("run --out a", "words compared"),
+        ("close --out b", "noise floor"),
+        ("run --out c --format json", "\"fit\""),
+    ] {
+        let line = format!("gyrogen {command} --record record.csv 2>&1");
+        let said = all_of(&shell(&line, folder.path()));
+        let place = |part: &str| said.find(part).unwrap_or_else(|| panic!("{part}: {said}"));
+        assert!(place("[time_step_implausible]") < place(result), "{said}");
+        assert_eq!(said.matches("[time_step_implausible]").count(), 1, "{said}");
+    }
 }
 
 /// A rate that was not measured in some rows counts as none, and the fitted design reproduces the
