@@ -123,7 +123,10 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         talk!("{}", super::emit::lacks_correction("compensation"));
     }
     if outcome.holds() {
-        talk!("{}", next(arguments));
+        // A thermometer that stands is to be mended first.
+        if outcome.not_fitted().is_none() {
+            talk!("{}", next(arguments));
+        }
         return Ok(());
     }
     Err(Error::Check(format!(
@@ -151,6 +154,9 @@ fn next(arguments: &Arguments) -> String {
 
 fn print(outcome: &Outcome, out: &Path) {
     let s = &outcome.summary;
+    if let Some(said) = outcome.not_fitted() {
+        say!("{said}");
+    }
     super::terminal::show(&super::comparison_table(&s.equivalence.functions));
     say!(
         "words compared: per call its results, its state and its fault number; per row of the chain its words; per table its entries."

@@ -217,6 +217,17 @@ pub fn single_readings(summary: &Summary, points: &Points) -> Option<String> {
     })
 }
 
+/// What stands for the drift over temperature where the thermometer never moves, a sentence; `None`: it does.
+pub fn not_fitted(summary: &Summary) -> Option<String> {
+    let mut warnings = summary.warnings.iter();
+    warnings.any(|w| w.code == "thermometer_constant").then(|| {
+        format!(
+            "No dependence on temperature could be fitted: {} is constant.",
+            summary.fit.thermometer
+        )
+    })
+}
+
 /// A compensation gains nothing if more than this share is left both of the drift and of the standard deviation about the mean
 /// (convention).
 const NO_GAIN: f64 = 0.9;
@@ -340,6 +351,11 @@ impl Outcome {
     /// Where heating and cooling differ, what the drift of their means leaves out: see [`single_readings`].
     pub fn single_readings(&self) -> Option<String> {
         single_readings(&self.summary, &self.parts.points)
+    }
+
+    /// Where the thermometer never moves, what is said of the drift: see [`not_fitted`].
+    pub fn not_fitted(&self) -> Option<String> {
+        not_fitted(&self.summary)
     }
 
     /// The first difference of each function that has one.

@@ -7,7 +7,7 @@ use super::tables;
 use super::text::{bounding, decimals_of, fixed, grouped, percent, significant};
 use crate::digest::sha256;
 use crate::job::fitted_design;
-use crate::job::outcome::{Drift, single_readings};
+use crate::job::outcome::{Drift, not_fitted, single_readings};
 use crate::output::name_of;
 use crate::record::Warning;
 use crate::verify::compare::Compared;
@@ -230,17 +230,22 @@ fn headline(shown: &Shown) -> String {
         (false, true) => "do not carry",
         (false, false) => "does not carry",
     };
+    let drift = not_fitted(s).map(|said| format!("{said} The"));
+    let drift = drift.unwrap_or_else(|| {
+        format!(
+            "Bias drift over temperature {change} from {} to {} deg/s peak to peak ({} of what it was; means over bins of temperature), \
+             computed in fixed point{}",
+            fixed(before, decimals),
+            fixed(after, decimals),
+            percent(after, before),
+            match single_readings(s, shown.points) {
+                Some(said) => format!(". {said} The"),
+                None => "; the".to_owned(),
+            }
+        )
+    });
     format!(
-        "Bias drift over temperature {change} from {} to {} deg/s peak to peak ({} of what it was; means over bins of temperature), \
-         computed in fixed point{} emitted {} {verdict} the model's bits: {} in {} words \
-         compared. What is left: {}.",
-        fixed(before, decimals),
-        fixed(after, decimals),
-        percent(after, before),
-        match single_readings(s, shown.points) {
-            Some(said) => format!(". {said} The"),
-            None => "; the".to_owned(),
-        },
+        "{drift} emitted {} {verdict} the model's bits: {} in {} words compared. What is left: {}.",
         s.built(),
         mismatches(s.equivalence.mismatches),
         grouped(s.equivalence.compared),

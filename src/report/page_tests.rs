@@ -279,6 +279,20 @@ fn long_records_are_thinned_and_keep_their_extremes() {
 }
 
 #[test]
+fn the_lead_of_a_constant_thermometer_names_no_drift() {
+    let mut made = usual(60);
+    made.summary.warnings = vec![Warning::on("thermometer_constant", "die_degc", "stands")];
+    let said = format!(
+        "id=\"headline\">No dependence on temperature could be fitted: {} is constant. The emitted C and Rust carry the model",
+        made.summary.fit.thermometer
+    );
+    let html = made.html();
+    is_sound(&html);
+    assert!(html.contains(&said), "{said}");
+    assert!(!html.contains("Bias drift over temperature"));
+}
+
+#[test]
 fn the_lead_says_what_the_mean_of_heating_and_cooling_leaves_out() {
     let mut made = usual(60);
     assert!(!made.html().contains("Heating and cooling differ, and"));

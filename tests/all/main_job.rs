@@ -1,6 +1,6 @@
 //! The main job as a user runs it: the embedded default, and real records where they are at hand.
 
-use crate::common::command::{all_of, gyrogen_here, shell, text, told};
+use crate::common::command::{all_of, good, gyrogen, gyrogen_here, shell, text, told};
 use crate::common::json::number;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
@@ -290,6 +290,21 @@ fn what_is_said_of_the_record_comes_before_the_results() {
         assert!(place("[time_step_implausible]") < place(result), "{said}");
         assert_eq!(said.matches("[time_step_implausible]").count(), 1, "{said}");
     }
+}
+
+/// A thermometer that stands gives no drift over temperature, and no causes to look for.
+#[test]
+fn a_constant_thermometer_is_the_first_thing_said() {
+    let folder = tempfile::tempdir().expect("a folder");
+    sixty(folder.path(), 1, |_| 25.0);
+    let output = gyrogen(&["run", "--record", "record.csv"], folder.path());
+    good(&output);
+    let said = all_of(&output);
+    let headline = "No dependence on temperature could be fitted: die_degc is constant.";
+    assert!(said.contains(&format!("\n{headline}\n")), "{said}");
+    assert!(!told(&output).contains("next:"), "{said}");
+    let page = std::fs::read_to_string(folder.path().join("gyrogen-out/report.html"));
+    assert!(page.expect("a report").contains(headline));
 }
 
 /// A rate that was not measured in some rows counts as none, and the fitted design reproduces the
