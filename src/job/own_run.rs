@@ -5,13 +5,12 @@ use super::points::{Point, Points};
 use super::{clamped_bias, compensation, warning};
 use crate::circuit::engine::{self, ArithmeticKind, Rows};
 use crate::circuit::scale::{excitation_is_off, full_scale_is_off};
-use crate::circuit::vector_width::TooShort;
+use crate::circuit::vector_width::{self, TooShort};
 use crate::cosim::scale::full_scale_dps;
 use crate::cosim::surroundings::Moment;
 use crate::cosim::{readings, stream};
 use crate::design::{CompensationInput, Design};
 use crate::emit::views::Language;
-use crate::equivalence::outcome::FirstOverflow;
 use crate::error::{Error, InputError, Result};
 use crate::nodes::run;
 use crate::numeric::format::pow2;
@@ -115,17 +114,19 @@ impl OwnRun {
     /// What is to be said where x and y of the CORDIC wrap in this run.
     fn vector_wraps(&self, design: &Design) -> Option<String> {
         // Most designs are proved not to, and need no second run.
-        TooShort::of(design)?;
+        let short = TooShort::of(design)?;
         let uncompensated = Design {
             compensation: None,
             ..design.clone()
         };
         let seen = run::run(&uncompensated, &self.stream.drive, &self.stream.sense);
-        let first = FirstOverflow::new(&uncompensated, &seen, None)?;
-        first.mend.as_ref()?;
+        let first = seen.first_overflow.as_ref();
+        let first = first.filter(|event| event.label.key == vector_width::KEY)?;
         Some(format!(
-            "{}. The drive phase is wrong wherever they wrap, and with it the fit and the drift after compensation",
-            first.sentence()
+            "x or y of the CORDIC wraps, first at sample {}; {}. The drive phase is wrong wherever they wrap, and with it the fit and the \
+             drift after compensation",
+            first.sample,
+            short.sentence()
         ))
     }
 
