@@ -52,15 +52,11 @@ pub fn fit(shown: &Shown) -> Vec<[String; 2]> {
         lines.push(line(
             "heating against cooling",
             format!(
-                "they differ by {} rms at the same reading; by chance, residuals of the fit's size and memory would make them \
+                "they differ by {} rms at the same reading; by chance, residuals with the same rms and autocorrelation would \
                  differ by {} rms: {}",
                 dps(l.rms_dps),
                 dps(l.noise_dps),
-                if l.significant {
-                    "significant"
-                } else {
-                    "not significant"
-                }
+                l.finding(f.noise_floor_rms_dps)
             ),
         ));
     }

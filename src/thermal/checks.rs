@@ -255,7 +255,7 @@ fn loop_warning(c: &Checked<'_>) -> Option<Warning> {
     let l = c.sweep_loop?;
     let seen = format!(
         "at the same reading of {} the error differs by {} deg/s rms between rising and falling sweeps; by chance, \
-         residuals of the fit's size and memory would make a difference of {} deg/s rms ({} places compared)",
+         residuals with the same rms and autocorrelation would make a difference of {} deg/s rms ({} places compared)",
         c.fit.thermometer,
         g(l.rms_dps),
         g(l.noise_dps),
@@ -270,13 +270,14 @@ fn loop_warning(c: &Checked<'_>) -> Option<Warning> {
                  `gyrogen close`, with the same record and design, looks for them"
             ),
         ))
-    } else if l.rms_dps > c.fit.noise_floor_rms_dps.max(l.noise_dps) {
+    } else if l.is_undecided(c.fit.noise_floor_rms_dps) {
         Some(Warning::on(
             "loop_or_slow_noise",
             &c.fit.thermometer,
             format!(
-                "{seen}. That is more than a single reading's noise, but the residuals wander so slowly that one record \
-                 cannot tell a loop from noise. Repeat the cycle"
+                "{seen}. That is more than a single reading's noise, but the residuals wander so slowly that this record \
+                 cannot tell a loop from noise. Try `gyrogen close`, with the same record and design; if it names no cause, record \
+                 a second cycle"
             ),
         ))
     } else {

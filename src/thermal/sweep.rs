@@ -67,7 +67,7 @@ pub struct Loop {
     /// Root mean square, over the thermometer's bins that both directions visit, of the
     /// difference between their mean residuals, deg/s.
     pub rms_dps: f64,
-    /// What chance would be expected to give, with residuals of the size and memory that the fit and the loop leave, deg/s.
+    /// What chance would be expected to give, with residuals of the rms and autocorrelation that the fit and the loop leave, deg/s.
     pub noise_dps: f64,
     /// How many bins were compared.
     pub bins: usize,
@@ -76,6 +76,25 @@ pub struct Loop {
     pub z: f64,
     /// True if that is more than [`LOOP_LIMIT`].
     pub significant: bool,
+}
+
+impl Loop {
+    /// True for a difference that is larger than chance and than a single reading's noise, deg/s rms, but not significant:
+    /// this record cannot tell a loop from slow noise.
+    pub fn is_undecided(&self, noise_floor_rms_dps: f64) -> bool {
+        !self.significant && self.rms_dps > noise_floor_rms_dps.max(self.noise_dps)
+    }
+
+    /// What the test says, in words; `noise_floor_rms_dps` is a single reading's noise, deg/s rms.
+    pub fn finding(&self, noise_floor_rms_dps: f64) -> &'static str {
+        match (self.significant, self.is_undecided(noise_floor_rms_dps)) {
+            (true, _) => "significant",
+            (false, true) => {
+                "larger than chance, but this record cannot tell a loop from slow noise (see the warning); try `gyrogen close`"
+            }
+            (false, false) => "not significant",
+        }
+    }
 }
 
 /// Far out, because the memory of the noise is itself an estimate.
@@ -187,5 +206,25 @@ mod tests {
         assert!(directions(&[], 1.0).is_empty());
         let falling: Vec<f64> = (0..50).rev().map(f64::from).collect();
         assert!(directions(&falling, 5.0).iter().all(|d| *d == -1));
+    }
+
+    /// A difference of four times chance is not told as no more than chance.
+    #[test]
+    fn a_difference_larger_than_chance_is_told_as_such() {
+        let seen = |rms_dps, significant| Loop {
+            rms_dps,
+            noise_dps: 0.1768,
+            bins: 20,
+            z: 0.0,
+            significant,
+        };
+        let larger = seen(0.6936, false);
+        assert!(larger.is_undecided(0.05));
+        assert!(larger.finding(0.05).contains("larger than chance"));
+        // Within a single reading's noise, or within chance.
+        assert_eq!(larger.finding(0.7), "not significant");
+        assert_eq!(seen(0.17, false).finding(0.05), "not significant");
+        assert_eq!(seen(0.6936, true).finding(0.05), "significant");
+        assert!(!seen(0.6936, true).is_undecided(0.05));
     }
 }
