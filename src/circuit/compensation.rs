@@ -284,7 +284,7 @@ impl<A: Arithmetic> Block<A, 1, 1> for Bias {
     type State = ();
     const NAME: &'static str = "bias";
     const PURPOSE: &'static str =
-        "The bias that the polynomial, or what stands for it, has at a word of the thermometer.";
+        "Bias at a quantised temperature (or phase or frequency), from the polynomial or the table that replaces it.";
 
     fn inputs(&self) -> [Port; 1] {
         [self.ports[0].clone()]
