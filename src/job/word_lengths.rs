@@ -109,10 +109,10 @@ impl WordLengths {
         };
         let largest = self.largest.as_ref();
         let largest = largest.map_or(String::new(), |w| {
-            format!(", the largest of them {} ({})", w.key, w.from)
+            format!(" (largest part: {} = {})", w.key, w.from)
         });
         format!(
-            "fit {} deg/s, {whose} {} deg/s{largest} (rms)",
+            "{} deg/s from the fit, {} deg/s from {whose}{largest}",
             shown(fit_dps, 3),
             shown(self.rms_dps, 2)
         )

@@ -46,7 +46,9 @@ fn a_short_product_is_named_with_what_it_does() {
     assert!(sentence.contains("deg/s at most (measured)"), "{sentence}");
     let clause = words.clause(fit);
     assert!(
-        clause.contains("the largest of them circuit.demodulator.product (Q2.10)"),
+        clause.contains(
+            " deg/s from word lengths (largest part: circuit.demodulator.product = Q2.10)"
+        ),
         "{clause}"
     );
 }

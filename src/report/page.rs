@@ -245,7 +245,7 @@ fn headline(shown: &Shown) -> String {
         )
     });
     format!(
-        "{drift} emitted {} {verdict} the model's bits: {} in {} words compared. What is left: {}.",
+        "{drift} emitted {} {verdict} the model's bits: {} in {} words compared. Left over, rms: {}.",
         s.built(),
         mismatches(s.equivalence.mismatches),
         grouped(s.equivalence.compared),
