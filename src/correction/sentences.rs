@@ -98,14 +98,7 @@ impl Said<'_> {
             Term::ScaleBy { .. } | Term::Cubic { .. } | Term::Even { .. } => {
                 format!("error on the rate r: {}", self.on_rate(term))
             }
-            _ => {
-                let said = self.on_bias(term);
-                // What is subtracted with a minus is added.
-                match said.strip_prefix('-') {
-                    Some(said) => format!("added: {said}"),
-                    None => format!("subtracted: {said}"),
-                }
-            }
+            _ => format!("subtracted: {}", self.on_bias(term)),
         }
     }
 
@@ -332,7 +325,7 @@ mod tests {
         assert_eq!(said(product(1.5, vec![])), "subtracted: 1.5 deg/s");
         assert_eq!(
             said(product(-2.0, vec![(0, 1), (2, 3)])),
-            "added: 2 deg/s * die_temperature * drive_gain^3"
+            "subtracted: -2 deg/s * die_temperature * drive_gain^3"
         );
         let values_dps = vec![0.0, 1.0, 0.5];
         assert_eq!(
