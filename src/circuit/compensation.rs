@@ -283,8 +283,7 @@ impl Bias {
 impl<A: Arithmetic> Block<A, 1, 1> for Bias {
     type State = ();
     const NAME: &'static str = "bias";
-    const PURPOSE: &'static str =
-        "Bias at a quantised temperature (or phase or frequency), from the polynomial or the table that replaces it.";
+    const PURPOSE: &'static str = "Bias at a quantised temperature (or phase or frequency), from the polynomial or the table that replaces it.";
 
     fn inputs(&self) -> [Port; 1] {
         [self.ports[0].clone()]

@@ -58,8 +58,8 @@ pub fn calibrate(
         ..design.fit.clone()
     };
     let mut fit = thermal::fit(record, &mapping, &options)?;
-    if design.fit.order == FitOrder::ByRecord {
-        fit.reason = by_record(&fit, simulated);
+    if simulated && design.fit.order == FitOrder::ByRecord {
+        fit.reason = by_record(&fit);
     }
     warnings.extend(fit.warnings.iter().cloned());
     let mut chosen = formats::fill(design, &fit, record)?;
@@ -88,18 +88,13 @@ pub fn calibrate(
 /// The order of a simulated run where the design leaves it to the record (convention: that of the paper).
 const SIMULATED_ORDER: u32 = 2;
 
-/// Why a fit has its order, with the rule that `by_record` is where a simulated run and its own record, measured, get
-/// different ones.
-fn by_record(fit: &BaselineFit, simulated: bool) -> String {
+/// Why a simulated run's fit has its order, and the one that the same record gets where it is measured.
+fn by_record(fit: &BaselineFit) -> String {
     let given = format!("order {SIMULATED_ORDER} as given");
-    match (simulated, fit.reason.strip_prefix(&given)) {
-        (true, Some(rest)) if !rest.is_empty() => format!(
+    match fit.reason.strip_prefix(&given) {
+        Some(rest) if !rest.is_empty() => format!(
             "order {SIMULATED_ORDER}, as in Chen et al. (2004), for the simulated run{rest}, and `run --record` of this run's record takes \
              that (fit.order = \"by_record\")"
-        ),
-        (false, _) if fit.order != SIMULATED_ORDER as usize => format!(
-            "{} (for its simulated record `run` takes order {SIMULATED_ORDER} instead: fit.order = \"by_record\")",
-            fit.reason
         ),
         _ => fit.reason.clone(),
     }
