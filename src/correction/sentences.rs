@@ -1,15 +1,15 @@
 //! A correction in sentences: what the head of its emitted sources says.
 
-use super::plan::{Plan, Term, in_words};
+use super::plan::{Input, Plan, Term, in_words};
 use super::run::Correction;
-use crate::text::{at_most, number};
+use crate::text::{at_most, constant, number};
 
 /// The plan and its words, a line each: how it is called, its inputs, its terms, its bound.
 pub fn facts(correction: &Correction) -> Vec<String> {
     let (plan, formats) = (&correction.plan, &correction.formats);
     let mut facts = called(plan);
     facts.push(format!(
-        "rate {} deg/s in and out, sum of the terms on 2^-{} deg/s, for a noise of {} deg/s rms",
+        "rate {} deg/s in and out, sum of the terms on 2^-{} deg/s, for a white noise of {} deg/s rms in a reading",
         formats.rate,
         formats.sum_fraction_bits,
         number(formats.noise_dps, 3)
@@ -18,8 +18,9 @@ pub fn facts(correction: &Correction) -> Vec<String> {
     let names = plan.input_names();
     facts.extend(inputs.zip(&names).map(|((input, format), name)| {
         format!(
-            "{name} = {}, {format}, rounded and held within -1 to 1",
-            input.formula()
+            "{name} = {}, {format}, rounded; {}",
+            input.formula(),
+            calibrated(input)
         )
     }));
     let mut said = Said {
@@ -36,6 +37,14 @@ pub fn facts(correction: &Correction) -> Vec<String> {
         "at most {} deg/s from these terms in real numbers (analysis), where no word saturates{relay}",
         at_most(correction.bound_dps(), 3)));
     facts
+}
+
+/// The range of a column that its input holds, in the column's unit.
+fn calibrated(input: &Input) -> String {
+    let (middle, half) = (input.offset, input.scale.abs());
+    let (low, high) = (constant(middle - half, 7), constant(middle + half, 7));
+    let column = &input.column;
+    format!("calibrated for {column} {low} .. {high}, beyond which it is held at the nearer end")
 }
 
 /// How it is called: which readings it takes, and what to do after a gap.
@@ -312,6 +321,19 @@ mod tests {
             assert!((1..=tables).all(told) && !told(tables + 1), "{head}");
         }
         assert_eq!(kinds.len(), 11, "{kinds:?}");
+    }
+
+    #[test]
+    fn an_input_says_its_range_in_its_own_unit() {
+        let input = |scale| Input {
+            column: "die_degc".to_owned(),
+            offset: 27.505,
+            scale,
+        };
+        let said =
+            "calibrated for die_degc -15.03 .. 70.04, beyond which it is held at the nearer end";
+        assert_eq!(calibrated(&input(42.535)), said);
+        assert_eq!(calibrated(&input(-42.535)), said);
     }
 
     #[test]
