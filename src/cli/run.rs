@@ -201,7 +201,8 @@ fn print(outcome: &Outcome, out: &Path) {
     );
     say!("fit in {}: {}.", s.fit.thermometer, s.fit.reason);
     say!(
-        "held-out rms {:.4} deg/s: each of {} blocks in time was predicted from the others. Noise alone makes {:.4} deg/s rms.",
+        "held-out rms {:.4} deg/s: each of {} blocks in time was predicted from the others. The noise floor, from differences of neighbouring \
+         residuals, is {:.4} deg/s rms.",
         s.fit.heldout_rms_dps,
         outcome.parts.fit.blocks.len(),
         s.fit.noise_floor_rms_dps
@@ -209,13 +210,17 @@ fn print(outcome: &Outcome, out: &Path) {
     for chosen in &s.chosen {
         say!("chosen: {chosen}");
     }
+    // The bias first: the bound of the rate is made of it.
+    let (bias, others) = s.certainty_text.split_at(s.certainty_text.len().min(1));
+    for line in bias {
+        say!("{line}");
+    }
     say!(
-        "error budget: the compensated rate is at most {} deg/s from what the fitted polynomial gives (proved). This is the bound of \
-         the bias in the next line with two roundings more: of the thermometer to its word, and of the rate to the output. The fit's \
-         own error is the held-out rms (an estimate).",
+        "The rate adds two roundings, of the thermometer to its word and of the rate to the output: it is at most {} deg/s from what \
+         the fitted polynomial gives (proved). The fit's own error is the held-out rms (an estimate).",
         at_most(s.budget.bound_dps, 3)
     );
-    for line in &s.certainty_text {
+    for line in others {
         say!("{line}");
     }
     say!("{}", s.finding);

@@ -229,6 +229,12 @@ fn a_simulated_run_says_why_its_own_record_gets_another_order() {
     let of = |arguments: &[&str]| {
         let (status, said, complaints) = gyrogen(top.path(), arguments);
         assert_eq!(status, Some(0), "{said}{complaints}");
+        // The bound of the rate is made of that of the bias: in this order.
+        let at = |words: &str| said.find(words).expect(words);
+        assert!(
+            at("the firmware's bias is at most ") < at("The rate adds two roundings, "),
+            "{said}"
+        );
         let lines = said
             .lines()
             .filter(|l| l.starts_with("fit in ") || l.starts_with("held-out rms "));
@@ -251,7 +257,8 @@ fn a_simulated_run_says_why_its_own_record_gets_another_order() {
         "{again}"
     );
     let floor = |lines: &str| {
-        let floor = lines.rsplit_once("Noise alone makes ");
+        let floor =
+            lines.rsplit_once("The noise floor, from differences of neighbouring residuals, is ");
         floor.expect("a noise floor").1.to_owned()
     };
     assert_eq!(floor(&own), floor(&again));
