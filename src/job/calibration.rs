@@ -3,7 +3,7 @@
 use super::bound::{self, Kept};
 use super::coefficients::{self, Rounded};
 use super::{formats, warning};
-use crate::design::{Compensation, CompensationInput, Design, FitOptions, FitOrder};
+use crate::design::{Compensation, CompensationInput, Design, FitOptions, FitOrder, Outside};
 use crate::error::{InputError, Result};
 use crate::record::{ThermalRecord, Warning};
 use crate::thermal;
@@ -61,9 +61,13 @@ pub fn calibrate(
     if simulated && design.fit.order == FitOrder::ByRecord {
         fit.reason = by_record(&fit);
     }
-    warnings.extend(fit.warnings.iter().cloned());
     let mut chosen = formats::fill(design, &fit, record)?;
     let rounded = coefficients::round(design, &fit)?;
+    let mut beyond = fit.warnings.iter_mut();
+    if let Some(warning) = beyond.find(|w| w.code == "extrapolation") {
+        warning.message += beyond_the_range(design.compensation.as_ref());
+    }
+    warnings.extend(fit.warnings.iter().cloned());
     // A fit of another order than the file's has other products.
     crate::design::limits::check(design).map_err(|excess| {
         let message = format!(
@@ -83,6 +87,23 @@ pub fn calibrate(
         kept,
         warnings,
     })
+}
+
+/// What the firmware does where nothing was measured, and what to do about it.
+fn beyond_the_range(compensation: Option<&Compensation>) -> &'static str {
+    let limited = compensation.filter(|c| c.clamp_raw.is_some());
+    match limited.map(|c| c.outside) {
+        Some(Outside::Clamp | Outside::Flag) => {
+            ". The firmware holds the bias of the nearer end there. If the gyro is to work there, record there"
+        }
+        Some(Outside::HoldSlope) => {
+            ". The firmware goes on with the slope of the nearer end there (`compensation.outside`). If the gyro is to work \
+             there, record there"
+        }
+        None => {
+            ". The firmware evaluates it there. Record there, or keep the gyro within the range"
+        }
+    }
 }
 
 /// The order of a simulated run where the design leaves it to the record (convention: that of the paper).
@@ -109,4 +130,41 @@ fn gives_up_held_phase(design: &mut Design) -> bool {
         design.compensation_is_own = false;
     }
     held
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::design::reader;
+    use crate::thermal::synthetic::{Random, record, triangle};
+
+    /// Twelve rows cannot carry order 5: the warning says what the firmware does beyond them, which the design decides.
+    #[test]
+    fn beyond_the_range_the_warning_says_what_the_firmware_does() {
+        let degc = triangle(12);
+        let mut random = Random::new(6);
+        let rates = degc
+            .iter()
+            .map(|t| 0.02 * t - 0.0003 * t * t + 0.3 * random.normal());
+        let record = record("die_degc", &degc, &rates.collect::<Vec<_>>());
+        let mut design = reader::read(None).expect("the default");
+        design.fit.order = FitOrder::Fixed(5);
+        let calibration = calibrate(&mut design, &record, false).expect("a calibration");
+        let mut warnings = calibration.warnings.iter();
+        let warning = warnings.find(|w| w.code == "extrapolation");
+        let message = &warning.expect("a warning").message;
+        assert!(
+            message.starts_with("nothing was measured beyond 0 .. 63.636 degC, "),
+            "{message}"
+        );
+        assert!(
+            message.contains("holds the bias of the nearer end there"),
+            "{message}"
+        );
+        let mut c = design.compensation.expect("a compensation");
+        c.outside = Outside::HoldSlope;
+        assert!(beyond_the_range(Some(&c)).contains("goes on with the slope"));
+        c.clamp_raw = None;
+        assert!(beyond_the_range(Some(&c)).contains("evaluates it there"));
+    }
 }

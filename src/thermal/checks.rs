@@ -10,7 +10,7 @@ use crate::record::Warning;
 use crate::statistics::folds::Sample;
 use crate::statistics::stats;
 use crate::statistics::weights::BINS;
-use crate::text::number;
+use crate::text::{constant, number};
 
 /// A Celsius thermometer that moved by less than this, K, cannot carry a temperature law.
 pub const LEAST_SPAN_K: f64 = 5.0;
@@ -237,14 +237,14 @@ fn extrapolation(c: &Checked<'_>) -> Option<Warning> {
             "extrapolation",
             &fit.thermometer,
             format!(
-                "at {} {}, a tenth of the range beyond what was measured, the polynomial of order {} has moved by {} deg/s, \
-                 known to {} deg/s (one standard deviation). It says nothing of the gyro there, and the firmware does not \
-                 evaluate it there",
-                g(t),
-                fit.unit,
-                fit.order,
+                "nothing was measured beyond {} .. {} {unit}, and the polynomial cannot stand in for it: at {} {unit} it is {} deg/s from \
+                 where it ends, with a standard deviation of {} deg/s",
+                constant(low, 5),
+                constant(high, 5),
+                constant(t, 5),
                 g(change),
-                g(std)
+                g(std),
+                unit = fit.unit
             ),
         )
     })
