@@ -3,12 +3,16 @@
 use super::machine::{Lowered, Type};
 use crate::numeric::arithmetic::Port;
 use crate::numeric::trace::ir::{Function, Interval};
-use crate::text::constant;
+use crate::text::{constant, number};
+
+/// Digits of a range's end, and most of one that would look rounder than it is (a double has no more).
+const DIGITS: usize = 7;
+const MOST_DIGITS: usize = 16;
 
 /// A port's name, its range in words and, where its scale is known, in its quantity, and what it means.
 pub(super) fn described(port: &Port, range: Interval) -> String {
     let quantity = port.scale.as_ref().map(|s| {
-        let at = |raw: i128| constant(s.offset + s.factor * raw as f64, 7);
+        let at = |raw: i128| told(s.offset + s.factor * raw as f64, s.factor.abs());
         let range = format!("{} .. {} {}", at(range.low), at(range.high), s.unit);
         format!(" ({})", range.trim_end())
     });
@@ -20,6 +24,21 @@ pub(super) fn described(port: &Port, range: Interval) -> String {
         quantity.unwrap_or_default(),
         meaning(port)
     )
+}
+
+/// A word's value to seven digits; to more where those would pass for another word's round value (2047.9998, a step of
+/// 2^-12 below 2048).
+fn told(value: f64, step: f64) -> String {
+    let text = constant(value, DIGITS);
+    let is_this = |text: &String| {
+        text.parse::<f64>()
+            .is_ok_and(|v| (v - value).abs() < step / 2.0)
+    };
+    if text == number(value, DIGITS) || is_this(&text) {
+        return text;
+    }
+    let mut longer = (DIGITS + 1..=MOST_DIGITS).map(|digits| constant(value, digits));
+    longer.find(is_this).unwrap_or(text)
 }
 
 /// What a port's words are, the value of a step apart from the word's own format.
@@ -76,6 +95,17 @@ pub(super) fn guarantee(function: &str) -> Option<&'static str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The greatest word of Q12.12 is not 2048.
+    #[test]
+    fn an_end_of_a_range_is_not_rounded_to_the_next_word() {
+        let step = 2f64.powi(-12);
+        assert_eq!(told(-8388608.0 * step, step), "-2048");
+        assert_eq!(told(8388607.0 * step, step), "2047.9998");
+        assert_eq!(told(2047.9375, step), "2047.938");
+        assert_eq!(told(1.0 - 2f64.powi(-31), 2f64.powi(-31)), "0.9999999995");
+        assert_eq!(told(std::f64::consts::PI, 1e-9), "3.141593");
+    }
 
     #[test]
     fn a_port_says_its_range_in_words_and_in_its_quantity() {
