@@ -148,7 +148,7 @@ pub struct Evidence {
     /// Chance that the best of all candidates does as well as this one, before any step; `None`
     /// where it was not scored.
     pub p_value: Option<f64>,
-    /// Gain in log-likelihood, before any step.
+    /// Gain in log-likelihood, before any step; below 0 where it makes the record less likely.
     pub gain: Option<f64>,
     /// Why, or what to do, in a sentence.
     pub remark: String,

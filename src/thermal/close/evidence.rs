@@ -90,13 +90,7 @@ impl Told<'_> {
             );
             return (Fate::Confounded, remark);
         }
-        let remark = match (j.p_value <= LEVEL, steps.is_empty()) {
-            (false, _) => "chance does as well among so many candidates",
-            (true, false) => "seen alone it helps, but what was taken explains more",
-            (true, true) => {
-                "beyond chance, but it does not hold over the whole record, or a shape without a name explains more"
-            }
-        };
+        let remark = rejected(j.p_value, j.gain, steps.is_empty());
         (Fate::Rejected, remark.to_owned())
     }
 
@@ -117,6 +111,20 @@ impl Told<'_> {
     }
 }
 
+/// Why a candidate of this chance and gain in log-likelihood was not taken; `alone` if none was.
+fn rejected(p_value: f64, gain: f64, alone: bool) -> &'static str {
+    match (p_value <= LEVEL, gain > 0.0, alone) {
+        (false, ..) => "chance does as well among so many candidates",
+        (true, false, _) => {
+            "beyond chance at a first look, but as fitted it makes the record less likely"
+        }
+        (true, true, false) => "seen alone it helps, but what was taken explains more",
+        (true, true, true) => {
+            "beyond chance, but it does not hold over the whole record, or a shape without a name explains more"
+        }
+    }
+}
+
 /// Of an effect without a score.
 fn unjudged(candidate: &Arc<dyn Candidate>, fate: Fate, remark: String) -> Evidence {
     Evidence {
@@ -125,5 +133,21 @@ fn unjudged(candidate: &Arc<dyn Candidate>, fate: Fate, remark: String) -> Evide
         p_value: None,
         gain: None,
         remark,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What has a gain below 0 is not said to help.
+    #[test]
+    fn the_remark_does_not_contradict_the_gain() {
+        for alone in [false, true] {
+            assert!(rejected(5e-4, -6.6, alone).contains("less likely"));
+            assert!(rejected(0.97, 3.6, alone).starts_with("chance does as well"));
+            assert!(!rejected(2e-9, 3.5, alone).contains("less likely"));
+        }
+        assert!(rejected(2e-9, 3.5, false).contains("it helps"));
     }
 }
