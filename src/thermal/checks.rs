@@ -238,7 +238,7 @@ fn extrapolation(c: &Checked<'_>) -> Option<Warning> {
             &fit.thermometer,
             format!(
                 "nothing was measured beyond {} .. {} {unit}, and the polynomial cannot stand in for it: at {} {unit} it is {} deg/s from \
-                 where it ends, with a standard deviation of {} deg/s",
+                 its value at the nearer end, with a standard deviation of {} deg/s",
                 constant(low, 5),
                 constant(high, 5),
                 constant(t, 5),
