@@ -40,10 +40,11 @@ use std::process::ExitCode;
 /// From a MEMS gyro's thermal drift to trusted fixed-point firmware.
 #[derive(Debug, Parser)]
 #[command(name = "gyrogen", version, about, long_about = None, max_term_width = 100)]
+#[command(after_help = "Exit status: 0 done, 1 a check failed, 2 an error.")]
 struct Cli {
     #[command(subcommand)]
     command: Command,
-    /// Print errors only; files are written, and exit statuses are what they are.
+    /// Print errors only. Files and exit statuses do not change.
     #[arg(long, short, global = true, conflicts_with = "verbose")]
     quiet: bool,
     /// Print each stage of the work and what it took.
