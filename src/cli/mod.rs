@@ -186,7 +186,7 @@ fn with_advice(mut error: clap::Error) -> clap::Error {
                 Some(ContextValue::Strings(missing)) => missing.join(" "),
                 _ => String::new(),
             };
-            with_tip(error, of_missing(&missing))
+            with_tip(error, &of_missing(&missing))
         }
         _ => error,
     }
@@ -222,21 +222,50 @@ fn of_conflict(one: &str, other: &str) -> &'static str {
 }
 
 /// What to do about options that are missing.
-fn of_missing(missing: &str) -> &'static str {
-    if missing.contains("--self-test") {
-        return "an option was given that is one of the self-test's: add `--self-test`, or leave that option out";
+fn of_missing(missing: &str) -> String {
+    const SAID: [(&str, &str); 4] = [
+        (
+            "--self-test",
+            "an option was given that is one of the self-test's: add `--self-test`, or leave that option out",
+        ),
+        (
+            "--profile",
+            "`--readings` is how many readings are taken of a profile: add `--profile`, or leave `--readings` out",
+        ),
+        (
+            "--capture",
+            "give the captured ADC codes with `--capture FILE` and the file for the rows with `--out FILE`, for example `--capture \
+             capture.csv --out rows.csv`; the one file without an option is the design (TOML), which may be left out",
+        ),
+        (
+            "--record",
+            "give the measured record with `--record FILE`; `close` takes a capture of ADC codes with `--capture FILE` in its place",
+        ),
+    ];
+    const EXAMPLES: [(&str, &str); 8] = [
+        ("--function", "--function 'sin(x)'"),
+        ("--domain", "--domain=0,1"),
+        ("--input", "--input Q1.15"),
+        ("--output", "--output Q1.15"),
+        ("--out", "--out rows.csv"),
+        ("--lang", "--lang c"),
+        ("<BUNDLE>", "gyrogen verify out/firmware/c"),
+        ("<SHELL>", "gyrogen completions bash"),
+    ];
+    let words: Vec<&str> = missing.split_whitespace().collect();
+    if let Some((_, said)) = SAID.iter().find(|(name, _)| words.contains(name)) {
+        return (*said).to_owned();
     }
-    if missing.contains("--profile") {
-        return "`--readings` is how many readings are taken of a profile: add `--profile`, or leave `--readings` out";
+    if words.contains(&"<NAME>") {
+        let names = crate::schemas::NAMES.map(|(name, _)| name);
+        return format!("give one of {}", names.join(", "));
     }
-    if missing.contains("--capture") {
-        return "give the captured ADC codes with `--capture FILE` and the file for the rows with `--out FILE`; the one file without an \
-                option is the design (TOML), which may be left out";
+    let of_these = EXAMPLES.iter().filter(|(name, _)| words.contains(name));
+    let examples: Vec<&str> = of_these.map(|(_, example)| *example).collect();
+    match examples.is_empty() {
+        true => "add it; `--help` behind the command says what it is".to_owned(),
+        false => format!("for example `{}`", examples.join(" ")),
     }
-    if missing.contains("--record") {
-        return "give the measured record with `--record FILE`; `close` takes a capture of ADC codes with `--capture FILE` in its place";
-    }
-    "add it; `--help` behind the command says what it is"
 }
 
 /// Runs a subcommand; `recorded` is what its files say of how they were made.
@@ -262,5 +291,32 @@ fn run(command: &Command, recorded: &Recorded) -> Result<()> {
         Command::Simulate(arguments) => simulate::run(arguments, recorded),
         Command::Study(arguments) => study::run(arguments, recorded),
         Command::Verify(arguments) => verify::run(arguments, recorded),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_help_of_the_program_has_its_exit_statuses() {
+        let said = "Exit status: 0 done, 1 a check failed, 2 an error.";
+        let help = parser().render_long_help().to_string();
+        assert!(help.trim_end().ends_with(said), "{help}");
+    }
+
+    #[test]
+    fn every_argument_that_is_required_by_itself_has_an_example() {
+        for command in parser().get_subcommands() {
+            for arg in command.get_arguments().filter(|a| a.is_required_set()) {
+                let tip = of_missing(&arg.to_string());
+                assert!(!tip.starts_with("add it"), "{command}: {arg}: {tip}");
+            }
+        }
+        assert_eq!(
+            of_missing("--domain <A,B> --output <FORMAT>"),
+            "for example `--domain=0,1 --output Q1.15`"
+        );
+        assert!(of_missing("<NAME>").starts_with("give one of design, "));
     }
 }

@@ -9,10 +9,14 @@ pub(super) fn with_advice(mut error: clap::Error) -> clap::Error {
         Some(ContextValue::String(argument)) => argument.clone(),
         _ => return error,
     };
-    let parser = super::Cli::command();
-    let name = given_command();
-    let command = name.and_then(|name| parser.find_subcommand(name));
+    let mut parser = super::Cli::command();
+    parser.build();
+    let mut command = given_command().and_then(|name| parser.find_subcommand_mut(name));
     error.remove(ContextKind::Suggested);
+    if let Some(usage) = command.as_mut().map(|command| command.render_usage()) {
+        // The parser's own shows what it believes that the misspelt option stands for as required.
+        error.insert(ContextKind::Usage, ContextValue::StyledStr(usage));
+    }
     match command.map_or(String::new(), |command| advice(command, &argument)) {
         // A similar option, if there is one, is named beside this.
         none if none.is_empty() => error,

@@ -367,7 +367,16 @@ fn arguments_that_are_nearly_right_are_shown_right() {
             "once with `--lang c` and once with `--lang rust`",
         ),
         (vec!["check", "-q", "-v"], "leave one of the two out"),
-        (vec!["emit"], "add it; `--help`"),
+        (vec!["emit"], "tip: for example `--lang c`"),
+        (vec!["schema"], "tip: give one of design, "),
+        (
+            vec!["approx"],
+            "tip: for example `--function 'sin(x)' --domain=0,1 --input Q1.15 --output Q1.15`",
+        ),
+        (
+            vec!["run", "--recrod", "r.csv"],
+            "Usage: gyrogen run [OPTIONS] [DESIGN]\n",
+        ),
         (
             vec!["close", "--record", "r.csv", "--lang", "c"],
             "always write both C and Rust",
