@@ -94,7 +94,7 @@ values!(crate::design::target::Target {
     CortexM4 = "cortex-m4", "ARMv7E-M: single-cycle 32 x 32 to 64 bit multiplier";
     CortexM0 = "cortex-m0", "ARMv6-M: 32-cycle 32 x 32 to 32 bit multiplier and none for the upper half";
     CortexM0Fast = "cortex-m0-fast", "The same with the single-cycle multiplier";
-    Rv32imc = "rv32imc" | "riscv32", "32-bit RISC-V with multiplication, as Ibex executes it";
+    Rv32imc = "rv32imc" | "riscv32", "32-bit RISC-V with multiplication, as Ibex executes it; `riscv32` is the same";
     Dsp16 = "dsp16", "A 16-bit signal processor";
 });
 
@@ -113,7 +113,7 @@ values!(crate::tabulate::job::Weight {
 values!(crate::verify::target::Target {
     Host = "host", "This machine";
     CortexM4 = "cortex-m4", "ARM Cortex-M4, Thumb-2, under emulation; C bundles only";
-    Riscv32 = "riscv32", "32-bit RISC-V (RV32IMAC), under emulation; C bundles only";
+    Riscv32 = "riscv32" | "rv32imc", "32-bit RISC-V (RV32IMAC), under emulation; C bundles only; `rv32imc` is the same";
 });
 
 values!(crate::approx::form::polynomial::Monomials {
@@ -136,6 +136,16 @@ values!(crate::approx::form::table::Kind {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn both_names_of_the_risc_v_target_are_taken_everywhere() {
+        for name in ["rv32imc", "riscv32"] {
+            let priced = <crate::design::target::Target as ValueEnum>::from_str(name, false);
+            assert_eq!(priced, Ok(crate::design::target::Target::Rv32imc));
+            let run_on = <crate::verify::target::Target as ValueEnum>::from_str(name, false);
+            assert_eq!(run_on, Ok(crate::verify::target::Target::Riscv32));
+        }
+    }
 
     #[test]
     fn counts_in_another_spelling_are_given_in_digits() {

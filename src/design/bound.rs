@@ -27,9 +27,7 @@ pub(super) fn bound(t: &Table) -> Result<Option<BiasBound>> {
         Some(value) => value.choice(&[("polynomial", false), ("auto", true)])?,
         None => false,
     };
-    let mut targets = Target::ALL.map(|t| (t.name(), t)).to_vec();
-    // As version 0.1 wrote it.
-    targets.push(("riscv32", Target::Rv32imc));
+    let targets: Vec<(&str, Target)> = Target::named().collect();
     let target = t.take("target", Some(Target::default()), |v| v.choice(&targets))?;
     let Some(value) = t.get("bound_dps") else {
         let alone = ["form", "target"].iter().find_map(|key| t.get(key));

@@ -317,3 +317,19 @@ fn a_bracket_that_stays_open_is_named_with_its_line() {
         assert!(e.contains(says), "{e}");
     }
 }
+
+#[test]
+fn a_study_and_a_bound_take_every_target_by_every_name_that_the_file_lists() {
+    use crate::design::target::Target;
+    for (name, target) in Target::named() {
+        let listed = DEFAULT.matches(&format!("\"{name}\"")).count();
+        assert!(listed >= 2, "{name}");
+        let study = format!("[study]\ntargets = [\"{name}\"]\n");
+        let study = parse(&study, None).expect("a design").study;
+        assert_eq!(study.targets, [target.name()]);
+        let bound = format!("[compensation]\nbound_dps = 0.01\ntarget = \"{name}\"\n");
+        let bound = parse(&bound, None).expect("a design").bound;
+        assert_eq!(bound.map(|b| b.target), Some(target));
+    }
+    refused("[study]\ntargets = [¦\"cortex-m7\"]\n");
+}

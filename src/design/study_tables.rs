@@ -1,6 +1,7 @@
 //! `[study]` and `[requirements]`: which words a word-length study varies, and what the figures may be.
 
 use super::table::{Real, Table, Value};
+use super::target::Target;
 use super::word::Word;
 use crate::error::{InputError, Result};
 use std::collections::BTreeMap;
@@ -31,9 +32,6 @@ impl Default for StudyOptions {
         }
     }
 }
-
-/// The names that `targets` takes.
-pub(super) const TARGETS: &[&str] = &["cortex-m4", "cortex-m0", "rv32imc", "dsp16", "host", "fpga"];
 
 /// A figure that can be required.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -274,7 +272,8 @@ pub(super) fn study(t: &Table) -> Result<StudyOptions> {
     }
     let targets = match t.get("targets") {
         Some(value) => {
-            let options: Vec<(&str, &str)> = TARGETS.iter().map(|t| (*t, *t)).collect();
+            let named = Target::named().map(|(name, t)| (name, t.name()));
+            let options: Vec<(&str, &str)> = named.chain([("fpga", "fpga")]).collect();
             let mut targets = Vec::new();
             for name in value.array("[\"cortex-m4\", \"fpga\"]")? {
                 let target = name.choice(&options)?.to_owned();

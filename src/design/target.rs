@@ -46,9 +46,14 @@ impl Target {
         }
     }
 
-    /// The target of that name; `riscv32` is another one for `rv32imc`.
+    /// Every name that is taken with its target: that of [`Target::name`], and `riscv32` for `rv32imc`.
+    pub fn named() -> impl Iterator<Item = (&'static str, Target)> {
+        let named = Target::ALL.into_iter().map(|t| (t.name(), t));
+        named.chain([("riscv32", Target::Rv32imc)])
+    }
+
+    /// The target of that name.
     pub fn of_name(name: &str) -> Option<Target> {
-        let same = |t: &Target| t.name() == name || (*t == Target::Rv32imc && name == "riscv32");
-        Target::ALL.into_iter().find(same)
+        Target::named().find(|(n, _)| *n == name).map(|(_, t)| t)
     }
 }
