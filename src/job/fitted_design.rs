@@ -10,6 +10,14 @@ use std::fmt::Write as _;
 /// Stands above a compensation that was fitted.
 const FITTED: &str = "# Fitted; the calibrated range is clamp_raw.";
 
+/// Stands above a correction that was found.
+const CORRECTED: &str = "\
+# The correction of averaged readings that `close` found, in real numbers; `emit` chooses the words.
+# Each term is subtracted from the rate, deg/s. An input is (column - offset) / scale, held within
+# -1 to 1; terms name it by its position, from 0.
+# kept = \"yes\": the lag goes on through a restart, as the gyro's temperature does; \"no\": it begins
+# anew at power-on. once = \"yes\": a step that has come on stays on.";
+
 /// The text of the user's design (or of the default) with its `[compensation]` replaced by the one
 /// that was fitted.
 pub fn text(design: &Design) -> String {
@@ -29,11 +37,8 @@ pub fn text(design: &Design) -> String {
 /// The text of the user's design (or of the default) with a correction: the augmented model as a design file.
 pub fn with_correction(design: &Design, planned: &Planned) -> String {
     let text = without(&design.source.text, "correction");
-    format!(
-        "{}\n\n# What a closure found, as firmware carries it.\n{}",
-        text.trim_end(),
-        planned.to_toml()
-    )
+    let text = text.trim_end().trim_end_matches(CORRECTED).trim_end();
+    format!("{text}\n\n{CORRECTED}\n{}", planned.to_toml())
 }
 
 /// Cuts a table, and its subtables, out of a design's text.
@@ -152,6 +157,25 @@ mod tests {
             let back = reader::parse(&text(&design), None).expect("a design");
             assert_eq!(back.compensation, design.compensation);
             assert_eq!(back.circuit, design.circuit);
+        }
+    }
+
+    #[test]
+    fn a_correction_is_explained_once_however_often_it_is_replaced() {
+        let toml = "[correction]\nperiod_s = 1.0\nfull_scale_dps = 250.0\nnoise_dps = 0.01\n\
+                    inputs = [{ column = \"die_degc\", offset = 25.0, scale = 60.0 }]\n\
+                    terms = [{ kind = \"lag\", gain_dps = 1.0, input = 0, tau_s = 30.0, kept = \"no\" }]\n";
+        let mut design = reader::parse(toml, None).expect("a design");
+        let planned = design.correction.clone().expect("a correction");
+        for _ in 0..2 {
+            let text = with_correction(&design, &planned);
+            assert_eq!(
+                text.matches("the lag goes on through a restart").count(),
+                1,
+                "{text}"
+            );
+            design = reader::parse(&text, None).expect("a design");
+            assert_eq!(design.correction.as_ref(), Some(&planned));
         }
     }
 
