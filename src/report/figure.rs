@@ -2,7 +2,7 @@
 //! figures in numbers for those who cannot see it.
 
 use super::marks::{Shape, Swatch, path};
-use super::text::{escape, significant};
+use super::text::{escape, grouped_decimal, minus, significant};
 use std::fmt::Write as _;
 
 /// Width of a figure that fills a wide page, px.
@@ -147,30 +147,35 @@ impl Figure {
         self.series.iter().any(|s| !s.points.is_empty())
     }
 
-    /// In numbers: axes, series, how many, abscissae from and to, ordinates from and to.
+    /// In numbers: axes, series, how many points, abscissae from and to, ordinates from and to. Series that these do not
+    /// tell apart are one row, and so are those that only the sign of the ordinates does.
     pub fn numbers(&self) -> Vec<[String; 5]> {
-        let shown = self.series.iter().filter(|s| !s.points.is_empty());
-        shown
-            .map(|s| {
-                let span = |low: &dyn Fn(&[f64; 3]) -> f64, high: &dyn Fn(&[f64; 3]) -> f64| {
-                    let least = s.points.iter().map(low).fold(f64::INFINITY, f64::min);
-                    let greatest = s.points.iter().map(high).fold(f64::NEG_INFINITY, f64::max);
-                    format!("{} to {}", significant(least, 4), significant(greatest, 4))
-                };
-                let upper = |p: &[f64; 3]| if s.third == "upper" { p[2] } else { p[1] };
-                let count = match s.third {
+        let mut rows: Vec<Row> = Vec::new();
+        for s in self.series.iter().filter(|s| !s.points.is_empty()) {
+            let span = |low: &dyn Fn(&[f64; 3]) -> f64, high: &dyn Fn(&[f64; 3]) -> f64| {
+                let least = s.points.iter().map(low).fold(f64::INFINITY, f64::min);
+                let greatest = s.points.iter().map(high).fold(f64::NEG_INFINITY, f64::max);
+                [least, greatest]
+            };
+            let upper = |p: &[f64; 3]| if s.third == "upper" { p[2] } else { p[1] };
+            let row = Row {
+                axes: s.axes.clone(),
+                name: self.name_of(s),
+                count: match s.third {
                     "count" => s.points.iter().map(|p| p[2]).sum::<f64>() as usize,
                     _ => s.points.len(),
-                };
-                [
-                    s.axes.clone(),
-                    self.name_of(s),
-                    count.to_string(),
-                    span(&|p| p[0], &|p| p[0]),
-                    span(&|p| p[1], &upper),
-                ]
-            })
-            .collect()
+                },
+                x: span(&|p| p[0], &|p| p[0]),
+                y: span(&|p| p[1], &upper),
+                has_mirrored: false,
+            };
+            let of_this = |r: &&mut Row| row.is_shown_by(r);
+            match rows.iter_mut().find(of_this) {
+                Some(shown) => shown.has_mirrored |= shown.y != row.y,
+                None => rows.push(row),
+            }
+        }
+        rows.iter().map(Row::text).collect()
     }
 
     /// What the legend calls a series; its class where the legend does not.
@@ -184,6 +189,51 @@ impl Figure {
         exact
             .or_else(|| named.next())
             .map_or_else(|| series.class.clone(), |e| e.2.clone())
+    }
+}
+
+/// A row of a figure's numbers.
+struct Row {
+    axes: String,
+    name: String,
+    /// Points.
+    count: usize,
+    /// Least and greatest abscissa, in the axis's unit.
+    x: [f64; 2],
+    /// Least and greatest ordinate, in the axis's unit.
+    y: [f64; 2],
+    /// Whether a series is the same but for the ordinates' sign.
+    has_mirrored: bool,
+}
+
+impl Row {
+    fn is_shown_by(&self, shown: &Row) -> bool {
+        let [low, high] = self.y;
+        (&self.axes, &self.name, self.count, self.x)
+            == (&shown.axes, &shown.name, shown.count, shown.x)
+            && (shown.y == self.y || shown.y == [-high, -low])
+    }
+
+    fn text(&self) -> [String; 5] {
+        let sign = if self.has_mirrored { "±" } else { "" };
+        let count = self.count.to_string();
+        let (x, y) = (range("", self.x), range(sign, self.y));
+        [self.axes.clone(), self.name.clone(), count, x, y]
+    }
+}
+
+/// A range; one number where its ends are the same. `sign` is `±` where it stands for two.
+fn range(sign: &str, [least, greatest]: [f64; 2]) -> String {
+    // Above this every float is a whole number.
+    const EXACT: f64 = 1e15;
+    let of = |v: f64| match v.fract() == 0.0 && v.abs() < EXACT {
+        true => minus(&grouped_decimal(&format!("{:.0}", v + 0.0))),
+        false => significant(v, 4),
+    };
+    match (sign, least == greatest) {
+        (_, true) => format!("{sign}{}", of(least)),
+        ("", false) => format!("{} to {}", of(least), of(greatest)),
+        _ => format!("{sign}({} to {})", of(least), of(greatest)),
     }
 }
 
@@ -285,8 +335,34 @@ mod tests {
     #[test]
     fn numbers_stand_for_the_drawing_and_the_legend_is_escaped() {
         let numbers = figure().numbers();
-        assert_eq!(numbers[0][2..4], ["2", "1.000 to 2.000"]);
+        assert_eq!(numbers[0][2..4], ["2", "1 to 2"]);
         assert!(figure().html().contains("=with &lt;steps&gt;"));
+    }
+
+    #[test]
+    fn whole_numbers_are_exact_and_series_that_are_alike_are_one_row() {
+        let mut drawn = figure();
+        let one = |points: Vec<[f64; 3]>| Series {
+            points,
+            ..drawn.series[0].clone()
+        };
+        let nan = f64::NAN;
+        drawn.series = vec![
+            one(vec![[-32768.0, 32767.0, nan]]),
+            one(vec![[-32768.0, 32767.0, nan]]),
+            one(vec![[0.0, 0.25, nan], [4294967295.0, 0.5, nan]]),
+            one(vec![[0.0, -0.5, nan], [4294967295.0, -0.25, nan]]),
+        ];
+        let numbers = drawn.numbers();
+        let ranges: Vec<&[String]> = numbers.iter().map(|n| &n[2..]).collect();
+        let narrow = |text: &str| text.replace(' ', "\u{202f}");
+        let words = [narrow("4 294 967 295"), narrow("−32 768"), narrow("32 767")];
+        assert_eq!(ranges.len(), 2, "{numbers:?}");
+        assert_eq!(ranges[0], ["1", &words[1], &words[2]]);
+        assert_eq!(
+            ranges[1],
+            ["2", &format!("0 to {}", words[0]), "±(0.2500 to 0.5000)"]
+        );
     }
 
     #[test]

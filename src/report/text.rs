@@ -97,7 +97,7 @@ pub fn grouped(value: u64) -> String {
 }
 
 /// The digits before the point in groups of three.
-fn grouped_decimal(text: &str) -> String {
+pub fn grouped_decimal(text: &str) -> String {
     let (sign, text) = text.strip_prefix('-').map_or(("", text), |t| ("-", t));
     let (whole, rest) = text.split_at(text.find('.').unwrap_or(text.len()));
     let whole: Result<u64, _> = whole.parse();
