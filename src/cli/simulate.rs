@@ -291,7 +291,7 @@ pub(super) fn show_loops(found: &[Hunting]) {
         "reduced model",
         "error pp, LSB: circuit",
         "reduced model",
-        "at most",
+        "limit",
         "mean error, LSB",
     ]);
     for h in found {

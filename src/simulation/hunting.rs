@@ -77,8 +77,8 @@ pub fn caption() -> String {
         "The loops run without noise at the first, the middle and the last temperature on the way up of [thermal_run]. pp: the largest \
          less the smallest value in {ROWS} rows. An output is in the unit beside the loop's name. An error is the setpoint's \
          difference from the magnitude or the phase, in LSB of that word. Circuit: the bit-accurate loop with ADC and NCO. Reduced model: the same \
-         loop without these two, so that its error may be the smaller one. At most: the reduced model's error with all that ADC and NCO \
-         may add, which the circuit's error has to keep to. By theory the loops have no dead band: they correct every error, \
+         loop without these two, so that its error may be the smaller one. Limit: the reduced model's error plus the most that ADC and NCO \
+         can add; the circuit's error must stay below it. By theory the loops have no dead band: they correct every error, \
          however small, and the mean error goes to 0."
     )
 }
