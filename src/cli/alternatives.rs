@@ -12,12 +12,13 @@ pub(super) struct Line<'a> {
     pub chosen: bool,
 }
 
-/// What the marks mean.
-pub(super) fn marks() -> String {
-    format!(
-        "chosen: the least of cycles + ROM bytes / {BYTES_A_CYCLE}. not beaten: no other form is as good or better in ROM, multiplies, \
-         adds and error at once."
-    )
+/// What the marks of a table mean, given undominated and chosen of each of its lines.
+pub(super) fn marks(lines: impl IntoIterator<Item = (bool, bool)>) -> String {
+    let mut said = format!("chosen: the least of cycles + ROM bytes / {BYTES_A_CYCLE}.");
+    if lines.into_iter().any(|marked| marked == (true, false)) {
+        said += " not beaten: no other form is as good or better in ROM, multiplies, adds and error at once.";
+    }
+    said
 }
 
 /// The table; `errors` are the titles of the errors' columns.
@@ -51,4 +52,16 @@ pub(super) fn table<'a>(errors: &[&str], lines: impl Iterator<Item = Line<'a>>) 
     }
     super::terminal::numbers(&mut table, 1..1 + 4 + errors.len());
     table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_marks_that_stand_in_the_table_are_explained() {
+        let chosen = marks([(true, true), (false, false)]);
+        assert!(chosen.starts_with("chosen: ") && !chosen.contains("not beaten"));
+        assert!(marks([(true, true), (true, false)]).contains(" not beaten: no other"));
+    }
 }

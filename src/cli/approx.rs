@@ -212,7 +212,8 @@ fn print(o: &Outcome, out: &std::path::Path) {
     if let Some(listed) = &o.alternatives {
         let table = alternatives::table(&["certified error"], listed.iter().map(alternative));
         super::terminal::show(&table);
-        say!("{}", alternatives::marks());
+        let marked = listed.iter().map(|a| (a.undominated, a.chosen));
+        say!("{}", alternatives::marks(marked));
         say!(
             "Certified errors in this table are bounds that are proved quickly. That of the chosen form is proved again below, from more \
              input codes, and may be smaller."
@@ -345,16 +346,56 @@ fn taken(search: &Search) -> String {
     let gain = search
         .gain_over_nearest_plane_percent
         .filter(|g| *g >= 0.005);
-    let gain = gain.map_or(String::new(), |g| {
-        format!(
-            ". That is {} % less than with the nearest plane's",
-            number(g, 2)
-        )
-    });
+    let gain = gain.map(|g| format!("{} % less than with lattice rounding", number(g, 2)));
     let best = match search.compared.last() {
-        Some(c) if c.proved => ". It is proved that no others in these formats have less",
-        _ if search.proved_best => ". It is proved that none have less than the least error found",
-        _ => "",
+        Some(c) if c.proved => Some("proved to be the least for these formats"),
+        _ if search.proved_best => {
+            Some("the least error found is proved to be the least for these formats")
+        }
+        _ => None,
     };
-    format!("choice of coefficients (row \"taken\"): {why}{gain}{best}.")
+    let said: Vec<String> = gain.into_iter().chain(best.map(str::to_owned)).collect();
+    let error = match said.is_empty() {
+        true => String::new(),
+        false => format!(" Their error: {}.", said.join("; ")),
+    };
+    format!("choice of coefficients (row \"taken\"): {why}.{error}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tabulate::outcome::Compared;
+
+    #[test]
+    fn what_the_choice_gains_and_what_is_proved_of_it_is_said_in_one_sentence() {
+        let mut search = Search {
+            minimax_error: 1e-4,
+            reason: Reason::LeastTotal,
+            rounding_part: 0.5,
+            least_total: 2e-4,
+            proved_best: true,
+            coefficients_proved_best: true,
+            gain_over_nearest_plane_percent: Some(10.0),
+            evaluations: 1,
+            compared: vec![Compared {
+                name: "taken",
+                raw: vec![1],
+                ideal_max_abs: 1e-4,
+                total_max_abs: Some(2e-4),
+                proved: true,
+            }],
+        };
+        let said = taken(&search);
+        assert!(
+            said.ends_with(
+                " % less than with lattice rounding; proved to be the least for these formats."
+            ),
+            "{said}"
+        );
+        search.gain_over_nearest_plane_percent = None;
+        (search.proved_best, search.compared[0].proved) = (false, false);
+        let said = taken(&search);
+        assert!(!said.contains("Their error"), "{said}");
+    }
 }

@@ -232,7 +232,8 @@ fn print(outcome: &Outcome, out: &Path) {
             kept.target.name(),
             alternatives::table(&errors, kept.alternatives.iter().map(alternative))
         );
-        say!("{}", alternatives::marks());
+        let marked = kept.alternatives.iter().map(|a| (a.undominated, a.chosen));
+        say!("{}", alternatives::marks(marked));
     }
     say!(
         "calibrated for {} .. {} {}",

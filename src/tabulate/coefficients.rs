@@ -240,7 +240,7 @@ fn shown(judged: &Judged) -> Compared {
     Compared {
         name: match judged.name {
             "rounded" => "rounded minimax",
-            "babai" => "nearest plane of the lattice (as fpminimax)",
+            "babai" => "lattice rounding (as fpminimax)",
             "ideal" => BEST_NAME,
             other => other,
         },

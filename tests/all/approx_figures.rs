@@ -176,11 +176,11 @@ fn the_whole_evaluation_is_below_the_nearest_planes_or_nothing_is() {
                 .find(|c| c["name"].as_str().unwrap().starts_with(name));
             one.unwrap()["total_max_abs"].as_f64().unwrap()
         };
-        let (plane, ours) = (total("nearest plane"), total("taken"));
+        let (plane, ours) = (total("lattice rounding"), total("taken"));
         let proved = is_proved(&json, "/search/proved_best");
         let gain = number(&json, "/search/gain_over_nearest_plane_percent");
         println!(
-            "{} {} {}: nearest plane {plane:.5e}, ours {ours:.5e} ({gain:.2} % less), proved {proved}",
+            "{} {} {}: lattice rounding {plane:.5e}, ours {ours:.5e} ({gain:.2} % less), proved {proved}",
             case.function, case.degree, case.monomials
         );
         let least = number(&json, "/search/least_total");
