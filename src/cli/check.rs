@@ -77,9 +77,6 @@ fn print(check: &Check) {
         "needs, bits",
         "spare, bits",
         "overflow",
-        "own rounding, LSB rms",
-        "adds to the rate, deg/s rms",
-        "mean, deg/s",
     ]);
     for node in &check.nodes {
         table.add_row(row(node));
@@ -88,9 +85,9 @@ fn print(check: &Check) {
     super::terminal::show(&table);
     say!(
         "proved range: every raw word that can come, for every ADC code and state. needs: the bits that hold this range. spare: has less \
-         needs; below 0 the word can overflow. own rounding: the error that the word's rounding makes by itself; after it, what that adds to \
-         the rate, rms and mean. -: does not apply."
+         needs; below 0 the word can overflow. -: does not apply."
     );
+    roundings(&check.nodes);
     let open = || {
         let nodes = check.nodes.iter();
         nodes.filter(|n| n.overflow == Overflows::Possible)
@@ -190,18 +187,49 @@ fn print(check: &Check) {
         );
         rest = others;
     }
-    say!("{}", verdict(check.holds, open().count()));
+    say!("{}", verdict(check.holds, open().count(), check.samples));
 }
 
-/// The verdict; `open` words are not proved to hold every value.
-fn verdict(holds: bool, open: usize) -> String {
+/// What each word's rounding makes, as a table beside that of the ranges: both in one are too wide for a terminal.
+fn roundings(nodes: &[NodeCheck]) {
+    let mut table = super::terminal::table(&[
+        "word",
+        "own rounding, LSB rms",
+        "adds to the rate, deg/s rms",
+        "mean, deg/s",
+    ]);
+    let some = |v: Option<f64>| v.map_or("-".to_owned(), |v| number(v, 3));
+    for node in nodes {
+        let Some(line) = &node.budget else { continue };
+        let rms = line.predicted_rms_lsb.or(line.measured_rms_lsb);
+        table.add_row([
+            named(&node.name).0.to_owned(),
+            rms.map_or("-".to_owned(), |v| format!("{v:.3} {}", line.source)),
+            some(line.rate_rms_dps),
+            some(line.rate_mean_dps),
+        ]);
+    }
+    if table.row_count() == 0 {
+        return;
+    }
+    super::terminal::numbers(&mut table, 1..);
+    super::terminal::show(&table);
+    say!(
+        "own rounding: the error that the word's rounding makes by itself; beside it, what that adds to the rate, rms and mean. \
+         A word that is not here does not round."
+    );
+}
+
+/// The verdict on a run of so many ADC samples; `open` words are not proved to hold every value.
+fn verdict(holds: bool, open: usize, samples: u64) -> String {
     match (holds, open) {
         (false, _) => "does not hold".to_owned(),
         (true, 0) => "holds".to_owned(),
         (true, _) => {
             let words = counted(open as u64, "word");
-            let are = if open == 1 { "is" } else { "are" };
-            format!("holds: no overflow occurred, but {words} {are} not proved free of overflow")
+            format!(
+                "holds: no overflow in {samples} samples; {words} could overflow for inputs that did not occur"
+            )
         }
     }
 }
@@ -294,7 +322,7 @@ fn bits(n: &NodeCheck) -> Option<[u32; 2]> {
 fn row(n: &NodeCheck) -> Vec<String> {
     let overflow = match n.overflow {
         Overflows::Impossible => "impossible (proved)".to_owned(),
-        Overflows::Possible => format!("not excluded ({})", n.mode),
+        Overflows::Possible => format!("possible (would {})", n.mode),
         Overflows::Certain => match n.follows_from {
             Some(key) => format!("follows from {key}"),
             None => format!("CERTAIN ({})", n.mode),
@@ -305,8 +333,6 @@ fn row(n: &NodeCheck) -> Vec<String> {
             format!("{what} by design")
         }
     };
-    let some = |v: Option<f64>| v.map_or("-".to_owned(), |v| number(v, 3));
-    let line = n.budget.as_ref();
     let (name, what) = named(&n.name);
     let [has, needs, spare] = match bits(n) {
         Some([has, needs]) => [has.into(), needs.into(), i64::from(has) - i64::from(needs)]
@@ -327,12 +353,6 @@ fn row(n: &NodeCheck) -> Vec<String> {
         needs,
         spare,
         overflow,
-        line.map_or("-".to_owned(), |l| {
-            let rms = l.predicted_rms_lsb.or(l.measured_rms_lsb);
-            rms.map_or("-".to_owned(), |v| format!("{v:.3} {}", l.source))
-        }),
-        some(line.and_then(|l| l.rate_rms_dps)),
-        some(line.and_then(|l| l.rate_mean_dps)),
     ]
 }
 
@@ -385,10 +405,15 @@ mod tests {
             "drive magnitude",
             "64 bits, internal",
         ];
-        assert_eq!(magnitude[..3], due);
+        assert_eq!(
+            (&magnitude[..3], magnitude.len()),
+            (&due.map(str::to_owned)[..], 8)
+        );
         assert_eq!(magnitude[4..7], ["64", "24", "40"]);
         assert_eq!(of("circuit.cordic.width")[4..7], ["32", "31", "1"]);
-        assert_eq!(of("compensation.output bias")[4..7], ["24", "25", "-1"]);
+        let bias = of("compensation.output bias");
+        let due = ["24", "25", "-1", "possible (would saturate)"];
+        assert_eq!(bias[4..8], due);
         assert_eq!(
             of("circuit.cordic phase")[4..8],
             ["-", "-", "-", "wraps by design"]
@@ -397,12 +422,13 @@ mod tests {
 
     #[test]
     fn the_verdict_says_what_is_not_proved() {
-        assert_eq!(verdict(true, 0), "holds");
-        assert_eq!(verdict(false, 2), "does not hold");
-        for (open, words) in [(1, "1 word is"), (2, "2 words are")] {
-            let due =
-                format!("holds: no overflow occurred, but {words} not proved free of overflow");
-            assert_eq!(verdict(true, open), due);
+        assert_eq!(verdict(true, 0, 1000), "holds");
+        assert_eq!(verdict(false, 2, 1000), "does not hold");
+        for (open, words) in [(1, "1 word"), (2, "2 words")] {
+            let due = format!(
+                "holds: no overflow in 1000 samples; {words} could overflow for inputs that did not occur"
+            );
+            assert_eq!(verdict(true, open, 1000), due);
         }
     }
 }
