@@ -11,6 +11,7 @@ use crate::firmware::manifest::{self, Manifest};
 use crate::output::Results;
 use crate::timing;
 use crate::verify::bundle::{self, Against, Verification};
+use crate::verify::compare::Compared;
 use crate::verify::target::Target;
 use std::path::{Path, PathBuf};
 
@@ -91,9 +92,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     if verification.holds {
         return Ok(());
     }
-    let said = reasons(&verification).into_iter();
-    let said: Vec<String> = said.chain(remedy(&verification)).collect();
-    Err(Error::Check(said.join("; ")))
+    Err(Error::Check(failure(&verification)))
 }
 
 /// A result in a bundle's folder, which may be anybody's, replaces a plain file or nothing.
@@ -223,6 +222,13 @@ fn print(v: &Verification, folder: &Path) {
     );
 }
 
+/// What was found wrong and what to do, a line each.
+fn failure(v: &Verification) -> String {
+    let help = remedy(v).map(|remedy| format!("help: {remedy}"));
+    let said: Vec<String> = reasons(v).into_iter().chain(help).collect();
+    said.join("\n  ")
+}
+
 /// What was found wrong, the likeliest cause of the others first.
 fn reasons(v: &Verification) -> Vec<String> {
     let mut reasons = Vec::new();
@@ -241,13 +247,8 @@ fn reasons(v: &Verification) -> Vec<String> {
             "files differ from the manifest in their line ends alone (CR LF for LF): {files}"
         ));
     }
-    for f in v.functions.iter().filter(|f| f.mismatches > 0) {
-        let first = f.first.as_deref().unwrap_or("");
-        reasons.push(format!(
-            "{} ({}): first difference at {first}",
-            f.name, f.language
-        ));
-    }
+    let differing = v.functions.iter().filter(|f| f.mismatches > 0);
+    reasons.extend(differing.map(Compared::sentence));
     if v.selftest == Some(false) {
         reasons.push("the self-test fails".into());
     }

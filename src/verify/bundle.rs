@@ -185,11 +185,15 @@ pub fn verify(
                 problems.extend(empty.map(|f| format!("nothing of `{}` was compared", f.name)));
             }
             // Which file was changed says more than what a compiler thinks of it.
-            Err(Error::Check(_)) if !changed_files.is_empty() => {
+            Err(Error::Check(said)) if !changed_files.is_empty() => {
                 let why = "the changed files do not compile";
                 not_built = Some(why);
                 toolchain_name = format!("none: {why}");
-                problems.push(why.to_owned());
+                // The folder of the build has another name each time.
+                let place = format!("{}{}", made.path().display(), std::path::MAIN_SEPARATOR);
+                let error = said.lines().skip(1).find(|line| line.contains("error"));
+                let error = error.unwrap_or_default().replace(&place, "");
+                problems.push(format!("{why}: {error}"));
             }
             Err(error) => return Err(error),
         }

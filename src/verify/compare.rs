@@ -347,6 +347,7 @@ fn checksum(
     (inputs, words, due): (u64, u64, &str),
 ) -> Result<Compared> {
     let mut tally = Tally::new(language, name);
+    let model = due;
     let due = due
         .strip_prefix("0x")
         .map(|hex| u64::from_str_radix(hex, 16));
@@ -360,11 +361,25 @@ fn checksum(
     if found.map(Ok) != due {
         tally.outcome.mismatches = 1;
         tally.outcome.first = Some(match found {
-            Some(word) => format!("all {inputs} inputs: checksum {word:#x}, model another"),
-            None => "all inputs: the emitted code gave no checksum".to_owned(),
+            Some(word) => {
+                format!("checksum over {inputs} inputs: emitted {word:#x}, model {model}")
+            }
+            None => "the emitted code gave no checksum".to_owned(),
         });
     }
     Ok(tally.outcome)
+}
+
+impl Compared {
+    /// A function that differs and where it does, in words.
+    pub fn sentence(&self) -> String {
+        let first = self.first.as_deref().unwrap_or("");
+        let at = match first.contains("checksum") {
+            true => "",
+            false => "first difference at ",
+        };
+        format!("{} ({}): {at}{first}", self.name, self.language)
+    }
 }
 
 /// Compares the chain row by row on captured codes, by each driver, on so many threads.
@@ -411,4 +426,23 @@ pub fn chain_rows(
         k += 1;
     })?;
     Ok(tally.finish(rows.len() as u64))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_checksum_that_differs_is_told_with_that_of_the_model() {
+        let of = |first: &str| {
+            let mut compared = Tally::new(Language::C, "long run").outcome;
+            compared.first = Some(first.to_owned());
+            compared.sentence()
+        };
+        assert_eq!(
+            of("checksum over 10 inputs: emitted 0x1, model 0x2"),
+            "long run (c): checksum over 10 inputs: emitted 0x1, model 0x2"
+        );
+        assert_eq!(of("row 3"), "long run (c): first difference at row 3");
+    }
 }

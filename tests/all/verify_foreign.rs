@@ -247,7 +247,10 @@ fn a_changed_file_is_named_also_where_it_does_not_compile() {
         1,
         "files differ from the manifest: tested_correction.c",
     );
-    refused(&at, 1, "the changed files do not compile");
+    // The compiler's first line names the file; each fact has a line.
+    let places = "\n  the changed files do not compile: tested_correction.c:";
+    refused(&at, 1, places);
+    refused(&at, 1, "\n  help: write the bundle again with ");
     // That alone is said of the build, and where the result is.
     let output = gyrogen(&["verify", "c"], at.parent().expect("a parent"));
     let said = String::from_utf8_lossy(&output.stdout).into_owned();

@@ -39,12 +39,7 @@ impl Emitted {
     /// The first difference of each table and function that has one; empty if the check holds.
     pub fn differences(&self) -> Vec<String> {
         let differing = self.functions.iter().filter(|f| f.mismatches > 0);
-        differing
-            .map(|f| {
-                let first = f.first.as_deref().unwrap_or("");
-                format!("{} ({}): first difference at {first}", f.name, f.language)
-            })
-            .collect()
+        differing.map(Compared::sentence).collect()
     }
 }
 
