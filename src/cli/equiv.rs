@@ -172,8 +172,9 @@ fn print(e: &Equivalence, out: &Path) {
         "overflows",
         "flags",
     ]);
+    let usual = usual_flag(e.nodes.iter().map(|n| &n.flags[..]));
     for n in &e.nodes {
-        table.add_row(row(n));
+        table.add_row(row(n, usual));
     }
     super::terminal::numbers(&mut table, 1..1 + 7);
     super::terminal::show(&table);
@@ -181,6 +182,15 @@ fn print(e: &Equivalence, out: &Path) {
         "error: fixed point less floating point, in LSB of the node. Its bound holds at every sample. A node whose LSB is in \
          deg/s is the bias or the rate, or a step on the way to them."
     );
+    if let Some(flag) = usual {
+        say!("flags: every node without one has {flag}.");
+    }
+    if e.nodes.iter().any(|n| n.name.contains(" inner ")) {
+        say!(
+            "compensation.accumulator: of step k of Horner's scheme, inner k is the product of the input and the step before, outer k its \
+             sum with coefficient k."
+        );
+    }
     say!("{} ADC samples, {} rows: {}", e.samples, e.rows, e.stimulus);
     for (emitted, language) in [(&e.model_vs_c, "C"), (&e.model_vs_rust, "Rust")] {
         let Some(emitted) = emitted else {
@@ -230,7 +240,10 @@ fn print(e: &Equivalence, out: &Path) {
     for note in &e.notes {
         say!("note: {note}");
     }
-    say!("{}", if e.holds { "holds" } else { "does not hold" });
+    say!(
+        "verdict: {}",
+        if e.holds { "holds" } else { "does not hold" }
+    );
     let mut next = vec!["equiv.html"];
     next.extend(e.counterexample.as_deref());
     super::common::wrote(out, &next);
@@ -259,7 +272,18 @@ fn print_spurs(e: &Equivalence) {
     );
 }
 
-fn row(n: &NodeReport) -> Vec<String> {
+/// The flag that most nodes have, if every other node has another one and none has it beside others: it is said once.
+fn usual_flag<'a>(nodes: impl Iterator<Item = &'a [&'static str]> + Clone) -> Option<&'static str> {
+    let flag = *nodes.clone().find(|flags| flags.len() == 1)?.first()?;
+    let having = nodes.clone().filter(|flags| **flags == [flag]).count();
+    let all = nodes.clone().count();
+    let is_told_apart =
+        |flags: &'a [&'static str]| flags == [flag] || !(flags.is_empty() || flags.contains(&flag));
+    (4 * having >= 3 * all && nodes.clone().all(is_told_apart)).then_some(flag)
+}
+
+/// A node as the table has it; of its flags not the `usual` one.
+fn row(n: &NodeReport, usual: Option<&str>) -> Vec<String> {
     let decimals = |v: f64| if v.abs() < 1e3 { 3 } else { 0 };
     let lsb = |v: f64| format!("{:.*}", decimals(v / n.lsb), v / n.lsb);
     let bound = n.bound / n.lsb;
@@ -274,6 +298,24 @@ fn row(n: &NodeReport) -> Vec<String> {
         format!("{} {unit}", number(n.lsb, 3)).trim_end().to_owned(),
         n.headroom_bits.map_or("-".into(), |b| format!("{b:.2}")),
         n.overflows.to_string(),
-        n.flags.join(" "),
+        match usual.is_some_and(|flag| n.flags == [flag]) {
+            true => String::new(),
+            false => n.flags.join(" "),
+        },
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_flag_that_nearly_all_nodes_have_is_said_once_and_no_other() {
+        let of = |nodes: &[&[&'static str]]| usual_flag(nodes.iter().copied());
+        assert_eq!(of(&[&["a"], &["a"], &["a"], &["b"]]), Some("a"));
+        // No flag would read as the usual one.
+        assert_eq!(of(&[&["a"], &["a"], &["a"], &[]]), None);
+        assert_eq!(of(&[&["a"], &["b"], &["a"]]), None);
+        assert_eq!(of(&[]), None);
+    }
 }
