@@ -115,9 +115,9 @@ int32_t gyro_decimate(gyro_cic_t *s);
  */
 gyro_cordic_out_t gyro_cordic(int32_t in_phase, int32_t quadrature);
 
-/* bias: The bias that the polynomial, or what stands for it, has at a word of the thermometer.
+/* bias: Bias at a quantised temperature (or phase or frequency), from the polynomial or the table that replaces it.
  *   in  thermometer: -8388608 .. 8388607 (-0.5 .. 0.4999999 turn); phase in units of 2^-24 turn
- *   out bias: -8208678 .. 8388607 (-2004.072 .. 2048 deg/s); bias = raw * 2^-12 deg/s; word format Q12.12 half_up saturate
+ *   out bias: -8208678 .. 8388607 (-2004.072 .. 2047.9998 deg/s); bias = raw * 2^-12 deg/s; word format Q12.12 half_up saturate
  *   error: each step one rounding to the accumulator's LSB
  *   an input outside its range is clamped to it
  */
@@ -125,8 +125,8 @@ int32_t gyro_bias(int32_t thermometer);
 
 /* rate: The compensated rate: the raw rate less the bias.
  *   in  raw_rate: -4194176 .. 4194176 (-2047.938 .. 2047.938 deg/s); sense I = raw * 2^-11 deg/s; word format Q2.22
- *   in  bias: -8208678 .. 8388607 (-2004.072 .. 2048 deg/s); bias = raw * 2^-12 deg/s; word format Q12.12 half_up saturate
- *   out rate: -8388608 .. 8388607 (-2048 .. 2048 deg/s); compensated rate = raw * 2^-12 deg/s; word format Q12.12 half_up saturate
+ *   in  bias: -8208678 .. 8388607 (-2004.072 .. 2047.9998 deg/s); bias = raw * 2^-12 deg/s; word format Q12.12 half_up saturate
+ *   out rate: -8388608 .. 8388607 (-2048 .. 2047.9998 deg/s); compensated rate = raw * 2^-12 deg/s; word format Q12.12 half_up saturate
  *   error: one rounding of the input to the output's LSB; the difference is exact
  *   an input outside its range is clamped to it
  */
@@ -146,8 +146,8 @@ int32_t gyro_amplitude_loop(gyro_amplitude_loop_t *s, int32_t magnitude);
  *   out sense_q: -4194176 .. 4194176; decimated, Q2.22 half_up saturate
  *   out phase: -8388608 .. 8388607; drive phase in units of 2^-24 turn
  *   out magnitude: 0 .. 5931461; drive magnitude in units of 2^-22
- *   out bias: -8208678 .. 8388607 (-2004.072 .. 2048 deg/s); bias = raw * 2^-12 deg/s; word format Q12.12 half_up saturate
- *   out rate: -8388608 .. 8388607 (-2048 .. 2048 deg/s); compensated rate = raw * 2^-12 deg/s; word format Q12.12 half_up saturate
+ *   out bias: -8208678 .. 8388607 (-2004.072 .. 2047.9998 deg/s); bias = raw * 2^-12 deg/s; word format Q12.12 half_up saturate
+ *   out rate: -8388608 .. 8388607 (-2048 .. 2047.9998 deg/s); compensated rate = raw * 2^-12 deg/s; word format Q12.12 half_up saturate
  *   out gain: 0 .. 32767; drive gain in units of 2^-15
  */
 gyro_period_out_t gyro_period(gyro_chain_t *s);

@@ -701,11 +701,11 @@ pub fn cordic(in_phase: i32, quadrature: i32) -> CordicOut {
     }
 }
 
-/// The bias that the polynomial, or what stands for it, has at a word of the thermometer.
+/// Bias at a quantised temperature (or phase or frequency), from the polynomial or the table that replaces it.
 ///
 /// ```text
 /// in  thermometer: -8388608 .. 8388607 (-0.5 .. 0.4999999 turn); phase in units of 2^-24 turn
-/// out bias: -8208678 .. 8388607 (-2004.072 .. 2048 deg/s); bias = raw * 2^-12 deg/s; word format Q12.12 half_up saturate
+/// out bias: -8208678 .. 8388607 (-2004.072 .. 2047.9998 deg/s); bias = raw * 2^-12 deg/s; word format Q12.12 half_up saturate
 /// error: each step one rounding to the accumulator's LSB
 /// an input outside its range is clamped to it
 /// ```
@@ -730,8 +730,8 @@ pub fn bias(thermometer: i32) -> i32 {
 ///
 /// ```text
 /// in  raw_rate: -4194176 .. 4194176 (-2047.938 .. 2047.938 deg/s); sense I = raw * 2^-11 deg/s; word format Q2.22
-/// in  bias: -8208678 .. 8388607 (-2004.072 .. 2048 deg/s); bias = raw * 2^-12 deg/s; word format Q12.12 half_up saturate
-/// out rate: -8388608 .. 8388607 (-2048 .. 2048 deg/s); compensated rate = raw * 2^-12 deg/s; word format Q12.12 half_up saturate
+/// in  bias: -8208678 .. 8388607 (-2004.072 .. 2047.9998 deg/s); bias = raw * 2^-12 deg/s; word format Q12.12 half_up saturate
+/// out rate: -8388608 .. 8388607 (-2048 .. 2047.9998 deg/s); compensated rate = raw * 2^-12 deg/s; word format Q12.12 half_up saturate
 /// error: one rounding of the input to the output's LSB; the difference is exact
 /// an input outside its range is clamped to it
 /// ```
@@ -775,8 +775,8 @@ pub fn amplitude_loop(s: &mut AmplitudeLoop, magnitude: i32) -> i32 {
 /// out sense_q: -4194176 .. 4194176; decimated, Q2.22 half_up saturate
 /// out phase: -8388608 .. 8388607; drive phase in units of 2^-24 turn
 /// out magnitude: 0 .. 5931461; drive magnitude in units of 2^-22
-/// out bias: -8208678 .. 8388607 (-2004.072 .. 2048 deg/s); bias = raw * 2^-12 deg/s; word format Q12.12 half_up saturate
-/// out rate: -8388608 .. 8388607 (-2048 .. 2048 deg/s); compensated rate = raw * 2^-12 deg/s; word format Q12.12 half_up saturate
+/// out bias: -8208678 .. 8388607 (-2004.072 .. 2047.9998 deg/s); bias = raw * 2^-12 deg/s; word format Q12.12 half_up saturate
+/// out rate: -8388608 .. 8388607 (-2048 .. 2047.9998 deg/s); compensated rate = raw * 2^-12 deg/s; word format Q12.12 half_up saturate
 /// out gain: 0 .. 32767; drive gain in units of 2^-15
 /// ```
 pub fn period(s: &mut Chain) -> PeriodOut {
