@@ -146,17 +146,17 @@ struct Sums<'a, const N: usize> {
 }
 
 impl<const N: usize> Sums<'_, N> {
-    /// Takes eight samples of both inputs into sums by input, integrator, cosine or sine, and lane: no sum waits for another.
+    /// Takes eight samples of both inputs into sums by integrator, cosine or sine, input, and lane: no sum waits for another.
     #[inline(always)]
-    fn take(&self, sums: &mut [[[Eight; 2]; N]; 2], chunk: usize, eights: [&Eight; 2]) {
-        for k in 0..N {
-            for part in 0..2 {
-                let Some(weight) = self.kernel.weights[k][part].get(chunk) else {
+    fn take(&self, sums: &mut [[[Eight; 2]; 2]; N], chunk: usize, eights: [&Eight; 2]) {
+        for (sums, weights) in sums.iter_mut().zip(&self.kernel.weights) {
+            for (sums, weights) in sums.iter_mut().zip(weights) {
+                let Some(weight) = weights.get(chunk) else {
                     return;
                 };
-                for input in 0..2 {
+                for (sum, eight) in sums.iter_mut().zip(eights) {
                     for lane in 0..WIDTH {
-                        sums[input][k][part][lane] += eights[input][lane] * weight[lane];
+                        sum[lane] += eight[lane] * weight[lane];
                     }
                 }
             }
@@ -172,7 +172,7 @@ impl<const N: usize> pulp::WithSimd for Sums<'_, N> {
         let [drive, sense] = self.inputs;
         let (drive, drive_rest) = drive.as_chunks::<WIDTH>();
         let (sense, sense_rest) = sense.as_chunks::<WIDTH>();
-        let mut sums = [[[[0.0; WIDTH]; 2]; N]; 2];
+        let mut sums = [[[[0.0; WIDTH]; 2]; 2]; N];
         for (chunk, (drive, sense)) in drive.iter().zip(sense).enumerate() {
             self.take(&mut sums, chunk, [drive, sense]);
         }
@@ -184,14 +184,13 @@ impl<const N: usize> pulp::WithSimd for Sums<'_, N> {
             self.take(&mut sums, drive.len(), last.each_ref());
         }
         let mut added = [[[0.0; 2]; N]; 2];
-        for (added, sums) in added
-            .as_flattened_mut()
-            .as_flattened_mut()
-            .iter_mut()
-            .zip(sums.as_flattened().as_flattened())
-        {
-            let [a, b, c, d, e, f, g, h] = *sums;
-            *added = ((a + e) + (c + g)) + ((b + f) + (d + h));
+        for (k, sums) in sums.iter().enumerate() {
+            for (part, sums) in sums.iter().enumerate() {
+                for (added, sum) in added.iter_mut().zip(sums) {
+                    let [a, b, c, d, e, f, g, h] = *sum;
+                    added[k][part] = ((a + e) + (c + g)) + ((b + f) + (d + h));
+                }
+            }
         }
         added
     }

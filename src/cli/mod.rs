@@ -307,7 +307,9 @@ mod tests {
 
     #[test]
     fn every_argument_that_is_required_by_itself_has_an_example() {
-        for command in parser().get_subcommands() {
+        let mut parser = parser();
+        parser.build();
+        for command in parser.get_subcommands() {
             for arg in command.get_arguments().filter(|a| a.is_required_set()) {
                 let tip = of_missing(&arg.to_string());
                 assert!(!tip.starts_with("add it"), "{command}: {arg}: {tip}");

@@ -234,7 +234,8 @@ const NO_GAIN: f64 = 0.9;
 
 /// True if the rate varies as much after the compensation as before it; a mean that is taken off is no gain.
 fn gains_nothing(points: &Points) -> bool {
-    let is_left = |figure: fn(&Points, fn(&Point) -> f64) -> f64| {
+    type Figure = fn(&Points, fn(&Point) -> f64) -> f64;
+    let is_left = |figure: Figure| {
         figure(points, |p| p.fixed_dps) > NO_GAIN * figure(points, |p| p.before_dps)
     };
     is_left(drift_pp) && is_left(deviation)

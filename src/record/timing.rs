@@ -376,7 +376,7 @@ mod tests {
         );
         // The longer of two.
         let two = said(&|k| k + paused(k, 100.0, 99.0) + paused(k, 300.0, 199.0));
-        let start = "line 302 is 200 s after line 301 (the longest of 2 gaps): ";
+        let start = "line 302 is 200.0 s after line 301 (the longest of 2 gaps): ";
         assert!(two.len() == 1 && two[0].1.starts_with(start), "{two:?}");
         // Too short a pause; rows as far apart as the pause; a pause every tenth row, as at a chamber's set points.
         for time_s in [
