@@ -11,7 +11,7 @@ fn design(folder: &Path, exhaustive: u32, more: &str) -> PathBuf {
     let text = format!(
         "[study]\nwords = [\"circuit.demodulator.product\", \"circuit.cordic.iterations\", \
          \"compensation.output\"]\ntargets = [\"cortex-m4\"]\nexhaustive = {exhaustive}\n[study.ranges]\n\
-         \"circuit.demodulator.product\" = [14, 20]\n\"circuit.cordic.iterations\" = [14, 18]\n\
+         \"circuit.demodulator.product\" = [14, 20]\n\"circuit.cordic.iterations\" = [12, 16]\n\
          \"compensation.output\" = [18, 22]\n{more}"
     );
     let path = folder.join("small.toml");
