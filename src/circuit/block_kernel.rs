@@ -13,7 +13,7 @@
 
 use super::chain::{Chain, FastState};
 use super::demodulator::Mixer;
-use super::sample_lanes::{CarrierPair, Portable, SampleLanes, carrier_pair};
+use super::sample_lanes::{CarrierPair, Portable, SampleLanes, by_channel, carrier_pair};
 use crate::numeric::cast::{End, Kernel};
 
 #[cfg(test)]
@@ -25,7 +25,7 @@ pub(super) mod tests;
 pub enum Instructions {
     /// Sample by sample, by the blocks as they are written.
     Plain,
-    /// The block kernel, compiled for any processor.
+    /// The block kernel, compiled for any processor; on x86-64 with SSE2 for codes and carriers of 16 bits.
     Portable,
     /// The block kernel with AVX2: x86-64-v3.
     Avx2,
@@ -55,21 +55,39 @@ impl Instructions {
         }
     }
 
-    /// The fastest that this processor has; `idle`: the product is not quantised, and then the blocks as
-    /// they are written are faster than a kernel without SIMD.
-    pub fn best(idle: bool) -> Self {
+    /// The fastest that this processor has for a chain. Where its product is not quantised, the blocks as they are written
+    /// are faster than a kernel without SIMD.
+    pub fn best<const N: usize>(chain: &Chain<N>) -> Self {
         let there = Instructions::ALL.into_iter().rev().find(|i| i.are_there());
+        let idle = chain.mixers.iter().all(|m| m.product.is_idle());
         match there {
-            Some(Instructions::Portable) if idle => Instructions::Plain,
+            Some(Instructions::Portable) if idle && !sixteen_bits(chain) => Instructions::Plain,
             there => there.unwrap_or(Instructions::Plain),
         }
     }
+}
+
+/// Codes and carriers have at most 16 bits, and the processor's products of these are taken.
+fn sixteen_bits<const N: usize>(chain: &Chain<N>) -> bool {
+    let all = i128::from(i16::MIN)..=i128::from(i16::MAX);
+    let codes = &chain.code_range;
+    let carriers = &chain.nco.table.entries;
+    #[cfg(target_arch = "x86_64")]
+    let has_products = pulp::x86::V1::try_new().is_some();
+    #[cfg(not(target_arch = "x86_64"))]
+    let has_products = false;
+    has_products
+        && all.contains(&codes.low)
+        && all.contains(&codes.high)
+        && carriers.iter().all(|c| all.contains(&i128::from(*c)))
 }
 
 /// The fast rate of a chain, compiled.
 #[derive(Debug, Clone)]
 pub struct BlockKernel<const N: usize> {
     instructions: Instructions,
+    /// See [`sixteen_bits`].
+    sixteen_bits: bool,
     /// Sine and cosine by address, 2^a of them.
     carriers: Box<[CarrierPair]>,
     /// The phase is moved up to the top of 64 bits by this many.
@@ -147,6 +165,7 @@ impl<const N: usize> BlockKernel<N> {
         };
         Some(BlockKernel {
             instructions,
+            sixteen_bits: sixteen_bits(chain),
             carriers,
             phase_spare_bits: spare,
             address_shift: 64 - table.address_bits,
@@ -181,6 +200,12 @@ impl<const N: usize> BlockKernel<N> {
                     simd.vectorize(InLanes(simd, self, state, drive, sense));
                 }
             }
+            #[cfg(target_arch = "x86_64")]
+            _ if self.sixteen_bits => {
+                if let Some(simd) = pulp::x86::V1::try_new() {
+                    simd.vectorize(InLanes(simd, self, state, drive, sense));
+                }
+            }
             _ => self.in_lanes(Portable, state, drive, sense),
         }
     }
@@ -200,7 +225,7 @@ impl<const N: usize> BlockKernel<N> {
             phase: phase.wrapping_add(self.half_step),
             step,
         };
-        let known = self.known_carriers(simd, walk, drive.len());
+        let known = self.known_carriers::<S>(walk, drive.len());
         let codes = [drive, sense];
         let moments = match self.product.form() {
             form::IDLE => self.moments::<S, { form::IDLE }>(simd, walk, known, codes),
@@ -255,7 +280,7 @@ impl<const N: usize> BlockKernel<N> {
         if let Some((_, carriers)) = known.and_then(|k| self.known.blocks.get(k)) {
             for (four, carriers) in codes.zip(carriers.as_chunks::<4>().0) {
                 for (k, carrier) in carriers.iter().enumerate() {
-                    let exact = simd.low_products(simd.code(four, k), simd.of_channels(carrier));
+                    let exact = simd.products(simd.code(four, k), simd.of_channels(carrier));
                     self.integrate::<S, FORM>(simd, &mut integrators, exact);
                 }
             }
@@ -274,7 +299,7 @@ impl<const N: usize> BlockKernel<N> {
                 for k in 0..4 {
                     phase = phase.wrapping_add(walk.step);
                     let pairs = simd.carriers([at(phase), at(phase.wrapping_add(ahead))]);
-                    let exact = simd.low_products(simd.code(four, k), pairs);
+                    let exact = simd.products(simd.code(four, k), pairs);
                     self.integrate::<S, FORM>(simd, &mut integrators, exact);
                 }
             }
@@ -300,12 +325,7 @@ impl<const N: usize> BlockKernel<N> {
     /// The carriers of a block of a whole period, made at its first time, where there are few
     /// different ones; `None` elsewhere.
     #[inline(always)]
-    fn known_carriers<S: SampleLanes>(
-        &mut self,
-        simd: S,
-        walk: Walk,
-        samples: usize,
-    ) -> Option<usize> {
+    fn known_carriers<S: SampleLanes>(&mut self, walk: Walk, samples: usize) -> Option<usize> {
         let known = &mut self.known;
         if known.step != walk.step || known.samples != samples {
             // Only what has just been seen is likely to come again: a loop moves the step.
@@ -331,21 +351,21 @@ impl<const N: usize> BlockKernel<N> {
         if !whole || different.saturating_mul(samples as u64) > KNOWN_SAMPLES {
             return None;
         }
-        self.learn(simd, walk, samples);
+        self.learn(walk, samples, samples / S::PARTS);
         None
     }
 
-    /// Keeps the carriers of a block.
+    /// Keeps the carriers of a block whose parts have `length` samples.
     #[cold]
     #[inline(never)]
-    fn learn<S: SampleLanes>(&mut self, simd: S, walk: Walk, samples: usize) {
-        let length = samples / S::PARTS;
+    fn learn(&mut self, walk: Walk, samples: usize, length: usize) {
         let at = |k: usize| {
             let phase = walk.phase.wrapping_add(walk.step.wrapping_mul(k as u64));
             &self.carriers[(phase >> self.address_shift) as usize & (self.carriers.len() - 1)]
         };
-        let one = |k| simd.by_channel(simd.carriers([at(k), at(k + length)]));
-        let carriers = (1..=length).map(one).collect();
+        let second = samples - length;
+        let carriers = (1..=length).map(|k| by_channel([at(k), at(k + second)]));
+        let carriers = carriers.collect();
         self.known.blocks.push((walk.phase, carriers));
     }
 

@@ -208,7 +208,7 @@ fn with_stages<const N: usize>(
     let bits = lane_bits(&chain, &chain.trace());
     let narrow = bits.fast <= 64 && bits.residue <= 64;
     let idle = chain.mixers.iter().all(|m| m.product.is_idle());
-    let instructions = instructions.unwrap_or_else(|| Instructions::best(idle));
+    let instructions = instructions.unwrap_or_else(|| Instructions::best(&chain));
     let kernel = narrow
         .then(|| BlockKernel::new(&chain, instructions))
         .flatten();

@@ -7,21 +7,25 @@
 pub trait SampleLanes: Copy {
     /// A 64-bit word for each lane.
     type Words: Copy;
+    /// A factor of a product for each lane: a code or a carrier.
+    type Factors: Copy;
+    /// Four consecutive codes of both channels.
+    type Codes: Copy;
     /// Samples side by side: each is of a part of the block of its own.
     const PARTS: usize;
 
     /// The same word in every lane.
     fn splat(self, word: i64) -> Self::Words;
     /// Four consecutive codes of drive and sense, of each part. With one part the second is ignored.
-    fn codes(self, drive: [&[i32; 4]; 2], sense: [&[i32; 4]; 2]) -> Self::Words;
-    /// The codes of sample `k` of those four, 0 to 3, by channel: in the low half of each lane.
-    fn code(self, codes: Self::Words, k: usize) -> Self::Words;
-    /// Sine and cosine, of each part, by channel: in the low half of each lane.
-    fn carriers(self, pairs: [&CarrierPair; 2]) -> Self::Words;
-    /// Words of each part by channel; with one part the second is ignored.
-    fn of_channels(self, words: &[[i64; 4]; 2]) -> Self::Words;
-    /// Exact products of the low halves, read as signed.
-    fn low_products(self, a: Self::Words, b: Self::Words) -> Self::Words;
+    fn codes(self, drive: [&[i32; 4]; 2], sense: [&[i32; 4]; 2]) -> Self::Codes;
+    /// The codes of sample `k` of those four, 0 to 3, by channel.
+    fn code(self, codes: Self::Codes, k: usize) -> Self::Factors;
+    /// Sine and cosine, of each part, by channel.
+    fn carriers(self, pairs: [&CarrierPair; 2]) -> Self::Factors;
+    /// Carriers of each part by channel; with one part the second is ignored.
+    fn of_channels(self, carriers: &[[i64; 4]; 2]) -> Self::Factors;
+    /// Exact products of codes and carriers.
+    fn products(self, codes: Self::Factors, carriers: Self::Factors) -> Self::Words;
     /// Sum.
     fn plus(self, a: Self::Words, b: Self::Words) -> Self::Words;
     /// Bitwise and.
@@ -44,12 +48,19 @@ pub fn carrier_pair(sine: i32, cosine: i32) -> CarrierPair {
     [sine, 0, cosine, 0]
 }
 
+/// The carriers of a sample of each part by channel.
+pub fn by_channel(pairs: [&CarrierPair; 2]) -> [[i64; 4]; 2] {
+    pairs.map(|[sine, _, cosine, _]| [sine, cosine, sine, cosine].map(|c| i64::from(*c)))
+}
+
 /// Lanes that any processor has; the compiler may use what it finds.
 #[derive(Debug, Clone, Copy)]
 pub struct Portable;
 
 impl SampleLanes for Portable {
     type Words = [i64; 4];
+    type Factors = [i64; 4];
+    type Codes = [i64; 4];
     const PARTS: usize = 1;
 
     #[inline(always)]
@@ -76,7 +87,7 @@ impl SampleLanes for Portable {
         words[0]
     }
     #[inline(always)]
-    fn low_products(self, a: [i64; 4], b: [i64; 4]) -> [i64; 4] {
+    fn products(self, a: [i64; 4], b: [i64; 4]) -> [i64; 4] {
         std::array::from_fn(|k| i64::from(a[k] as i32) * i64::from(b[k] as i32))
     }
     #[inline(always)]
