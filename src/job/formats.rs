@@ -180,7 +180,7 @@ fn no_finer_than(peak: f64, step: f64, bits: std::ops::RangeInclusive<u32>) -> R
 /// The range of a signed format in a sentence.
 fn reach(format: Format) -> String {
     let end = pow2(format.integer_bits as i32 - 1);
-    format!("range +-{end} deg/s, a power of two")
+    format!("range -{end} to {end} deg/s")
 }
 
 /// True if the formats hold every coefficient of the fit.

@@ -22,9 +22,8 @@ const LEAST_GAP_S: f64 = 60.0;
 /// Pauses are that much longer than the median step (convention).
 const LEAST_GAP_STEPS: f64 = 20.0;
 
-/// One pause in so many steps, and three in all, are gaps; more of them are a program that has pauses (convention).
+/// One pause in so many steps is a gap; more of them are a program that has pauses (convention).
 const STEPS_A_GAP: usize = 50;
-const MOST_GAPS: usize = 3;
 
 /// Warnings for a clock in another unit, or of calendar time, and for a gap.
 pub(super) fn check(record: &ThermalRecord) -> Vec<Warning> {
@@ -45,7 +44,7 @@ fn gap(record: &ThermalRecord) -> Option<Warning> {
         1 => String::new(),
         n => format!(" (the longest of {n} gaps)"),
     };
-    (count <= (steps.len() / STEPS_A_GAP).clamp(1, MOST_GAPS)).then(|| {
+    (count <= (steps.len() / STEPS_A_GAP).max(1)).then(|| {
         Warning::on(
             "time_gap",
             "time_s",
