@@ -9,12 +9,12 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-/// Two cycles of the chamber in six hours.
-fn profile() -> String {
+/// Cycles of the chamber of three hours each, by an amplitude.
+fn profile(cycles: u32, amplitude_k: f64) -> String {
     let mut text = String::from("time_s,chamber_degc\n");
-    for k in 0..=360 {
+    for k in 0..=180 * cycles {
         let at_s = 60.0 * f64::from(k);
-        let degc = 35.0 + 34.0 * (TAU * at_s / 10_800.0).sin();
+        let degc = 35.0 + amplitude_k * (TAU * at_s / 10_800.0).sin();
         writeln!(text, "{at_s},{degc:.4}").unwrap();
     }
     text
@@ -35,13 +35,19 @@ fn design(changes: &[(&str, &str)]) -> String {
     text
 }
 
-/// Simulates 600 readings of a design and closes their record with it.
+/// Simulates 600 readings of a design in two cycles over 68 K and closes their record with it.
 fn closed(folder: &Path, text: &str) -> Value {
+    closed_of(folder, text, &profile(2, 34.0), 600)
+}
+
+/// Simulates readings of a design under a chamber's profile and closes their record with it.
+fn closed_of(folder: &Path, text: &str, profile: &str, readings: u32) -> Value {
     fs::write(folder.join("gyro.toml"), text).unwrap();
-    fs::write(folder.join("profile.csv"), profile()).unwrap();
-    let simulate = "simulate gyro.toml --profile profile.csv --readings 600 --out simulated";
+    fs::write(folder.join("profile.csv"), profile).unwrap();
+    let simulate =
+        format!("simulate gyro.toml --profile profile.csv --readings {readings} --out simulated");
     let close = "close --record simulated/record.csv --design gyro.toml --out closed";
-    for command in [simulate, close] {
+    for command in [&simulate, close] {
         let arguments: Vec<&str> = command.split(' ').collect();
         let out = gyrogen_in(folder, &arguments, &[]);
         good(&out);
@@ -80,7 +86,8 @@ fn steps_of_the_phase_word_are_taken_out_and_not_named() {
         ("iterations = 20", "iterations = 10"),
     ];
     let folder = tempfile::tempdir().unwrap();
-    let closure = closed(folder.path(), &design(&quiet));
+    // Half the range in half the readings, as many to a step of the word: a quarter of the time.
+    let closure = closed_of(folder.path(), &design(&quiet), &profile(1, 17.0), 300);
     assert_eq!(closure["steps"], serde_json::json!([]));
     let warning = &closure["warnings"][0];
     assert_eq!(warning["code"], "thermometer_quantised");
