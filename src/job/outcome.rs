@@ -3,10 +3,9 @@
 use super::bound::Kept;
 use super::budget::Budget;
 use super::coefficients::Rounded;
-use super::points::deviation;
 pub use super::points::{Point, Points};
 use super::word_lengths::WordLengths;
-use super::{drift_pp, reading::warning, rms};
+use super::{drift_pp, rms};
 use crate::compensation::certainty;
 use crate::compensation::certainty::Certainty;
 use crate::design::Design;
@@ -15,6 +14,7 @@ use crate::output::name_of;
 use crate::record::Warning;
 use crate::text::number;
 use crate::thermal::BaselineFit;
+use crate::thermal::no_gain;
 use crate::verify::compare::Compared;
 use crate::verify::firmware::Firmware;
 use serde::Serialize;
@@ -228,19 +228,6 @@ pub fn not_fitted(summary: &Summary) -> Option<String> {
     })
 }
 
-/// A compensation gains nothing if more than this share is left both of the drift and of the standard deviation about the mean
-/// (convention).
-const NO_GAIN: f64 = 0.9;
-
-/// True if the rate varies as much after the compensation as before it; a mean that is taken off is no gain.
-fn gains_nothing(points: &Points) -> bool {
-    type Figure = fn(&Points, fn(&Point) -> f64) -> f64;
-    let is_left = |figure: Figure| {
-        figure(points, |p| p.fixed_dps) > NO_GAIN * figure(points, |p| p.before_dps)
-    };
-    is_left(drift_pp) && is_left(deviation)
-}
-
 impl Outcome {
     /// Draws the conclusions.
     pub fn new(parts: Parts) -> Self {
@@ -269,19 +256,10 @@ impl Outcome {
         let apart = points.iter().map(|p| (p.fixed_dps - p.float_dps).abs());
         let on_record = points.iter().filter(|p| p.differs()).count() as u64;
         let is_measured = parts.record_path.is_some();
-        let no_gain = (is_measured && gains_nothing(points)).then(|| {
-            let rates = || parts.points.iter().map(|p| p.before_dps);
-            let (low, high) = (rates().fold(f64::INFINITY, f64::min), rates().fold(f64::NEG_INFINITY, f64::max));
-            let said = format!(
-                "the compensation takes nothing of the drift off: the rate runs from {} to {} deg/s before it and varies as much after it. \
-                 Either it does not follow {}, or the gyro was turned. Cut the rows in which it turned, or give the applied \
-                 rate as rate_dps",
-                number(low, 4),
-                number(high, 4),
-                parts.fit.thermometer
-            );
-            warning("no_gain", said)
-        });
+        let triples = points
+            .iter()
+            .map(|p| [p.thermometer, p.before_dps, p.fixed_dps]);
+        let no_gain = is_measured.then(|| no_gain::warning(&parts.fit.thermometer, triples));
         let compensation = parts.design.compensation.as_ref();
         let fit = &parts.fit;
         let summary = Summary {
@@ -339,7 +317,12 @@ impl Outcome {
                     })
                 })
                 .collect(),
-            warnings: parts.warnings.iter().cloned().chain(no_gain).collect(),
+            warnings: parts
+                .warnings
+                .iter()
+                .cloned()
+                .chain(no_gain.flatten())
+                .collect(),
         };
         Outcome { summary, parts }
     }
@@ -383,51 +366,5 @@ impl Outcome {
             }
         }
         lines
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Readings from 20 to 44 degC, by their number of 2400: before the compensation and after it, deg/s.
-    fn readings(before: fn(u32) -> f64, after: fn(u32) -> f64) -> Points {
-        let point = |k: u32| Point {
-            time_s: f64::from(k),
-            thermometer: 20.0 + f64::from(k) / 100.0,
-            temperature_degc: f64::NAN,
-            heating: true,
-            before_dps: before(k),
-            float_dps: after(k),
-            fixed_dps: after(k),
-            c_dps: None,
-            rust_dps: None,
-        };
-        Points::from((0..2400).map(point).collect::<Vec<_>>())
-    }
-
-    fn noise(k: u32) -> f64 {
-        if k.is_multiple_of(2) { 1.0 } else { -1.0 }
-    }
-
-    fn slope(k: u32) -> f64 {
-        f64::from(k) / 10_000.0
-    }
-
-    #[test]
-    fn a_mean_that_is_taken_off_is_no_gain_and_a_small_drift_in_noise_is_one() {
-        // Turned for half of the record: the mean of 2.5 deg/s is a good part of the rms.
-        let turned = |k: u32| if k < 1200 { 0.0 } else { 5.0 };
-        assert!(gains_nothing(&readings(turned, |k| if k < 1200 {
-            -2.5
-        } else {
-            2.5
-        })));
-        // The noise hides the drift from the standard deviation, and the means over bins show it.
-        assert!(!gains_nothing(&readings(|k| slope(k) + noise(k), noise)));
-        // Half of the drift remains, and half of the standard deviation.
-        assert!(!gains_nothing(&readings(slope, |k| slope(k) / 2.0)));
-        // Nothing is left of nothing.
-        assert!(!gains_nothing(&readings(|_| 3.0, |_| 0.0)));
     }
 }

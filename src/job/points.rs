@@ -1,5 +1,7 @@
 //! Readings through every path, and figures over them.
 
+use crate::thermal::no_gain;
+pub use crate::thermal::no_gain::DRIFT_BINS;
 use std::fmt;
 
 /// One reading: the same rate through every path, deg/s. The applied rate is subtracted.
@@ -85,46 +87,13 @@ impl fmt::Debug for Points {
     }
 }
 
-/// Bins over the thermometer's range, of whose means the drift is.
-pub const DRIFT_BINS: usize = 24;
-
-/// Points' drift: greatest minus least of the means over bins of the thermometer.
+/// Points' drift: greatest minus least of the means over [`DRIFT_BINS`] bins of the thermometer.
 pub fn drift_pp(points: &Points, of: impl Fn(&Point) -> f64) -> f64 {
-    let readings = || points.iter().map(|p| p.thermometer);
-    let low = readings().fold(f64::INFINITY, f64::min);
-    let high = readings().fold(f64::NEG_INFINITY, f64::max);
-    let width = (high - low).max(f64::MIN_POSITIVE) / DRIFT_BINS as f64;
-    let mut sums = [(0.0, 0usize); DRIFT_BINS];
-    for point in points.iter() {
-        let bin = (((point.thermometer - low) / width) as usize).min(DRIFT_BINS - 1);
-        sums[bin].0 += of(&point);
-        sums[bin].1 += 1;
-    }
-    // Bins with a third of the usual number of points and more: the others are noise.
-    let filled = sums.iter().filter(|b| b.1 > 0).count().max(1);
-    let least = (points.len() / filled / 3).max(1);
-    let means: Vec<f64> = sums
-        .iter()
-        .filter(|b| b.1 >= least)
-        .map(|b| b.0 / b.1 as f64)
-        .collect();
-    let greatest = means.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let smallest = means.iter().copied().fold(f64::INFINITY, f64::min);
-    if means.is_empty() {
-        0.0
-    } else {
-        greatest - smallest
-    }
+    no_gain::drift_pp(points.iter().map(|p| (p.thermometer, of(&p))))
 }
 
 /// Root mean square.
 pub fn rms(points: &Points, of: impl Fn(&Point) -> f64) -> f64 {
     let sum: f64 = points.iter().map(|p| of(&p).powi(2)).sum();
     (sum / points.len().max(1) as f64).sqrt()
-}
-
-/// Standard deviation about the mean.
-pub fn deviation(points: &Points, of: impl Fn(&Point) -> f64) -> f64 {
-    let mean = points.iter().map(|p| of(&p)).sum::<f64>() / points.len().max(1) as f64;
-    rms(points, |p| of(p) - mean)
 }

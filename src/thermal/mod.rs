@@ -1,7 +1,7 @@
 //! What a thermal record says about the declared model.
 //!
 //! [`baseline`] fits the bias model, a polynomial in the thermometer's reading; [`order`] chooses its order, [`sweep`] compares
-//! heating with cooling, [`checks`] say what a user should know of before believing the fit. Weights, folds and the noise's
+//! heating with cooling, [`checks`] and [`no_gain`] say what a user should know of before believing the fit. Weights, folds and the noise's
 //! correlation are in [`crate::statistics`], and so is what tells an effect from noise with a memory.
 //!
 //! [`close`] answers for a record: [`intake`] takes it in ([`quantised`], [`staircase`]: coarse thermometers; [`repeated`]: slow
@@ -21,6 +21,7 @@ pub mod firmware;
 mod heats;
 mod holes;
 pub mod intake;
+pub mod no_gain;
 pub mod order;
 pub mod quadrature;
 pub mod quantised;

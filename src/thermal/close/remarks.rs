@@ -3,12 +3,14 @@
 use super::Told;
 use crate::record::Warning;
 use crate::text::number;
+use crate::thermal::no_gain;
 use crate::thermal::search::LEVEL;
 
 impl Told<'_> {
     /// All of it but what firmware has to say.
     pub(super) fn warn(&self, warnings: &mut Vec<Warning>) {
         warnings.extend(self.accidents().or_else(|| self.riddled()));
+        warnings.extend(self.no_gain());
         if !self.found.within_rounding.is_empty() {
             let each = self.found.within_rounding.iter();
             let names: Vec<String> = each
@@ -65,6 +67,19 @@ impl Told<'_> {
                 ),
             ));
         }
+    }
+
+    /// What is said where something is left, and as much varies as before. Noise alone is no drift.
+    fn no_gain(&self) -> Option<Warning> {
+        let left = self.after.residual(self.whole);
+        let rows = self.whole.error_dps.iter().zip(&left).zip(&self.whole.u);
+        let rows = rows.zip(&self.rows.accidents);
+        let usual = rows.filter(|((rates, _), accident)| rates.0.is_finite() && !**accident);
+        let readings = usual.map(|(((before, after), u), _)| [*u, *before, *after]);
+        let is_left = self.found.left.is_some();
+        is_left
+            .then(|| no_gain::warning(&self.whole.thermometer, readings))
+            .flatten()
     }
 
     /// What is said of rows that no figure has in it.
@@ -126,5 +141,38 @@ impl Told<'_> {
         let taken = |id: &String| self.found.terms.iter().any(|t| t.id() == *id);
         let ids = hidden.map(|j| j.candidate.id());
         ids.filter(|id| !taken(id)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::design::reader;
+    use crate::thermal::close::close;
+    use crate::thermal::search::Effort;
+    use crate::thermal::synthetic::{Random, record};
+
+    /// Codes of what is said of a gyro that was turned at `turned_dps` in a tenth of its rows, over two cycles of temperature.
+    fn said(turned_dps: f64) -> Vec<&'static str> {
+        let mut random = Random::new(3);
+        let phase = |k: u32| f64::from(k) / 300.0 * std::f64::consts::TAU;
+        let degc: Vec<f64> = (0..600).map(|k| 25.0 + 20.0 * phase(k).sin()).collect();
+        let rows = degc.iter().enumerate();
+        let output: Vec<f64> = rows
+            .map(|(k, t)| {
+                let turned = f64::from(u8::from((300..359).contains(&k)));
+                0.1 + 0.01 * t + turned_dps * turned + 0.01 * random.normal()
+            })
+            .collect();
+        let record = record("die_degc", &degc, &output);
+        let design = reader::parse("", None).unwrap();
+        let closed = close(&record, Vec::new(), &design, "test", Effort::default()).unwrap();
+        let warnings = closed.closure.warnings.iter();
+        warnings.map(|w| w.code).collect()
+    }
+
+    #[test]
+    fn a_gyro_that_was_turned_is_told_as_run_tells_it() {
+        assert!(said(50.0).contains(&"no_gain"), "{:?}", said(50.0));
+        assert!(!said(0.0).contains(&"no_gain"), "{:?}", said(0.0));
     }
 }

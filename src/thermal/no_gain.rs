@@ -1,0 +1,104 @@
+//! Whether a compensation takes anything of the drift off: said of a measured record by all that fit one.
+
+use crate::record::Warning;
+use crate::text::number;
+
+/// Bins over the thermometer's range, of whose means the drift is.
+pub const DRIFT_BINS: usize = 24;
+
+/// A compensation gains nothing if more than this share is left both of the drift and of the standard deviation about the mean
+/// (convention).
+const NO_GAIN: f64 = 0.9;
+
+/// Greatest minus least of the means over bins of the thermometer; of pairs of its reading and a rate.
+pub fn drift_pp(readings: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
+    let whole = || readings.clone().map(|r| r.0);
+    let low = whole().fold(f64::INFINITY, f64::min);
+    let high = whole().fold(f64::NEG_INFINITY, f64::max);
+    let width = (high - low).max(f64::MIN_POSITIVE) / DRIFT_BINS as f64;
+    let mut sums = [(0.0, 0usize); DRIFT_BINS];
+    for (thermometer, rate) in readings.clone() {
+        let bin = (((thermometer - low) / width) as usize).min(DRIFT_BINS - 1);
+        sums[bin].0 += rate;
+        sums[bin].1 += 1;
+    }
+    // Bins with a third of the usual number of readings and more: the others are noise.
+    let filled = sums.iter().filter(|b| b.1 > 0).count().max(1);
+    let least = (readings.count() / filled / 3).max(1);
+    let means = sums.iter().filter(|b| b.1 >= least);
+    let means: Vec<f64> = means.map(|b| b.0 / b.1 as f64).collect();
+    crate::statistics::stats::extremes(&means).map_or(0.0, |(low, high)| high - low)
+}
+
+/// Standard deviation about the mean.
+fn deviation(rates: impl Iterator<Item = f64> + Clone) -> f64 {
+    let count = rates.clone().count().max(1) as f64;
+    let mean = rates.clone().sum::<f64>() / count;
+    let squares = rates.map(|rate| (rate - mean).powi(2));
+    (squares.sum::<f64>() / count).sqrt()
+}
+
+/// True if the rate varies as much after the compensation as before it; a mean that is taken off is no gain.
+fn gains_nothing(readings: impl Iterator<Item = [f64; 3]> + Clone) -> bool {
+    let [before, after] = [1, 2].map(|k| {
+        let rates = readings.clone().map(move |r| (r[0], r[k]));
+        (drift_pp(rates.clone()), deviation(rates.map(|r| r.1)))
+    });
+    after.0 > NO_GAIN * before.0 && after.1 > NO_GAIN * before.1
+}
+
+/// What is said of a compensation that takes nothing off; of readings of the thermometer with the rate before the compensation and
+/// after it, deg/s, the applied rate subtracted.
+pub fn warning(
+    thermometer: &str,
+    readings: impl Iterator<Item = [f64; 3]> + Clone,
+) -> Option<Warning> {
+    gains_nothing(readings.clone()).then(|| {
+        let rates = || readings.clone().map(|r| r[1]);
+        let low = rates().fold(f64::INFINITY, f64::min);
+        let high = rates().fold(f64::NEG_INFINITY, f64::max);
+        let said = format!(
+            "the compensation takes nothing of the drift off: the rate runs from {} to {} deg/s before it and varies as much after it. \
+             Either it does not follow {thermometer}, or the gyro was turned. Cut the rows in which it turned, or give the applied \
+             rate as rate_dps",
+            number(low, 4),
+            number(high, 4)
+        );
+        Warning::general("no_gain", said)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Readings from 20 to 44 degC, by their number of 2400: before the compensation and after it, deg/s.
+    fn nothing_gained(before: fn(u32) -> f64, after: fn(u32) -> f64) -> bool {
+        gains_nothing((0..2400).map(|k| [20.0 + f64::from(k) / 100.0, before(k), after(k)]))
+    }
+
+    fn noise(k: u32) -> f64 {
+        if k.is_multiple_of(2) { 1.0 } else { -1.0 }
+    }
+
+    fn slope(k: u32) -> f64 {
+        f64::from(k) / 10_000.0
+    }
+
+    #[test]
+    fn a_mean_that_is_taken_off_is_no_gain_and_a_small_drift_in_noise_is_one() {
+        // Turned for half of the record: the mean of 2.5 deg/s is a good part of the rms.
+        let turned = |k: u32| if k < 1200 { 0.0 } else { 5.0 };
+        assert!(nothing_gained(turned, |k| if k < 1200 {
+            -2.5
+        } else {
+            2.5
+        }));
+        // The noise hides the drift from the standard deviation, and the means over bins show it.
+        assert!(!nothing_gained(|k| slope(k) + noise(k), noise));
+        // Half of the drift remains, and half of the standard deviation.
+        assert!(!nothing_gained(slope, |k| slope(k) / 2.0));
+        // Nothing is left of nothing.
+        assert!(!nothing_gained(|_| 3.0, |_| 0.0));
+    }
+}
