@@ -2,18 +2,28 @@
 
 use crate::selftest::controls::Controls;
 use crate::statistics::blocks::Role;
+use crate::statistics::stats;
 use crate::text::number;
 use crate::thermal::close::Closed;
 use crate::thermal::effects::covariate::of_another_axis;
 use crate::thermal::firmware::emitted::Emitted;
+use crate::thermal::search::declared;
 use crate::verdict::{Closure, Verdict};
 use std::collections::BTreeSet;
 use std::path::Path;
 
 /// What the terminal says of a record's closing that is not in `closure.json`.
 pub(super) struct Said {
+    /// The fitted polynomial in the thermometer, as an equation.
+    polynomial: String,
     /// What each cause adds to the rate output.
     equations: Vec<String>,
+    /// The column that tells the temperature.
+    thermometer: String,
+    /// rms of the rows that judge, as read, deg/s.
+    as_read_rms: f64,
+    /// How many these are.
+    judging: usize,
     /// Part of the rows that judge, and part that choose.
     roles: [f64; 2],
 }
@@ -21,18 +31,67 @@ pub(super) struct Said {
 impl Said {
     /// Of a closing.
     pub(super) fn of(closed: &Closed) -> Self {
+        let c = &closed.channels;
         let terms = closed.after.terms.iter();
         let roles = &closed.split.roles;
         let share = |role: Role| {
             roles.iter().filter(|r| **r == role).count() as f64 / roles.len().max(1) as f64
         };
+        let judging = closed.split.judging();
+        let rows = c.error_dps.iter().zip(&judging).zip(&closed.accidents);
+        let rows =
+            rows.filter(|((e, judging), accident)| **judging && !**accident && e.is_finite());
+        let as_read: Vec<f64> = rows.map(|((error, _), _)| *error).collect();
+        let powers: Vec<f64> = closed
+            .after
+            .beta
+            .iter()
+            .copied()
+            .take(declared(c).len())
+            .collect();
         Said {
-            equations: terms
-                .map(|t| t.candidate.equation(&closed.channels, &t.point))
-                .collect(),
+            polynomial: polynomial(&powers, &c.thermometer, [c.centre, c.half]),
+            equations: terms.map(|t| t.candidate.equation(c, &t.point)).collect(),
+            thermometer: c.thermometer.clone(),
+            as_read_rms: stats::rms(&as_read),
+            judging: as_read.len(),
             roles: [Role::Judge, Role::Choose].map(share),
         }
     }
+
+    /// Whether an equation has the temperature in it.
+    fn has_temperature(&self) -> bool {
+        let is_word = |c: char| c.is_alphanumeric() || c == '_';
+        let mut words = self.equations.iter().flat_map(|e| e.split(|c| !is_word(c)));
+        words.any(|word| word == "T")
+    }
+}
+
+/// A polynomial in the scaled reading of a thermometer, deg/s.
+fn polynomial(coefficients: &[f64], thermometer: &str, [centre, half]: [f64; 2]) -> String {
+    let [constant, powers @ ..] = coefficients else {
+        return String::new();
+    };
+    let signed = |value: f64| match value < 0.0 {
+        true => format!("- {}", number(-value, 5)),
+        false => format!("+ {}", number(value, 5)),
+    };
+    let mut out = number(*constant, 5);
+    for (k, c) in powers.iter().enumerate() {
+        out += &format!(" {} u", signed(*c));
+        if k > 0 {
+            out += &format!("^{}", k + 1);
+        }
+    }
+    out += " deg/s";
+    if !powers.is_empty() {
+        out += &format!(
+            "; u = ({thermometer} {}) / {}",
+            signed(-centre),
+            number(half, 5)
+        );
+    }
+    out
 }
 
 /// Prints a closure; `out` is where its files are.
@@ -44,16 +103,13 @@ pub(super) fn print(
     out: &Path,
 ) {
     if !c.steps.is_empty() {
-        causes(c, said);
+        causes(c);
+    }
+    if let Some(said) = said {
+        contributions(c, said);
     }
     say!("{}", sentence(c));
-    say!(
-        "held-out rms {:.5} -> {:.5} {}, noise floor {:.5}",
-        c.before.heldout_rms,
-        c.after.heldout_rms,
-        c.unit_text(),
-        c.noise_floor_rms
-    );
+    say!("{}", errors(c, said));
     if let Some(rms) = c.firmware.heldout_rms {
         say!(
             "firmware's model, bit for bit{}: held-out rms {rms:.5} {}",
@@ -82,27 +138,50 @@ pub(super) fn print(
     super::common::wrote(out, &next);
 }
 
-/// The causes: a table, what its signs and names say, and what each cause adds to the output.
-fn causes(c: &Closure, said: Option<&Said>) {
+/// The causes: a table, and what its signs and names say.
+fn causes(c: &Closure) {
     super::terminal::show(&table(c));
     let deviations = c.steps.iter().flat_map(|s| s.parameter_std.values());
     if deviations.into_iter().any(|std| *std > 0.0) {
         say!("+-: one standard deviation");
     }
+    say!("p: the probability that noise alone lets the best of all effects do as well");
     covariates(c);
-    let Some(said) = said else {
-        return;
-    };
+}
+
+/// What the declared bias and each cause add to the output.
+fn contributions(c: &Closure, said: &Said) {
     say!(
-        "what a cause adds to rate_out_dps{}:",
+        "what is in rate_out_dps{}:",
         match c.firmware.compensable {
             true => ", and firmware subtracts",
             false => "",
         }
     );
+    say!("  polynomial: {}", said.polynomial);
     for (step, equation) in c.steps.iter().zip(&said.equations) {
         say!("  {}: {equation}", step.effect);
     }
+    if said.has_temperature() {
+        say!("T: the temperature, degC, that {} tells", said.thermometer);
+    }
+}
+
+/// The errors from the readings on, a step at a time.
+fn errors(c: &Closure, said: Option<&Said>) -> String {
+    let (before, after, floor) = (c.before.heldout_rms, c.after.heldout_rms, c.noise_floor_rms);
+    let unit = c.unit_text();
+    let Some(said) = said else {
+        return format!("held-out rms {before:.5} -> {after:.5} {unit}, noise floor {floor:.5}");
+    };
+    let causes = match c.steps.is_empty() {
+        true => String::new(),
+        false => format!("{after:.5} after the causes too; "),
+    };
+    format!(
+        "held-out rms, {unit}: {:.5} as read; {before:.5} after the polynomial; {causes}noise floor {floor:.5}",
+        said.as_read_rms
+    )
 }
 
 /// A row for each cause.
@@ -151,9 +230,9 @@ fn covariates(c: &Closure) {
     }
 }
 
-/// What the rows served for, and why `run` has other held-out figures: a line each.
+/// What the rows served for, what the noise floor is, and why `run` has other figures: a line each.
 fn held_out(said: Option<&Said>) -> String {
-    let Some(Said { roles, .. }) = said else {
+    let Some(Said { roles, judging, .. }) = said else {
         return "held out: a part of the capture that no fit used".to_owned();
     };
     let [judge, choose] = roles.map(|share| (100.0 * share).round());
@@ -167,8 +246,13 @@ fn held_out(said: Option<&Said>) -> String {
              record is too short to keep others for it alone."
         ),
     };
+    // Standard deviation of the rms of so many independent values of a normal law.
+    let chance = (100.0 / (2.0 * (*judging).max(1) as f64).sqrt()).round();
     format!(
-        "{which}\nThe held-out rms of `run` is not comparable: there each block of rows is predicted from all others."
+        "{which}\nnoise floor: white noise, from differences of neighbouring residuals. The held-out rms has slow noise in it as \
+         well, and being of {judging} rows it is off by {chance} % by chance alone (one standard deviation).\n`run` has other figures: its \
+         held-out rms is of blocks that are each predicted from all other rows, and its noise floor is of the residuals of a \
+         polynomial."
     )
 }
 
@@ -199,24 +283,136 @@ fn sentence(c: &Closure) -> String {
             )
         }
         Verdict::Unexplained => {
-            format!("unexplained: something is left that none of the known effects makes{channel}")
+            let what = format!(
+                "unexplained: something is left that none of the known effects makes{channel}"
+            );
+            let only = match c.firmware.compensable {
+                true => " The firmware subtracts the polynomial alone.",
+                false => "",
+            };
+            match c.unit {
+                "deg/s" => format!(
+                    "{what}.{only} report.html says what to measure next; a cause that you suspect is tried as a formula in [[effects]] \
+                     of the design"
+                ),
+                _ => what,
+            }
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Said, held_out, with_deviation};
+    use super::{Said, errors, held_out, polynomial, sentence, with_deviation};
+    use crate::verdict::{Closure, Errors, FirmwareErrors, SCHEMA, Step, Structure, Verdict};
+    use std::collections::BTreeMap;
+
+    fn of_roles(roles: [f64; 2], judging: usize) -> Said {
+        Said {
+            polynomial: String::new(),
+            equations: Vec::new(),
+            thermometer: "die_degc".to_owned(),
+            as_read_rms: 1.55,
+            judging,
+            roles,
+        }
+    }
+
+    fn closure(unit: &'static str, steps: usize) -> Closure {
+        let errors = |heldout_rms| Errors {
+            heldout_rms,
+            ..Errors::default()
+        };
+        let step = Step {
+            effect: "thermal_lag".to_owned(),
+            channels: Vec::new(),
+            parameters: BTreeMap::new(),
+            parameter_std: BTreeMap::new(),
+            heldout_rms: 0.02,
+            p_value: 1e-9,
+            selection_frequency: 1.0,
+            indistinguishable_from: Vec::new(),
+            separating_experiment: None,
+        };
+        Closure {
+            schema: SCHEMA,
+            version: "0",
+            design_sha256: String::new(),
+            command: String::new(),
+            verdict: Verdict::of(steps, true),
+            unit,
+            noise_floor_rms: 0.01,
+            before: errors(0.5),
+            steps: vec![step; steps],
+            after: errors(if steps > 0 { 0.02 } else { 0.5 }),
+            firmware: FirmwareErrors {
+                compensable: true,
+                ..FirmwareErrors::default()
+            },
+            residual_structure: Structure {
+                left: true,
+                strongest_channel: Some("die_degc".to_owned()),
+            },
+            evidence: Vec::new(),
+            warnings: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn errors_begin_with_the_readings_and_name_each_step() {
+        let said = of_roles([0.07, 0.2], 42);
+        assert_eq!(
+            errors(&closure("deg/s", 1), Some(&said)),
+            "held-out rms, deg/s: 1.55000 as read; 0.50000 after the polynomial; 0.02000 after the causes too; noise floor 0.01000"
+        );
+        assert_eq!(
+            errors(&closure("deg/s", 0), Some(&said)),
+            "held-out rms, deg/s: 1.55000 as read; 0.50000 after the polynomial; noise floor 0.01000"
+        );
+        assert_eq!(
+            errors(&closure("lsb", 1), None),
+            "held-out rms 0.50000 -> 0.02000 LSB, noise floor 0.01000"
+        );
+    }
+
+    #[test]
+    fn what_is_unexplained_says_what_firmware_does_and_what_helps() {
+        let said = sentence(&closure("deg/s", 0));
+        for part in [
+            "most of it in die_degc.",
+            "subtracts the polynomial alone",
+            "[[effects]]",
+        ] {
+            assert!(said.contains(part), "{said}");
+        }
+        assert!(!sentence(&closure("lsb", 0)).contains("polynomial"));
+    }
+
+    #[test]
+    fn the_polynomial_is_an_equation_in_the_thermometer() {
+        assert_eq!(
+            polynomial(&[120.25, -80.02, 13.507], "phase_rad", [-1.8187, 0.3141]),
+            "120.25 - 80.020 u + 13.507 u^2 deg/s; u = (phase_rad + 1.8187) / 0.31410"
+        );
+        assert_eq!(polynomial(&[0.5], "die_degc", [25.0, 1.0]), "0.50000 deg/s");
+    }
+
+    #[test]
+    fn the_temperature_of_an_equation_is_told_from_other_words() {
+        let has = |equation: &str| {
+            let said = Said {
+                equations: vec![equation.to_owned()],
+                ..of_roles([0.0, 0.2], 10)
+            };
+            said.has_temperature()
+        };
+        assert!(has("gain (T - T_l)") && has("x = (T - center) / half width"));
+        assert!(!has("a Tilt of T_l") && !has("f(supply_v)"));
+    }
 
     #[test]
     fn held_out_rows_are_told_apart_from_those_of_run() {
-        let said = |judge, choose| {
-            let said = Said {
-                equations: Vec::new(),
-                roles: [judge, choose],
-            };
-            held_out(Some(&said))
-        };
+        let said = |judge, choose| held_out(Some(&of_roles([judge, choose], 50)));
         let both = said(0.06, 0.2);
         assert!(
             both.starts_with(
@@ -230,7 +426,11 @@ mod tests {
             "{one}"
         );
         for text in [both, one] {
-            assert_eq!(text.lines().count(), 2, "{text}");
+            assert_eq!(text.lines().count(), 3, "{text}");
+            assert!(
+                text.contains("of 50 rows it is off by 10 % by chance"),
+                "{text}"
+            );
         }
     }
 

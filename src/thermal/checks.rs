@@ -250,17 +250,32 @@ fn extrapolation(c: &Checked<'_>) -> Option<Warning> {
     })
 }
 
-/// The loop, if it is more than noise, or larger than noise makes it on the whole.
-fn loop_warning(c: &Checked<'_>) -> Option<Warning> {
-    let l = c.sweep_loop?;
-    let seen = format!(
+/// Heating against cooling in figures.
+fn seen(fit: &BaselineFit, l: Loop) -> String {
+    format!(
         "at the same reading of {} the error differs by {} deg/s rms between rising and falling sweeps; by chance, \
          residuals with the same rms and autocorrelation would make a difference of {} deg/s rms ({} places compared)",
-        c.fit.thermometer,
+        fit.thermometer,
         g(l.rms_dps),
         g(l.noise_dps),
         l.bins
+    )
+}
+
+/// The loop of a record that no known effect explains, if it is more than noise.
+pub(super) fn unexplained_loop(fit: &BaselineFit) -> Option<Warning> {
+    let l = fit.sweep_loop.filter(|l| l.significant)?;
+    let said = format!(
+        "{}. No function of the thermometer can follow that, and none of the known effects makes it",
+        seen(fit, l)
     );
+    Some(Warning::on("heating_cooling_loop", &fit.thermometer, said))
+}
+
+/// The loop, if it is more than noise, or larger than noise makes it on the whole.
+fn loop_warning(c: &Checked<'_>) -> Option<Warning> {
+    let l = c.sweep_loop?;
+    let seen = seen(c.fit, l);
     if l.significant {
         Some(Warning::on(
             "heating_cooling_loop",

@@ -4,8 +4,9 @@ mod carried;
 mod evidence;
 mod remarks;
 
-use super::baseline;
+use super::baseline::{self, BaselineFit};
 use super::channels::Channels;
+use super::checks;
 use super::effects::{Candidate, user};
 use super::intake::{Intake, refused};
 use super::search::{Effort, Found, Model, Search};
@@ -122,7 +123,8 @@ pub fn close(
     let record: &ThermalRecord = &taken.intake.record;
     let refuse = |why: String| refused(record, why);
     let mut warnings = taken.intake.warnings.clone();
-    Warning::add_of_fit(&mut warnings, course(record, design));
+    let fit = baseline::fit(record, &design.record, &design.fit).ok();
+    Warning::add_of_fit(&mut warnings, fit.as_ref().and_then(course));
     warnings.extend(no_judges(&taken.intake.split));
     let whole = taken.intake.whole();
     let (closure, before, after, accidents, firmware) = {
@@ -148,6 +150,9 @@ pub fn close(
         };
         let mut closure = told.closure().map_err(unusable)?;
         told.warn(&mut warnings);
+        if closure.verdict == Verdict::Unexplained {
+            warnings.extend(fit.as_ref().and_then(checks::unexplained_loop));
+        }
         let firmware = told.firmware(record, design, &mut warnings);
         closure.firmware = firmware
             .as_ref()
@@ -171,10 +176,10 @@ pub fn close(
 }
 
 /// What `run` says of a record that was heated or cooled alone, where names of effects in time mean less, or not at all.
-fn course(record: &ThermalRecord, design: &Design) -> Option<Warning> {
-    let fit = baseline::fit(record, &design.record, &design.fit).ok()?;
-    let mut warnings = fit.warnings.into_iter();
-    warnings.find(|w| ["one_direction", "thermometer_constant"].contains(&w.code))
+fn course(fit: &BaselineFit) -> Option<Warning> {
+    let mut warnings = fit.warnings.iter();
+    let is_meant = |w: &&Warning| ["one_direction", "thermometer_constant"].contains(&w.code);
+    warnings.find(is_meant).cloned()
 }
 
 /// What is said of a record without rows that do nothing but judge.
