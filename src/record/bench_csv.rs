@@ -72,12 +72,22 @@ pub(super) fn table(
         None if says_volts || !rows.iter().all(whole) => {
             // In whole volts the first row is as good as any.
             let row = rows.iter().position(|r| !whole(r)).unwrap_or(0);
-            let is_none = |k: &usize| rows[row].get(*k).is_some_and(|v| v.fract() != 0.0);
+            let is_none = |k: &usize| {
+                named.volts(*k).is_some() || rows[row].get(*k).is_some_and(|v| v.fract() != 0.0)
+            };
             let cell = used.into_iter().find(is_none).unwrap_or(used[0]);
             let line = lines.get(before + row).map_or("", |l| l.trim_end());
             let left = line.split(char::from(separator)).take(cell);
             let column = left.map(|c| c.chars().count() + 1).sum::<usize>() + 1;
-            let mut error = no_scale(path, &named, used, &rows).at(number + before + row, column);
+            let shown = named.shown(cell);
+            let what = match rows[row].get(cell) {
+                Some(value) if named.volts(cell).is_none() => {
+                    format!("{value} in {shown} is no integer")
+                }
+                _ => format!("{shown} is a voltage"),
+            };
+            let mut error =
+                no_scale((path, &what), &named, used, &rows).at(number + before + row, column);
             error.source_line = Some(line.to_owned());
             return Err(error.into());
         }

@@ -27,10 +27,10 @@ pub(super) fn in_unit(path: &Path, scale: Scale, named: &Named, used: [usize; 2]
     })
 }
 
-/// An error that asks for the scale, without the place of what is no code; with the step that the values stand on, where they
-/// do.
+/// An error that asks for the scale, without the place of `what`, which is no code; with the step that the values stand on, where
+/// they do.
 pub(super) fn no_scale(
-    path: &Path,
+    (path, what): (&Path, &str),
     named: &Named,
     used: [usize; 2],
     rows: &[Vec<f64>],
@@ -39,10 +39,10 @@ pub(super) fn no_scale(
     let seen = step(used, rows).map_or(String::new(), |step| {
         format!("; the values stand on steps of about {:.5e} V", step * unit)
     });
-    InputError::new("the columns are no codes, and the capture does not say what a code is")
+    InputError::new(format!("{what}, and the capture does not say what a code is"))
         .in_file(path)
         .help(format!(
-            "write `volts_per_code = 0.0001` (the ADC's volts for one code; and `volts_at_code_0 = 0.0` where that is not 0) into {} \
+            "codes are integers; for voltages write `volts_per_code = 0.0001` (the ADC's volts for one code; and `volts_at_code_0 = 0.0` where that is not 0) into {} \
              beside it, or as `# key = value` lines before the header{seen}",
             sidecar_name(path)
         ))

@@ -207,14 +207,25 @@ fn what_is_not_said_is_asked_for_with_the_keys() {
 
 #[test]
 fn what_is_no_code_is_shown_at_its_place() {
-    for (text, line, column) in [
-        ("drive,sense\n1,2\n3,4\n5,6.5\n7,8\n", 4, 3),
+    for (text, line, column, what) in [
+        (
+            "drive,sense\n1,2\n3,4\n5,6.5\n7,8\n",
+            4,
+            3,
+            "6.5 in column 1, \"sense\" is no integer",
+        ),
         (
             "# by hand\n\ndrive;t;sense\n0,5;0,1;2\n3;0,2;4\n5;0,3;6\n",
             4,
             1,
+            "0.5 in column 0, \"drive\" is no integer",
         ),
-        ("drive (V),sense (V)\n1,2\n3,4\n5,6\n", 2, 1),
+        (
+            "drive (V),sense (V)\n1,2\n3,4\n5,6\n",
+            2,
+            1,
+            "column 0, \"drive (V)\" is a voltage",
+        ),
     ] {
         let error = csv(text).rows(Q15, 9).1.unwrap();
         assert_eq!(
@@ -224,7 +235,7 @@ fn what_is_no_code_is_shown_at_its_place() {
         );
         let told = error.to_string();
         assert!(
-            told.contains("the columns are no codes") && told.contains("volts_per_code = 0.0001"),
+            told.contains(what) && told.contains("volts_per_code = 0.0001"),
             "{told}"
         );
     }
