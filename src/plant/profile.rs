@@ -20,6 +20,9 @@ pub struct Surroundings {
     pub accel_g: f64,
 }
 
+/// Temperatures that a gyro may work at, degC: beyond, the laws of the simulated one mean nothing.
+pub const TEMPERATURES_DEGC: (f64, f64) = (-100.0, 250.0);
+
 /// The supply where a profile says nothing of it, V.
 pub const NOMINAL_SUPPLY_V: f64 = 5.0;
 
@@ -27,6 +30,8 @@ pub const NOMINAL_SUPPLY_V: f64 = 5.0;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Profile {
     corners: Vec<Surroundings>,
+    /// The line of each corner in its file; empty for a profile that is of none.
+    lines: Vec<u64>,
     /// Which of rate, supply and acceleration it states.
     pub has: [bool; 3],
 }
@@ -68,14 +73,19 @@ impl Profile {
             }
         }
         corners.push(at_rest(time_s, last));
-        let has = [false; 3];
-        (Profile { corners, has }, readings)
+        let profile = Profile {
+            corners,
+            lines: Vec::new(),
+            has: [false; 3],
+        };
+        (profile, readings)
     }
 
     /// A chamber that stays at a temperature.
     pub fn constant(chamber_degc: f64) -> Profile {
         Profile {
             corners: vec![at_rest(0.0, chamber_degc)],
+            lines: Vec::new(),
             has: [false; 3],
         }
     }
@@ -84,7 +94,7 @@ impl Profile {
     /// `supply_v`, `accel_g`; other columns are not looked at.
     ///
     /// # Errors
-    /// A file that cannot be read; a missing column, a cell that is no number, a time that decreases.
+    /// A file that cannot be read; a missing column, a cell that is no number, a time that decreases; one time in all rows.
     pub fn read(path: &Path) -> Result<Profile> {
         let bytes = input::text_bytes(
             input::open(path, "profile")?,
@@ -93,6 +103,15 @@ impl Profile {
             input::MOST_OF_A_RECORD,
         )?;
         parse(&bytes, path)
+    }
+
+    /// The first corner at a temperature that no gyro works at, degC, and the line of its file, where it is of one.
+    pub fn beyond(&self) -> Option<(f64, Option<u64>)> {
+        let (coldest, hottest) = TEMPERATURES_DEGC;
+        let is_beyond = |c: &Surroundings| !(coldest..=hottest).contains(&c.chamber_degc);
+        let place = self.corners.iter().position(is_beyond)?;
+        let corner = self.corners.get(place)?;
+        Some((corner.chamber_degc, self.lines.get(place).copied()))
     }
 
     /// s, from the first to the last corner.
@@ -229,6 +248,7 @@ fn parse(bytes: &[u8], path: &Path) -> Result<Profile> {
     ];
     let missing = [0.0, 0.0, 0.0, NOMINAL_SUPPLY_V, 0.0];
     let mut corners: Vec<Surroundings> = Vec::new();
+    let mut lines = Vec::new();
     for record in reader.records() {
         let record = record.map_err(broken)?;
         let line = record.position().map_or(0, csv::Position::line);
@@ -256,6 +276,7 @@ fn parse(bytes: &[u8], path: &Path) -> Result<Profile> {
             let message = format!("the profile has the time {time_s} s after a later one");
             return Err(refuse(message, line, None).into());
         }
+        lines.push(line);
         corners.push(Surroundings {
             time_s,
             chamber_degc,
@@ -264,11 +285,23 @@ fn parse(bytes: &[u8], path: &Path) -> Result<Profile> {
             accel_g,
         });
     }
-    if corners.is_empty() {
+    let (Some(first), Some(last), Some(line)) = (corners.first(), corners.last(), lines.last())
+    else {
         return Err(refuse("the profile has no rows".to_owned(), 1, None).into());
+    };
+    if last.time_s <= first.time_s {
+        let message = format!(
+            "the profile lasts no time: time_s is {} in every row",
+            first.time_s
+        );
+        return Err(refuse(message, *line, None).into());
     }
     let has = [places[2], places[3], places[4]].map(|p| p.is_some());
-    Ok(Profile { corners, has })
+    Ok(Profile {
+        corners,
+        lines,
+        has,
+    })
 }
 
 /// Where a cell starts in its line, counted from 1, if no cell before it was quoted.

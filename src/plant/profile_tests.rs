@@ -55,12 +55,26 @@ fn what_is_no_profile_is_refused_with_its_place() {
         ("time_s,chamber_degc\n5,20\n0,20\n", "p.csv:3:1"),
         ("time_s,chamber_degc\n0,-300\n", "p.csv:2:1"),
         ("time_s,chamber_degc\n0,20,7\n", "p.csv:2:1"),
+        ("time_s,chamber_degc\n0,25\n0,30\n", "p.csv:3:1"),
+        (
+            "time_s,chamber_degc\n7,25\n",
+            "lasts no time: time_s is 7 in",
+        ),
         ("time_s,chamber_degc\n", "p.csv:1:1"),
         ("", "p.csv:1:1"),
     ] {
         let e = parse(text.as_bytes(), Path::new("p.csv")).expect_err(text);
         assert!(e.to_string().contains(words), "{text:?}: {e}");
     }
+}
+
+#[test]
+fn a_temperature_that_no_gyro_works_at_has_its_line() {
+    let of = |degc: f64| profile(&format!("time_s,chamber_degc\n0,25\n600,{degc}\n900,20\n"));
+    assert_eq!(of(900.0).beyond(), Some((900.0, Some(3))));
+    assert_eq!(of(-101.0).beyond(), Some((-101.0, Some(3))));
+    assert_eq!(of(125.0).beyond(), None);
+    assert_eq!(Profile::constant(300.0).beyond(), Some((300.0, None)));
 }
 
 #[test]

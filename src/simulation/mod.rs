@@ -16,9 +16,10 @@ pub mod trace;
 
 use crate::cosim::readings::{self, Options, Taken};
 use crate::design::Design;
-use crate::error::{InputError, Result};
+use crate::error::Result;
 use crate::job::calibration::{self, Calibration};
-use crate::plant::profile::{Profile, Reading};
+use crate::output::name_of;
+use crate::plant::profile::{Profile, Reading, TEMPERATURES_DEGC};
 use crate::record::{self, Warning};
 use outcome::Outcome;
 pub use request::{Course, Progress, Request, Run};
@@ -33,9 +34,11 @@ pub fn simulate(design: &Design, request: &Request, progress: Progress) -> Resul
         compensation: None,
         ..design.clone()
     };
+    let mut warnings = Vec::new();
     let run = match &request.course {
         Course::ThermalRun => {
             let (profile, readings) = Profile::of_run(&design.thermal_run, reading_s(design));
+            warnings.extend(beyond(&profile, "[thermal_run]"));
             let taken = warm(
                 &uncompensated,
                 &profile,
@@ -52,7 +55,8 @@ pub fn simulate(design: &Design, request: &Request, progress: Progress) -> Resul
         }
         Course::Profile(path) => {
             let profile = Profile::read(path)?;
-            let readings = readings_along(&profile, path, request.profile_readings)?;
+            warnings.extend(beyond(&profile, &name_of(path)));
+            let readings = profile.even_readings(request.profile_readings);
             let taken = warm(
                 &uncompensated,
                 &profile,
@@ -72,7 +76,6 @@ pub fn simulate(design: &Design, request: &Request, progress: Progress) -> Resul
         }
     };
     let csv = record_csv::text(design, &run);
-    let mut warnings = Vec::new();
     let calibrated = if is_worth_a_fit(&run) {
         match calibrate(design, &csv) {
             Ok(calibrated) => Some(calibrated),
@@ -168,23 +171,24 @@ fn warm(
     readings::take(design, readings, &moments, options, &said)
 }
 
-fn readings_along(profile: &Profile, path: &Path, count: u64) -> Result<Vec<Reading>> {
-    if profile.duration_s() <= 0.0 {
-        return Err(InputError::new("lasts no time")
-            .in_file(path)
-            .help("give at least two rows with different times")
-            .into());
-    }
-    Ok(profile.even_readings(count))
+/// What is said of a chamber at a temperature that no gyro works at; `place` is the file or the table that asks for it.
+fn beyond(profile: &Profile, place: &str) -> Option<Warning> {
+    let (degc, line) = profile.beyond()?;
+    let line = line.map_or(String::new(), |line| format!(":{line}"));
+    let (coldest, hottest) = TEMPERATURES_DEGC;
+    let said = format!(
+        "{place}{line}: the chamber is at {degc} degC, and no gyro works beyond {coldest} to {hottest} degC. The laws of the simulated \
+         gyro mean nothing there, and no figure of this run does"
+    );
+    Some(Warning::general("chamber_beyond", said))
 }
 
 /// The compensation that the record gives, through the same door as a measured one.
 fn calibrate(design: &Design, csv: &str) -> Result<(Design, Calibration)> {
-    let (record, mut warnings) =
+    // What its reader finds unlikely has remedies for a file, and this one is made here.
+    let (record, _) =
         record::thermal::parse(csv.as_bytes(), Path::new("record.csv"), &Default::default())?;
     let mut fitted = design.clone();
-    let mut calibration = calibration::calibrate(&mut fitted, &record, true)?;
-    warnings.append(&mut calibration.warnings);
-    calibration.warnings = warnings;
+    let calibration = calibration::calibrate(&mut fitted, &record, true)?;
     Ok((fitted, calibration))
 }

@@ -229,6 +229,26 @@ fn a_profile_with_rate_supply_and_acceleration_has_their_columns() {
 }
 
 #[test]
+fn a_chamber_that_no_gyro_works_in_is_told_at_its_line_and_not_of_the_record() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let profile = folder.path().join("hot.csv");
+    std::fs::write(&profile, "time_s,chamber_degc\n0,25\n600,900\n1200,25\n").expect("written");
+    let out = folder.path().join("out");
+    let along = ["--profile", text(&profile), "--readings", "30"];
+    let output = gyrogen_here(&[&["simulate", "--out", text(&out)], &along[..]].concat());
+    let talk = told(&output);
+    assert_eq!(talk.matches("chamber_beyond").count(), 1, "{talk}");
+    assert!(
+        talk.contains("warning: hot.csv:3: the chamber is at 900 degC"),
+        "{talk}"
+    );
+    // Remedies for a measured file.
+    for word in ["Leave cells", "[record.columns]", "Unwrap"] {
+        assert!(!talk.contains(word), "{word}: {talk}");
+    }
+}
+
+#[test]
 fn what_cannot_be_simulated_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("out");
