@@ -79,8 +79,8 @@ pub struct Arguments {
     /// Prefix of the emitted names: a C identifier.
     #[arg(long, default_value = "approx")]
     name: String,
-    /// Threads, 1 to 256; as many as the machine has if left out. The result does not depend on it.
-    #[arg(long, value_name = "N", value_parser = super::values::whole::<u16>(1..=256))]
+    /// Threads, 1 to 1024; as many as the machine has if left out. The result does not depend on it.
+    #[arg(long, value_name = "N", value_parser = super::values::whole::<u16>(1..=1024))]
     threads: Option<u16>,
     /// Folder for the results; made if it does not exist.
     #[arg(long, value_name = "DIR", default_value = "gyrogen-approx")]
@@ -137,7 +137,9 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let page = crate::report::approx::html(&made)?;
     results.write("report.html", page.as_bytes())?;
     watch.write(&mut results, &made.outcome.design_sha256, &recorded.command)?;
+    let note = super::earlier::note(&arguments.out, "approx.json", "request", &json);
     results.finish()?;
+    note.iter().for_each(|note| talk!("{note}"));
     match arguments.format {
         OutputFormat::Json => super::terminal::give(&json),
         OutputFormat::Text => print(&made.outcome, &arguments.out),
@@ -215,8 +217,8 @@ fn print(o: &Outcome, out: &std::path::Path) {
         let marked = listed.iter().map(|a| (a.undominated, a.chosen));
         say!("{}", alternatives::marks(marked));
         say!(
-            "Certified errors in this table are bounds that are proved quickly. That of the chosen form is proved again below, from more \
-             input codes, and may be smaller."
+            "Certified errors in this table are quick bounds, which are proved but need not be tight. That of the chosen form is computed again \
+             below, more closely, and may be smaller."
         );
     }
     if let Some(search) = &o.search {
@@ -255,7 +257,12 @@ fn print(o: &Outcome, out: &std::path::Path) {
         ))
     );
     let lsb = f.output.parse::<Format>().map_or(1.0, Format::lsb);
-    let mut table = super::terminal::table(&["largest error", "value", "LSB of the output", "of"]);
+    let mut table = super::terminal::table(&[
+        "largest error",
+        "value",
+        "LSB of the output",
+        "of what, and where",
+    ]);
     // A bound is rounded up, what was seen to the nearest, as in the table of coefficients.
     let mut row = |what: &str, v: f64, of: String| {
         let shown = if what == "observed" { number } else { at_most };

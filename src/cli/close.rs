@@ -193,7 +193,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     });
     results.write("closure.json", json.as_bytes())?;
     watch.write(&mut results, &closure.design_sha256, &recorded.command)?;
-    let note = super::earlier::note(out, "closure.json", &json);
+    let note = super::earlier::note(out, "closure.json", super::earlier::MEASURED, &json);
     results.finish()?;
     note.iter().for_each(|note| talk!("{note}"));
     match arguments.format {

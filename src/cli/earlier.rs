@@ -5,13 +5,16 @@ use crate::text::{Place, shown};
 use serde_json::Value;
 use std::path::Path;
 
-/// Keys of a result that are the same only for the same design and the same measurement: the text's digest, and the
-/// errors before anything was fitted.
+/// Keys of a result that are the same only for the same design and the same measurement: the text's digest (without a design that of
+/// the request), and the errors before anything was fitted, where there are such.
 const WHOSE: [&str; 2] = ["design_sha256", "before"];
 
+/// What a result of a record or a capture is of.
+pub(super) const MEASURED: &str = "measurement or design";
+
 /// What is replaced where `json` takes the place of the result `name` in `folder`; `None` where there is none, and for
-/// the same measurement and design. To be asked before the results are put into the folder.
-pub(super) fn note(folder: &Path, name: &str, json: &str) -> Option<String> {
+/// the same `of`. To be asked before the results are put into the folder.
+pub(super) fn note(folder: &Path, name: &str, of: &str, json: &str) -> Option<String> {
     let text = Folder::open(folder).and_then(|f| f.read_text(name)).ok()?;
     let read = |text: &str| serde_json::from_str::<Value>(text).ok();
     let (earlier, new) = (read(&text)?, read(json)?);
@@ -19,7 +22,7 @@ pub(super) fn note(folder: &Path, name: &str, json: &str) -> Option<String> {
         return None;
     }
     let note = format!(
-        "note: {} held the results of `{}`, of another measurement or design: they were replaced; to keep both, give each a folder \
+        "note: {} held the results of `{}`, of another {of}: they were replaced; to keep both, give each a folder \
          of its own with --out",
         folder.display(),
         earlier["command"].as_str()?
@@ -42,7 +45,7 @@ mod tests {
         let made = tempfile::tempdir().expect("a folder");
         let at = made.path();
         let earlier = result("gyrogen close --record r.csv", "0", 0.5);
-        let note_of = |json: &str| note(at, "closure.json", json);
+        let note_of = |json: &str| note(at, "closure.json", MEASURED, json);
         assert_eq!(note_of(&earlier), None, "nothing was there");
         std::fs::write(at.join("closure.json"), &earlier).expect("written");
         let again = result("gyrogen close --record r.csv --verify", "0", 0.5);
@@ -55,5 +58,14 @@ mod tests {
             assert!(said.contains("`gyrogen close --record r.csv`"), "{said}");
             assert!(said.contains("--out"), "{said}");
         }
+        // Without errors before a fit, as of a function: the digest decides.
+        let of = |design: &str| {
+            serde_json::json!({ "command": "gyrogen approx", "design_sha256": design }).to_string()
+        };
+        std::fs::write(at.join("approx.json"), of("0")).expect("written");
+        let note_of = |json: &str| note(at, "approx.json", "request", json);
+        assert_eq!(note_of(&of("0")), None, "the same request");
+        let said = note_of(&of("1")).expect("a note");
+        assert!(said.contains("of another request"), "{said}");
     }
 }

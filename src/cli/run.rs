@@ -104,7 +104,12 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         &outcome.summary.design_sha256,
         &recorded.command,
     )?;
-    let note = super::earlier::note(&arguments.out, "summary.json", &json);
+    let note = super::earlier::note(
+        &arguments.out,
+        "summary.json",
+        super::earlier::MEASURED,
+        &json,
+    );
     results.finish()?;
     note.iter().for_each(|note| talk!("{note}"));
     let parts = &outcome.parts;

@@ -114,6 +114,27 @@ fn a_design_file_of_the_same_name_is_known_by_its_text_and_the_designs_name() {
 }
 
 #[test]
+fn another_function_in_the_folder_of_one_is_said() {
+    let top = tempfile::tempdir().expect("a folder");
+    let of = |function: &str| {
+        let fixed =
+            "approx --domain=0,1 --degree 2 --input Q1.10 --output Q2.10 --coefficients Q2.14";
+        let mut arguments: Vec<&str> = fixed.split(' ').collect();
+        arguments.extend(["--function", function]);
+        let (status, said) = gyrogen(top.path(), &arguments);
+        assert_eq!(status, Some(0), "{said}");
+        said
+    };
+    assert!(!of("sin(x)").contains("note: "));
+    assert!(!of("sin(x)").contains("note: "), "the same again");
+    let said = of("cos(x)");
+    assert!(
+        said.contains("note: gyrogen-approx held the results of") && said.contains("sin(x)"),
+        "{said}"
+    );
+}
+
+#[test]
 fn the_firmware_of_the_other_language_stays() {
     let top = tempfile::tempdir().expect("a folder");
     let here = top.path();
