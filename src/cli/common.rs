@@ -42,6 +42,12 @@ pub(super) fn design(path: Option<&Path>) -> Result<crate::design::Design> {
         refuse_record(path)?;
     }
     let design = crate::design::reader::read(path)?;
+    if let Some(path) = path.filter(|_| sets_nothing(&design.source.text)) {
+        talk!(
+            "note: {} sets nothing: every value is the embedded default's",
+            path.display()
+        );
+    }
     crate::correction::refuse_unbuildable(&design)?;
     Ok(design)
 }
@@ -58,6 +64,12 @@ pub(super) fn claim(
         crate::output::refuse_inputs(&out.join(name), &recorded.inputs)?;
     }
     Results::claim(out, planned, &recorded.inputs).or_else(|e| look().and(Err(e)))
+}
+
+/// Whether a design's text is empty, or has nothing but comments.
+fn sets_nothing(text: &str) -> bool {
+    let mut lines = text.trim_start_matches('\u{feff}').lines().map(str::trim);
+    lines.all(|line| line.is_empty() || line.starts_with('#'))
 }
 
 /// A record in a design's place is named as what it is.
@@ -246,6 +258,16 @@ fn wrote_line(out: &Path, next: &[&str]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_design_without_a_key_or_a_table_sets_nothing() {
+        for text in ["", "\u{feff}", "\n  \n", "# name = \"a\"\n\n  # more\n"] {
+            assert!(sets_nothing(text), "{text:?}");
+        }
+        for text in ["name = \"a\"", "# a\n[record]\n"] {
+            assert!(!sets_nothing(text), "{text:?}");
+        }
+    }
 
     #[test]
     fn the_last_line_names_the_files_that_are_there() {

@@ -111,6 +111,17 @@ fn refuse_link(path: &Path) -> Result<()> {
 /// What a design emits now for a bundle's part and language, by the bundle's command.
 fn of_design(path: &Path, manifest: &Manifest) -> Result<Vec<EmittedFile>> {
     let design = super::design(Some(path))?;
+    if ["correction", "conversion"].contains(&manifest.part.as_str()) && design.correction.is_none()
+    {
+        let what = format!(
+            "the bundle is a {}, and this design has no [correction]",
+            manifest.part
+        );
+        return Err(InputError::new(what)
+            .in_file(path)
+            .help("give the design.toml that `gyrogen close` wrote beside the bundle's folder firmware")
+            .into());
+    }
     let part = match manifest.part.as_str() {
         "chain" => Part::Chain,
         // A whole chain's part where its thermometer is not the circuit's.

@@ -128,6 +128,16 @@ fn a_bundle_holds_against_its_digest_and_its_design() {
         "{}",
         told(&output)
     );
+    // A design without a correction is named, and what is wanted in its place.
+    std::fs::write(other.path().join("design.toml"), "# nothing yet\n").expect("written");
+    let output = gyrogen(&["verify", "c", "--design", "design.toml"], other.path());
+    assert_eq!(output.status.code(), Some(2));
+    for words in [
+        "note: design.toml sets nothing",
+        "design.toml: error: the bundle is a correction, and this design has no [correction]",
+    ] {
+        assert!(told(&output).contains(words), "{}", told(&output));
+    }
     // Sealed again with another command, all of it is right but for the digest.
     let command = "gyrogen emit other.toml --lang c";
     let before = "gyrogen emit design.toml --lang c";
