@@ -97,7 +97,9 @@ fn without_firmware_there_is_nothing_to_compare_and_that_is_said() {
         "{said}{talk}"
     );
     assert!(
-        talk.contains("does not see chamber_degc") && talk.contains("[not_compensable]"),
+        talk.contains("does not see chamber_degc")
+            && talk.contains("name it die_degc in [record.columns]")
+            && talk.contains("[not_compensable]"),
         "{talk}"
     );
     // What an earlier record left is not taken for this one's.

@@ -71,7 +71,9 @@ pub fn obstacles(c: &Channels, model: &Model, estimates: &[Estimate]) -> Vec<Str
     if model.bias.coefficients_dps.len() > 1 && words.thermometer().is_none() {
         let name = &c.thermometer;
         out.push(format!(
-            "firmware does not see {name}, which the declared bias is a function of"
+            "firmware does not see {name}, which the declared bias is a function of. If {name} is the gyro's own thermometer, name it \
+             die_degc in [record.columns]; else record phase_rad, freq_hz or die_degc beside it. Until then firmware carries no cause, \
+             and a formula in [[effects]] changes nothing"
         ));
     }
     for (term, estimate) in model.terms.iter().zip(estimates) {
