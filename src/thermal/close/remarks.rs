@@ -150,6 +150,14 @@ mod tests {
     use crate::thermal::close::close;
     use crate::thermal::search::Effort;
     use crate::thermal::synthetic::{Random, record};
+    use crate::verdict::{Closure, Verdict};
+
+    fn closed(degc: &[f64], output: &[f64]) -> Closure {
+        let record = record("die_degc", degc, output);
+        let design = reader::parse("", None).unwrap();
+        let closed = close(&record, Vec::new(), &design, "test", Effort::default());
+        closed.unwrap().closure
+    }
 
     /// Codes of what is said of a gyro that was turned at `turned_dps` in a tenth of its rows, over two cycles of temperature.
     fn said(turned_dps: f64) -> Vec<&'static str> {
@@ -163,16 +171,37 @@ mod tests {
                 0.1 + 0.01 * t + turned_dps * turned + 0.01 * random.normal()
             })
             .collect();
-        let record = record("die_degc", &degc, &output);
-        let design = reader::parse("", None).unwrap();
-        let closed = close(&record, Vec::new(), &design, "test", Effort::default()).unwrap();
-        let warnings = closed.closure.warnings.iter();
-        warnings.map(|w| w.code).collect()
+        let warnings = closed(&degc, &output).warnings;
+        warnings.iter().map(|w| w.code).collect()
     }
 
     #[test]
     fn a_gyro_that_was_turned_is_told_as_run_tells_it() {
         assert!(said(50.0).contains(&"no_gain"), "{:?}", said(50.0));
         assert!(!said(0.0).contains(&"no_gain"), "{:?}", said(0.0));
+    }
+    /// A play of 8 K between the die and what the bias follows: no effect of the catalogue.
+    #[test]
+    fn a_backlash_that_no_effect_makes_is_told_of_heating_and_cooling() {
+        let mut random = Random::new(4);
+        let phase = |k: u32| f64::from(k) / 200.0 * std::f64::consts::TAU;
+        let degc: Vec<f64> = (0..600).map(|k| 25.0 + 20.0 * phase(k).sin()).collect();
+        let mut behind = 25.0;
+        let output: Vec<f64> = degc
+            .iter()
+            .map(|t| {
+                behind = f64::clamp(behind, t - 4.0, t + 4.0);
+                0.1 + 0.02 * t + 0.05 * (behind - t) + 0.005 * random.normal()
+            })
+            .collect();
+        let closure = closed(&degc, &output);
+        assert_eq!(closure.verdict, Verdict::Unexplained);
+        let loops = closure.warnings.iter();
+        let loops: Vec<_> = loops.filter(|w| w.code == "heating_cooling_loop").collect();
+        let [told] = loops.as_slice() else {
+            panic!("{:?}", closure.warnings);
+        };
+        // What it sends a user of `run` to is this command.
+        assert!(!told.message.contains("gyrogen close"), "{}", told.message);
     }
 }
