@@ -20,8 +20,8 @@ pub(super) struct Said {
     equations: Vec<String>,
     /// The column that tells the temperature.
     thermometer: String,
-    /// rms of the rows that judge, as read, deg/s.
-    as_read_rms: f64,
+    /// What the readings are before anything is subtracted, and the rms of the rows that judge, deg/s.
+    as_read: (&'static str, f64),
     /// How many these are.
     judging: usize,
     /// Part of the rows that judge, and part that choose.
@@ -53,7 +53,10 @@ impl Said {
             polynomial: polynomial(&powers, &c.thermometer, [c.centre, c.half]),
             equations: terms.map(|t| t.candidate.equation(c, &t.point)).collect(),
             thermometer: c.thermometer.clone(),
-            as_read_rms: stats::rms(&as_read),
+            as_read: match c.column("rate_dps") {
+                Some(_) => ("as read less rate_dps", stats::rms(&as_read)),
+                None => ("as read", stats::rms(&as_read)),
+            },
             judging: as_read.len(),
             roles: [Role::Judge, Role::Choose].map(share),
         }
@@ -178,9 +181,9 @@ fn errors(c: &Closure, said: Option<&Said>) -> String {
         true => String::new(),
         false => format!("{after:.5} after the causes too; "),
     };
+    let (as_read, rms) = said.as_read;
     format!(
-        "held-out rms, {unit}: {:.5} as read; {before:.5} after the polynomial; {causes}noise floor {floor:.5}",
-        said.as_read_rms
+        "held-out rms, {unit}: {rms:.5} {as_read}; {before:.5} after the polynomial; {causes}noise floor {floor:.5}"
     )
 }
 
@@ -312,7 +315,7 @@ mod tests {
             polynomial: String::new(),
             equations: Vec::new(),
             thermometer: "die_degc".to_owned(),
-            as_read_rms: 1.55,
+            as_read: ("as read", 1.55),
             judging,
             roles,
         }

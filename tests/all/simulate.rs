@@ -234,7 +234,7 @@ fn a_chamber_that_no_gyro_works_in_is_told_at_its_line_and_not_of_the_record() {
     let profile = folder.path().join("hot.csv");
     std::fs::write(&profile, "time_s,chamber_degc\n0,25\n600,900\n1200,25\n").expect("written");
     let out = folder.path().join("out");
-    let along = ["--profile", text(&profile), "--readings", "30"];
+    let along = ["--profile", text(&profile), "--readings", "60"];
     let output = gyrogen_here(&[&["simulate", "--out", text(&out)], &along[..]].concat());
     let talk = told(&output);
     assert_eq!(talk.matches("chamber_beyond").count(), 1, "{talk}");
