@@ -26,7 +26,7 @@ use crate::thermal::search::Effort;
 use crate::timing;
 use std::path::{Path, PathBuf};
 
-/// Find what a measured record holds beyond the declared bias: a named cause or an honest refusal, and new firmware.
+/// For a record of your own: find which effects the drift consists of, or that none is known, and write firmware against them.
 ///
 /// Use `close` where the polynomial that `run` fits leaves too much drift, or where you want to know what the drift
 /// consists of. It searches for causes, such as a lag, a step or a mode crossing, and says how sure each one is. Its

@@ -242,12 +242,13 @@ fn of_missing(missing: &str) -> String {
             "give the measured record with `--record FILE`; `close` takes a capture of ADC codes with `--capture FILE` in its place",
         ),
     ];
-    const EXAMPLES: [(&str, &str); 8] = [
+    const EXAMPLES: [(&str, &str); 9] = [
         ("--function", "--function 'sin(x)'"),
         ("--domain", "--domain=0,1"),
         ("--input", "--input Q1.15"),
         ("--output", "--output Q1.15"),
-        ("--out", "--out rows.csv"),
+        ("--out <DIR>", "--out out"),
+        ("--out <FILE>", "--out rows.csv"),
         ("--lang", "--lang c"),
         ("<BUNDLE>", "gyrogen verify out/firmware/c"),
         ("<SHELL>", "gyrogen completions bash"),
@@ -260,7 +261,7 @@ fn of_missing(missing: &str) -> String {
         let names = crate::schemas::NAMES.map(|(name, _)| name);
         return format!("give one of {}", names.join(", "));
     }
-    let of_these = EXAMPLES.iter().filter(|(name, _)| words.contains(name));
+    let of_these = EXAMPLES.iter().filter(|(name, _)| missing.contains(name));
     let examples: Vec<&str> = of_these.map(|(_, example)| *example).collect();
     match examples.is_empty() {
         true => "add it; `--help` behind the command says what it is".to_owned(),
@@ -319,6 +320,8 @@ mod tests {
             of_missing("--domain <A,B> --output <FORMAT>"),
             "for example `--domain=0,1 --output Q1.15`"
         );
+        assert_eq!(of_missing("--out <DIR>"), "for example `--out out`");
+        assert_eq!(of_missing("--out <FILE>"), "for example `--out rows.csv`");
         assert!(of_missing("<NAME>").starts_with("give one of design, "));
     }
 }

@@ -14,7 +14,7 @@ use crate::text::{at_most, constant};
 use crate::timing;
 use std::path::{Path, PathBuf};
 
-/// Fit the bias to a thermal record, round it to fixed point, emit C and Rust, build and compare them, report.
+/// Fit the polynomial alone, to the simulated default or a record: fixed point, C and Rust, built and compared, report.
 ///
 /// Use `run` first. It fits one polynomial in the thermometer, writes firmware that subtracts it, and says how much drift
 /// is left. If too much is left, use `close` on the same record: it searches for causes that no polynomial follows, and
