@@ -10,6 +10,7 @@ use crate::study::job::{self, Request};
 use crate::study::journal;
 use crate::study::outcome::{Point, Study};
 use crate::study::progress::{Progress, Step};
+use crate::study::reporting::RESOLUTION;
 use crate::study::shard::Part;
 use crate::text::number;
 use crate::timing;
@@ -135,30 +136,36 @@ fn into_folder(
     Ok(())
 }
 
+/// The columns of figures: title and unit.
+const COLUMNS: [&str; 5] = [
+    "bias\ndeg/s",
+    "drift\ndeg/s",
+    "noise\ndeg/s/rtHz",
+    "SF\nppm",
+    "line\ndeg/s",
+];
+
 fn print(s: &Study) {
-    let mut header = vec!["point", "on the front of"];
-    let targets: Vec<String> = s.reference.price.keys().cloned().collect();
-    let titles: Vec<String> = targets.iter().map(|t| format!("{t}, %")).collect();
-    header.extend(titles.iter().map(String::as_str));
-    header.extend([
-        "bias, deg/s",
-        "drift, deg/s",
-        "noise, deg/s/rtHz",
-        "ARW, deg/rth",
-        "SF, ppm",
-        "line, deg/s",
-        "merit",
-        "by",
-    ]);
-    let mut table = super::terminal::table(&header);
-    for p in std::iter::once(&s.reference).chain(&s.front) {
-        table.add_row(row(p, &targets));
-    }
-    super::terminal::numbers(&mut table, 2..);
-    super::terminal::show(&table);
+    say!("what the word lengths add to the gyro's own errors; costs in % of the given design's");
+    super::terminal::show(&points(s));
+    say!("*: on that target's front: of what is as fine nothing is cheaper");
+    let held = if s.limits_from == "requirements" {
+        "every requirement that has a column is met"
+    } else {
+        s.limits_from
+    };
     say!(
-        "merit 1: {}; {} designs considered, {} run bit for bit ({}), {} points verified",
-        s.limits_from,
+        "merit: the largest part that a column is of its limit (`by`: which column); at most 1: {held}"
+    );
+    say!("angle random walk in deg/rth: 42.4 times the noise");
+    if let Some(hz) = s.conditions.detuned_hz {
+        say!(
+            "line: the largest, at rest or with the oscillator off by {} Hz; `equiv` runs at the design's own frequency alone",
+            number(hz, 3)
+        );
+    }
+    say!(
+        "{} designs considered, {} run bit for bit ({}), {} points verified",
         s.designs_considered,
         s.designs_simulated,
         s.method,
@@ -176,6 +183,12 @@ fn print(s: &Study) {
         ]);
     }
     super::terminal::show(&words);
+    let percent = 100.0 * RESOLUTION;
+    say!(
+        "one word changed, the others as given. first that hurts: the longest length below the given one that raises the \
+         search's merit by more than {percent:.0} %; last that helps: the longest above it whose last bit lowers it by more \
+         than {percent:.0} %; -: none in the range"
+    );
     for chosen in &s.chosen {
         match chosen.point {
             Some(point) => say!("{}: point {point}, {}", chosen.target, chosen.reason),
@@ -199,28 +212,53 @@ fn print(s: &Study) {
     }
 }
 
+/// The points and what a merit of 1 is.
+fn points(s: &Study) -> comfy_table::Table {
+    let targets: Vec<String> = s.reference.price.keys().cloned().collect();
+    let prices: Vec<String> = targets.iter().map(|t| format!("{t}\n%")).collect();
+    let mut header = vec!["point"];
+    header.extend(prices.iter().map(String::as_str));
+    header.extend(COLUMNS);
+    header.extend(["merit", "by"]);
+    let mut table = super::terminal::table(&header);
+    for p in std::iter::once(&s.reference).chain(&s.front) {
+        table.add_row(row(p, &targets));
+    }
+    let limits = s.limits.limits().into_iter();
+    let limits = limits.map(|(_, limit)| limit.map_or("-".to_owned(), |l| number(l, 3)));
+    let blank = targets.iter().map(|_| String::new());
+    let mut limit = vec!["limit".to_owned()];
+    limit.extend(blank.chain(limits).chain(["1".to_owned()]));
+    table.add_row(limit);
+    super::terminal::numbers(&mut table, 1..1 + targets.len() + COLUMNS.len() + 1);
+    table
+}
+
 fn row(p: &Point, targets: &[String]) -> Vec<String> {
-    let mut row = vec![
-        if p.number == 0 {
-            "given".to_owned()
-        } else {
-            p.number.to_string()
-        },
-        p.targets.join(", "),
-    ];
+    let mut row = vec![if p.number == 0 {
+        "given".to_owned()
+    } else {
+        p.number.to_string()
+    }];
     for target in targets {
         let part = p.price_of_given.get(target).copied().unwrap_or(f64::NAN);
-        row.push(format!("{:.1}", 100.0 * part));
+        let mark = if p.targets.contains(target) { "*" } else { "" };
+        row.push(format!("{mark}{:.1}", 100.0 * part));
     }
     row.extend([
         number(p.bias_error_dps, 3),
         number(p.drift_residual_dps, 3),
         number(p.noise_dps_rthz, 3),
-        number(p.arw_deg_rth, 3),
         format!("{:.1}", p.scale_factor_ppm),
         number(p.spur_dps, 3),
         format!("{:.3}", p.merit),
-        p.limited_by.to_owned(),
+        // Its column.
+        match p.limited_by.split('_').next() {
+            Some("scale") => "SF",
+            Some("spur") => "line",
+            name => name.unwrap_or_default(),
+        }
+        .to_owned(),
     ]);
     row
 }

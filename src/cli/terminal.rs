@@ -230,7 +230,7 @@ fn by_line(table: &Table) -> String {
         .header()
         .into_iter()
         .flat_map(|h| h.cell_iter())
-        .map(|c| c.content())
+        .map(|c| c.content().replace('\n', ", "))
         .collect();
     let mut out = Vec::new();
     for row in table.row_iter() {

@@ -2,7 +2,7 @@
 //! cannot be met because of which word.
 
 use super::bench::Bench;
-use super::certainty::largest;
+use super::certainty::Bounds;
 use super::figures::Figures;
 use super::merit::Scale;
 use super::outcome::{Chosen, Point, Required, Step};
@@ -17,10 +17,27 @@ use crate::parallel::in_parallel;
 use crate::text::number;
 use std::collections::BTreeMap;
 
+/// The designs that were verified.
+pub(super) struct Seen {
+    /// Those that may be reported.
+    pub(super) good: BTreeMap<Lengths, Checked>,
+    /// Those that nothing but their start from power-on keeps from it.
+    pub(super) late: Vec<Checked>,
+}
+
+impl Seen {
+    /// Those that say what a limit on the bias can be, which includes the start, or on the rest.
+    fn of(&self, bias: bool) -> impl Iterator<Item = &Checked> {
+        let late = self.late.iter().filter(move |_| bias);
+        self.good.values().chain(late)
+    }
+}
+
 /// The answers.
 pub(super) struct Answers {
     pub(super) chosen: Vec<Chosen>,
     pub(super) required: Vec<Required>,
+    pub(super) notes: Vec<String>,
 }
 
 /// So many designs are looked at beside the fronts for bytes and cycles that are required.
@@ -96,8 +113,8 @@ pub(super) fn holds(work: &Reporting, c: &Checked, objective: usize) -> bool {
     }
     let cost = work.bench.costs(&c.lengths).and_then(|c| c.get(objective));
     let is_fabric = target(work, objective) == "fpga";
-    let figures = limits.iter().all(|limit| match c.bounds.of(limit.name) {
-        Some(interval) => largest(interval) <= limit.value,
+    let figures = limits.iter().all(|limit| match c.bounds.most(limit.name) {
+        Some(most) => most <= limit.value,
         None => limit.name != LimitName::Bandwidth || work.bandwidth_hz >= limit.value,
     });
     figures && cost.is_some_and(|c| costs_hold(c, is_fabric, limits))
@@ -128,17 +145,24 @@ fn target<'w>(work: &'w Reporting, objective: usize) -> &'w str {
 /// Answers from the reported points.
 pub(super) fn answers(
     work: &Reporting,
+    seen: &Seen,
     points: &[(Lengths, Point)],
     given: &Point,
     best: &[Option<Lengths>],
 ) -> Answers {
     let limits = work.limits;
-    let required = required(work);
+    let required = required(work, seen);
     let mut chosen = Vec::new();
+    let mut notes = Vec::new();
     for (objective, lengths) in best.iter().enumerate() {
         let target = target(work, objective);
         let cost = |p: &Point| p.price.get(target).copied().unwrap_or(f64::INFINITY);
         let point = points.iter().find(|(l, _)| Some(l) == lengths.as_ref());
+        notes.extend(point.and_then(|(l, p)| {
+            let worse = unlimited(work, &seen.good.get(l)?.verified.figures)?;
+            let number = p.number;
+            Some(format!("{target}: point {number} has figures without a limit that are worse than the given design's: {worse}"))
+        }));
         let reason = match point {
             Some((_, p)) => {
                 let part = 100.0 * cost(p) / cost(given).max(f64::MIN_POSITIVE);
@@ -151,7 +175,7 @@ pub(super) fn answers(
                 };
                 format!("{what}: {part:.1} % of the given design's cost")
             }
-            None => why_not(work, &required, objective),
+            None => why_not(work, seen, &required, objective),
         };
         chosen.push(Chosen {
             target: target.to_owned(),
@@ -160,28 +184,51 @@ pub(super) fn answers(
             sensitivity: point.map_or(Vec::new(), |(l, _)| sensitivity(work, l)),
         });
     }
-    Answers { chosen, required }
+    Answers {
+        chosen,
+        required,
+        notes,
+    }
 }
 
-fn figure(f: &Figures, name: LimitName) -> Option<f64> {
-    f.of(name).map(f64::abs)
+/// Where limits are asked for: the figures that have none and by which the data sheet gets worse, with the given design's.
+fn unlimited(work: &Reporting, figures: &Figures) -> Option<String> {
+    if work.limits.is_empty() {
+        return None;
+    }
+    let limits = work.scale.limits().into_iter();
+    let worse = limits
+        .zip(work.instrument.limits())
+        .filter_map(|((name, limit), (_, usual))| {
+            let (own, given) = (figures.of(name)?.abs(), work.own.of(name)?.abs());
+            let text = || {
+                let [own, given] = [own, given].map(|v| number(v, 3));
+                format!("{} {own} (given {given})", name.name())
+            };
+            (limit.is_none() && own > usual?).then(text)
+        });
+    let worse: Vec<String> = worse.collect();
+    (!worse.is_empty()).then(|| worse.join(", "))
 }
 
-/// Each limit with the best that any design has, and the word in the way.
-fn required(work: &Reporting) -> Vec<Required> {
+/// Each limit with the best that is shown of any design, and the word in the way.
+fn required(work: &Reporting, seen: &Seen) -> Vec<Required> {
     let mut out = Vec::new();
     for limit in work.limits.iter() {
-        let (best, word) = match limit.name {
+        let (best, lengths) = match limit.name {
             LimitName::Bandwidth => (work.bandwidth_hz, None),
             LimitName::RomBytes | LimitName::CyclesPerRow => smallest(work, limit.name),
-            name => finest(work, name),
+            name => finest(seen, name),
         };
         let met = if limit.name.is_least() {
             best >= limit.value
         } else {
             best <= limit.value
         };
-        let word = word.filter(|_| !met);
+        let word = lengths.filter(|_| !met).and_then(|l| match limit.name {
+            LimitName::RomBytes | LimitName::CyclesPerRow => dearest(work, limit.name, &l, best),
+            name => coarsest(work, &l, &|b| b.most(name)),
+        });
         out.push(Required {
             name: limit.name.name(),
             limit: limit.value,
@@ -249,13 +296,12 @@ impl InTheWay {
     }
 }
 
-/// The least value of a figure over all designs that ran, and the word in the way there.
-fn finest(work: &Reporting, name: LimitName) -> (f64, Option<InTheWay>) {
-    let value = |l: &Lengths| work.bench.figures(l).and_then(|f| figure(f, name));
-    let Some((value, lengths)) = least(work, &value) else {
-        return (f64::MAX, None);
-    };
-    (value, coarsest(work, &lengths, &|f| figure(f, name)))
+/// The least that a figure is shown to be at most, and of which design.
+fn finest(seen: &Seen, name: LimitName) -> (f64, Option<Lengths>) {
+    let all = seen.of(name == LimitName::Bias);
+    let most = all.filter_map(|c| Some((c.bounds.most(name)?, &c.lengths)));
+    most.min_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(b.1)))
+        .map_or((f64::MAX, None), |(most, l)| (most, Some(l.clone())))
 }
 
 /// The design that ran with the least of a value.
@@ -276,15 +322,18 @@ fn with_one(design: &Design, by: i32) -> Vec<(Word, Design)> {
     words.filter_map(of).collect()
 }
 
-/// The word that keeps a figure of a design from being less: that of which one bit more lowers it the most; or where
+/// The word that keeps a bound of a design from being less: that of which one bit more lowers it the most; or where
 /// none lowers it by more than a merit is certain to, that of which one bit less raises it the most.
 fn coarsest(
     work: &Reporting,
     lengths: &[u32],
-    of: &(dyn Fn(&Figures) -> Option<f64> + Sync),
+    of: &(dyn Fn(&Bounds) -> Option<f64> + Sync),
 ) -> Option<InTheWay> {
     let design = work.space.design(work.design, lengths).ok()?;
-    let value = |d: &Design| of(&work.verifier.figures(&d.without_stops()).ok()?);
+    let value = |d: &Design| {
+        let verified = work.verifier.verify(&d.without_stops()).ok()?;
+        of(&work.bounds(&verified))
+    };
     let own = value(&design)?;
     let both = [1, -1].map(|by| {
         let others = with_one(&design, by);
@@ -303,44 +352,46 @@ fn coarsest(
     Some(InTheWay::new(work, &design, *word, true))
 }
 
-/// The least bytes or cycles of a design that is good for anything, and the word of which one bit less saves the most
-/// of them there.
-fn smallest(work: &Reporting, name: LimitName) -> (f64, Option<InTheWay>) {
+/// The least bytes or cycles of a design that is good for anything, and of which.
+fn smallest(work: &Reporting, name: LimitName) -> (f64, Option<Lengths>) {
     let worst = search::worst_merit(work.bench, work.searched);
-    let of = |objective: usize, cost: &Cost| cost_of(cost, target(work, objective) == "fpga", name);
     let value = |l: &Lengths| {
         let good = work.bench.merit(work.searched, l) <= worst;
-        let costs = work.bench.costs(l).filter(|_| good)?.iter().enumerate();
-        costs.filter_map(|(o, c)| of(o, c)).reduce(f64::min)
+        least_cost(work, name, work.bench.costs(l).filter(|_| good)?)
     };
-    let Some((value, lengths)) = least(work, &value) else {
-        return (f64::MAX, None);
-    };
-    let Ok(design) = work.space.design(work.design, &lengths) else {
-        return (value, None);
-    };
+    least(work, &value).map_or((f64::MAX, None), |(value, l)| (value, Some(l)))
+}
+
+/// The least of a cost over the targets.
+fn least_cost(work: &Reporting, name: LimitName, costs: &[Cost]) -> Option<f64> {
+    let of = |(o, c): (usize, &Cost)| cost_of(c, target(work, o) == "fpga", name);
+    costs.iter().enumerate().filter_map(of).reduce(f64::min)
+}
+
+/// The word of which one bit less saves the most of a design's bytes or cycles, `value`.
+fn dearest(work: &Reporting, name: LimitName, lengths: &[u32], value: f64) -> Option<InTheWay> {
+    let design = work.space.design(work.design, lengths).ok()?;
     let costs = |d: &Design| {
-        let objectives = work.bench.objectives.iter().enumerate();
-        let costs = objectives.filter_map(|(o, b)| of(o, &cost::of_design(d, b.target)));
-        costs.reduce(f64::min).unwrap_or(f64::MAX)
+        let objectives = work.bench.objectives.iter();
+        let costs: Vec<Cost> = objectives.map(|b| cost::of_design(d, b.target)).collect();
+        least_cost(work, name, &costs).unwrap_or(f64::MAX)
     };
     let others = with_one(&design, -1).into_iter();
     let saving = others
         .map(|(w, d)| (costs(&d), w))
         .filter(|(c, _)| *c < value);
-    let most = saving.min_by(|a, b| a.0.total_cmp(&b.0));
-    let word = most.map(|(_, w)| InTheWay::new(work, &design, w, false));
-    (value, word)
+    let (_, word) = saving.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(InTheWay::new(work, &design, word, false))
 }
 
 /// Why no design holds what is asked.
-fn why_not(work: &Reporting, required: &[Required], objective: usize) -> String {
+fn why_not(work: &Reporting, seen: &Seen, required: &[Required], objective: usize) -> String {
     if work.limits.is_empty() {
         return "no point of the front is as good as the given design".to_owned();
     }
     let missed: Vec<&Required> = required.iter().filter(|r| !r.can_be_met).collect();
     if missed.is_empty() {
-        return nearest(work, objective);
+        return nearest(work, seen, objective);
     }
     let said: Vec<String> = missed
         .iter()
@@ -357,7 +408,7 @@ fn why_not(work: &Reporting, required: &[Required], objective: usize) -> String 
                 (None, _) => String::new(),
             };
             format!(
-                "{} cannot be met: {} is required, {} the best{word}",
+                "{} cannot be met: {} is required, {} is the best that is shown of any design{word}",
                 r.name,
                 number(r.limit, 3),
                 number(r.best, 3)
@@ -368,33 +419,30 @@ fn why_not(work: &Reporting, required: &[Required], objective: usize) -> String 
 }
 
 /// What keeps the nearest design from holding all limits, each of which some design holds.
-fn nearest(work: &Reporting, objective: usize) -> String {
+fn nearest(work: &Reporting, seen: &Seen, objective: usize) -> String {
+    let each = "each requirement can be met by itself, and no design that was verified is shown to meet all of them at once";
     let is_fabric = target(work, objective) == "fpga";
-    let value = |l: &Lengths| {
-        let cost = work.bench.costs(l)?.get(objective)?;
-        costs_hold(cost, is_fabric, work.limits).then(|| work.bench.merit(work.searched, l))
-    };
-    let each =
-        "each requirement can be met by itself, and no design that ran meets all of them at once";
-    let Some((merit, lengths)) = least(work, &value) else {
+    let able = seen.of(work.limits.get(LimitName::Bias).is_some());
+    let able = able.filter(|c| {
+        let cost = work.bench.costs(&c.lengths).and_then(|c| c.get(objective));
+        cost.is_some_and(|c| costs_hold(c, is_fabric, work.limits))
+    });
+    let misses = able.filter_map(|c| {
+        let limits = work.limits.iter();
+        let parts = limits.filter_map(|l| Some((c.bounds.most(l.name)? / l.value, l.name)));
+        let (part, name) = parts.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some((part, name, &c.lengths))
+    });
+    let Some((part, name, lengths)) =
+        misses.min_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.2.cmp(b.2)))
+    else {
         return each.to_owned();
     };
-    let Some(f) = work.bench.figures(&lengths) else {
-        return each.to_owned();
-    };
-    let name = work.searched.worst(f);
-    let part = |f: &Figures| {
-        let parts = work.searched.parts(f).into_iter();
-        parts.filter(|(n, _)| *n == name).map(|(_, p)| p).next()
-    };
-    let word = coarsest(work, &lengths, &part).map_or(String::new(), |w| w.text());
-    if merit <= 1.0 {
-        return format!(
-            "a design has every figure in its limit ({name} {:.1} % of it{word}), and no run of the verification's length shows that for certain; see `bounds`",
-            100.0 * merit
-        );
-    }
-    format!("{each}: the nearest has {merit:.3} times the limit of {name}{word}")
+    let word = coarsest(work, lengths, &|b| b.most(name)).map_or(String::new(), |w| w.text());
+    format!(
+        "{each}: the nearest has {part:.3} times the limit of {}{word}",
+        name.name()
+    )
 }
 
 /// One bit more and one bit less of each word.

@@ -197,6 +197,14 @@ impl Bounds {
         }
     }
 
+    /// The largest size that a limited figure may have; `None` of what is known. A start from power-on is an error of
+    /// the bias.
+    pub fn most(&self, name: LimitName) -> Option<f64> {
+        let own = largest(self.of(name)?);
+        let start = self.startup_error_dps.filter(|_| name == LimitName::Bias);
+        Some(start.map_or(own, |start| own.max(largest(start))))
+    }
+
     /// The interval of a figure that can be limited; `None` of a cost and of the bandwidth, which are known.
     pub fn of(&self, name: LimitName) -> Option<[f64; 2]> {
         match name {

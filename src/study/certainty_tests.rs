@@ -108,4 +108,9 @@ fn bounds_are_around_their_figures_and_no_line_is_bounded_by_what_would_be_seen(
     assert_eq!(b.spur_dps, [0.0, 0.5]);
     assert_eq!(b.startup_error_dps, Some([1.0 - 0.2 * z, 1.0 + 0.2 * z]));
     assert_eq!(b.of(LimitName::RomBytes), None);
+    // The start is an error of the bias, and of nothing else.
+    assert_eq!(b.most(LimitName::Bias), Some(2.0 + 0.1 * z));
+    assert_eq!(b.most(LimitName::Spur), Some(0.5));
+    let b = Bounds::new(&figures, &errors, Some([-4.0, 0.2]), &confidence);
+    assert_eq!(b.most(LimitName::Bias), Some(4.0 + 0.2 * z));
 }

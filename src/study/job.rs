@@ -68,7 +68,8 @@ pub fn study(design: &Design, request: &Request, said: &(dyn Fn(Progress) + Sync
     }
     let bandwidth_hz = super::bandwidth::bandwidth_hz(design);
     let verifier = Verifier::new(design)?;
-    let own = verifier.figures(&design.without_stops())?;
+    let verified = verifier.verify(&design.without_stops())?;
+    let own = verified.figures;
     let alone = Scale::of_instrument(design, &bench.whole, bandwidth_hz);
     let instrument = alone.beside(&own);
     let asked = Scale::of_limits(&request.limits);
@@ -85,7 +86,15 @@ pub fn study(design: &Design, request: &Request, said: &(dyn Fn(Progress) + Sync
             "no figure of the data sheet more than one percent worse than the given design's",
         )
     } else {
-        (asked, asked, "requirements")
+        let start = [
+            asked.bias_dps.or(instrument.bias_dps),
+            verified.startup_dps.map(|[_, error]| error),
+        ];
+        (
+            asked,
+            asked.that_can_be_shown(&own, &verified.errors, start),
+            "requirements",
+        )
     };
     let exhaustive = !request.heuristic && space.size() <= u128::from(design.study.exhaustive);
     let (mut fronts, method) = if exhaustive {

@@ -5,7 +5,7 @@
 //! lines so much that they add one percent to the instrument's noise (in squares), the scale factor one percent of its
 //! change, each beside what the given design's words add themselves.
 
-use super::certainty::{Bounds, largest};
+use super::certainty::{Bounds, Confidence, Errors, FIGURES, largest};
 use super::figures::Figures;
 use crate::circuit::scale::full_scale_dps;
 use crate::design::{Design, LimitName, Limits};
@@ -28,6 +28,9 @@ pub struct Scale {
 
 /// A figure's worsening that counts as 1.
 const WORSE: f64 = 0.01;
+
+/// Points that a study is expected to verify: the standard errors of a bound hardly depend on it (convention).
+const EXPECTED_POINTS: usize = 64;
 
 /// As [`crate::study::figures::arw_deg_rth`] has it.
 const ARW: f64 = 60.0 / std::f64::consts::SQRT_2;
@@ -82,16 +85,34 @@ impl Scale {
         }
     }
 
+    /// With the noise limited to what leaves the verification's intervals room within these limits, of the start from
+    /// power-on within its own, `start`: limit and standard error, deg/s.
+    ///
+    /// A mean is as uncertain as the noise is large. A search for a small bias alone ends at designs that are cheap and
+    /// noisy and whose bias is small by chance, of which no run of the verification's length shows anything. How an
+    /// interval's width goes with the noise is taken from the given design, `f` and `e`: an estimate, which only steers the search.
+    pub fn that_can_be_shown(self, f: &Figures, e: &Errors, start: [Option<f64>; 2]) -> Scale {
+        let z = Confidence::of(FIGURES * EXPECTED_POINTS).standard_errors;
+        let widths = [
+            (self.bias_dps, z * e.bias_dps),
+            (self.drift_dps, z * e.drift_dps),
+            (self.scale_factor_ppm, z * e.scale_factor_ppm),
+            (self.spur_dps, f.spur_floor_dps),
+            (start[0], z * start[1].unwrap_or(0.0)),
+        ];
+        let room = widths
+            .into_iter()
+            .filter_map(|(limit, width)| Some(limit? / width * f.noise_dps_rthz))
+            .filter(|noise| noise.is_finite() && *noise > 0.0);
+        Scale {
+            noise_dps_rthz: room.chain(self.noise_dps_rthz).reduce(f64::min),
+            ..self
+        }
+    }
+
     /// True if no figure counts.
     pub fn is_empty(&self) -> bool {
-        let all = [
-            self.bias_dps,
-            self.drift_dps,
-            self.noise_dps_rthz,
-            self.scale_factor_ppm,
-            self.spur_dps,
-        ];
-        all.iter().all(Option::is_none)
+        self.limits().iter().all(|(_, limit)| limit.is_none())
     }
 
     /// Each figure's name and its part of its limit.
@@ -123,24 +144,9 @@ impl Scale {
     /// True if every figure is within its limit: the whole of its interval, or the figure itself where it is at most
     /// `WORSE` above `given`'s, which has run on the same noise.
     pub fn holds(&self, f: &Figures, bounds: &Bounds, given: &Figures) -> bool {
-        let names = [
-            LimitName::Bias,
-            LimitName::Drift,
-            LimitName::Noise,
-            LimitName::ScaleFactor,
-            LimitName::Spur,
-        ];
-        let limits = [
-            self.bias_dps,
-            self.drift_dps,
-            self.noise_dps_rthz,
-            self.scale_factor_ppm,
-            self.spur_dps,
-        ];
         let parts = self.parts(f).into_iter().zip(self.parts(given));
-        names
+        self.limits()
             .into_iter()
-            .zip(limits)
             .zip(parts)
             .all(|((name, limit), (own, given))| {
                 let most = bounds.of(name).map(largest);
@@ -152,6 +158,17 @@ impl Scale {
             })
     }
 
+    /// Each figure's limit, in the order of [`parts`](Self::parts).
+    pub fn limits(&self) -> [(LimitName, Option<f64>); 5] {
+        [
+            (LimitName::Bias, self.bias_dps),
+            (LimitName::Drift, self.drift_dps),
+            (LimitName::Noise, self.noise_dps_rthz),
+            (LimitName::ScaleFactor, self.scale_factor_ppm),
+            (LimitName::Spur, self.spur_dps),
+        ]
+    }
+
     /// The figure with the largest part.
     pub fn worst(&self, f: &Figures) -> &'static str {
         let mut worst = ("bias_dps", f64::NEG_INFINITY);
@@ -161,5 +178,38 @@ impl Scale {
             }
         }
         worst.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_limit_on_the_bias_leaves_room_for_as_much_noise_as_its_intervals_allow() {
+        let given = Figures {
+            noise_dps_rthz: 1e-4,
+            ..Figures::default()
+        };
+        let errors = Errors {
+            bias_dps: 1e-4,
+            ..Errors::default()
+        };
+        let bias = Scale::of_limits(&Limits::parse("bias_dps<=0.01").unwrap());
+        let z = Confidence::of(FIGURES * EXPECTED_POINTS).standard_errors;
+        let noise = |scale: Scale, start| {
+            let scale = scale.that_can_be_shown(&given, &errors, start);
+            scale.noise_dps_rthz.unwrap()
+        };
+        let own = noise(bias, [None, None]);
+        assert!((own * z / 0.01 - 1.0).abs() < 1e-9, "{own}");
+        // The start is the less certain of the two, and counts where the bias has no limit.
+        let start = [Some(0.01), Some(4e-4)];
+        assert!((noise(bias, start) * 4.0 / own - 1.0).abs() < 1e-9);
+        let noisy = Scale::of_limits(&Limits::parse("noise_dps_rthz<=1e-5").unwrap());
+        assert_eq!(noise(noisy, start), 1e-5);
+        // Without noise there is nothing to go by.
+        let silent = bias.that_can_be_shown(&Figures::default(), &Errors::default(), start);
+        assert_eq!(silent, bias);
     }
 }

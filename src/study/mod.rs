@@ -23,7 +23,7 @@ pub mod outcome;
 pub mod overflow;
 pub mod progress;
 pub mod quarter;
-mod reporting;
+pub mod reporting;
 pub mod retune;
 pub mod scenario;
 pub mod search;

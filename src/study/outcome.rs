@@ -35,8 +35,8 @@ pub struct Point {
     pub number: usize,
     /// The file that makes it, beside `study.json`; the given design has its own.
     pub design: Option<String>,
-    /// The targets on whose front it is; none for a design that was chosen for bytes or cycles that are required, which
-    /// a front of the one price does not weigh.
+    /// The targets on whose front it is; none for a design that was chosen for what a front of price and merit does not
+    /// weigh: bytes or cycles that are required, or that its bounds are within the limits.
     pub targets: Vec<String>,
     /// Lengths of all words that were varied.
     pub word_lengths: WordLengths,
@@ -148,7 +148,7 @@ pub struct Required {
     pub name: &'static str,
     /// As required.
     pub limit: f64,
-    /// The best value of any design that ran.
+    /// The best that is shown of any design: of a figure the largest that it may be with the study's confidence.
     pub best: f64,
     /// It can be met by itself.
     pub can_be_met: bool,

@@ -1,6 +1,6 @@
 //! From the fronts of a search to what is reported: every point verified, numbered, with its file and its answers.
 
-use super::answer;
+use super::answer::{self, Seen};
 use super::bench::Bench;
 use super::budget;
 use super::certainty::{Bounds, Confidence, largest};
@@ -20,6 +20,7 @@ use super::verify::{Verified, Verifier};
 use crate::design::{Design, Limits};
 use crate::error::{InputError, Result};
 use crate::parallel::in_parallel;
+use crate::text::{counted, number};
 use std::collections::BTreeMap;
 
 /// Points of a front whose merits differ by less are one point with alternatives: the merit of a point is certain
@@ -70,15 +71,16 @@ impl Reporting<'_> {
     pub(super) fn report(&self, wanted: &[Lengths], how: &Method) -> Result<Done> {
         let given = self.space.given();
         let mut notes = Vec::new();
-        let (good, dropped) = self.verified(wanted, &mut notes);
+        let (seen, dropped) = self.verified(wanted, &mut notes);
+        let good = &seen.good;
         let Some(reference) = good.get(&given) else {
             let why = notes.join("; ");
             return Err(InputError::new(format!("the given design cannot be run: {why}")).into());
         };
         let base = self.point(reference);
-        let chosen = answer::chosen(self, &good);
+        let chosen = answer::chosen(self, good);
         let mut points = Vec::new();
-        for (lengths, (targets, alternatives)) in self.fronts(&good, &chosen) {
+        for (lengths, (targets, alternatives)) in self.fronts(good, &chosen) {
             if let Some(c) = good.get(&lengths) {
                 let mut point = self.point(c);
                 point.targets = targets;
@@ -99,7 +101,8 @@ impl Reporting<'_> {
             .iter()
             .map(|(l, _, p)| (l.clone(), p.clone()))
             .collect();
-        let answers = answer::answers(self, &numbered, &base, &chosen);
+        let answers = answer::answers(self, &seen, &numbered, &base, &chosen);
+        notes.extend(answers.notes);
         let threads = self.bench.threads();
         let mut chosen_budgets = BTreeMap::new();
         for (target, lengths) in self.design.study.targets.iter().zip(&chosen) {
@@ -148,12 +151,8 @@ impl Reporting<'_> {
         Ok(Done { study, files })
     }
 
-    /// The designs that their verification confirms, and how many it does not.
-    fn verified(
-        &self,
-        wanted: &[Lengths],
-        notes: &mut Vec<String>,
-    ) -> (BTreeMap<Lengths, Checked>, usize) {
+    /// The designs as their verification finds them, and how many it drops. Each reason is noted once.
+    fn verified(&self, wanted: &[Lengths], notes: &mut Vec<String>) -> (Seen, usize) {
         let given = self.space.given();
         let said = |done: usize| {
             (self.said)(Progress {
@@ -165,31 +164,42 @@ impl Reporting<'_> {
             });
         };
         let checked = in_parallel(wanted, self.bench.threads(), &said, |l| self.check(l));
-        let mut good = BTreeMap::new();
-        let mut dropped = 0;
+        let mut seen = Seen {
+            good: BTreeMap::new(),
+            late: Vec::new(),
+        };
+        let mut reasons: BTreeMap<String, u64> = BTreeMap::new();
+        let mut late = None;
         for (lengths, checked) in wanted.iter().zip(checked) {
-            let checked = checked.and_then(|c| match self.failure(&c) {
-                Some(why) if *lengths != given => Err(why.to_owned()),
-                Some(why) => {
-                    notes.push(format!("the given design itself: {why}"));
-                    Ok(c)
+            match checked.map(|c| (self.failure(&c), c)) {
+                Ok((why, c)) if why.is_none() || *lengths == given => {
+                    notes.extend(why.map(|why| format!("the given design itself: {why}")));
+                    seen.good.insert(lengths.clone(), c);
                 }
-                None => Ok(c),
-            });
-            match checked {
-                Ok(c) => {
-                    good.insert(lengths.clone(), c);
+                Ok((why, c)) if c.verified.overflows.is_empty() => {
+                    late = why;
+                    seen.late.push(c);
                 }
-                Err(why) => {
-                    dropped += 1;
-                    let why = format!("points that were dropped: {why}");
-                    if !notes.contains(&why) {
-                        notes.push(why);
-                    }
-                }
+                Ok((why, _)) => *reasons.entry(why.unwrap_or_default()).or_default() += 1,
+                Err(why) => *reasons.entry(why).or_default() += 1,
             }
         }
-        (good, dropped)
+        if let Some(why) = late {
+            let starts = seen.late.iter().filter_map(|c| c.bounds.startup_error_dps);
+            let mut starts: Vec<f64> = starts.map(largest).collect();
+            starts.sort_by(f64::total_cmp);
+            let ends = starts.first().zip(starts.last());
+            let bounds = ends.map_or(String::new(), |(least, most)| {
+                let [least, most] = [least, most].map(|v| number(*v, 3));
+                format!("; their errors there may be up to {least} to {most} deg/s")
+            });
+            reasons.insert(format!("{why}{bounds}"), seen.late.len() as u64);
+        }
+        let told =
+            |(why, count): (&String, &u64)| format!("{} dropped: {why}", counted(*count, "point"));
+        notes.extend(reasons.iter().map(told));
+        let dropped = reasons.values().sum::<u64>();
+        (seen, dropped as usize)
     }
 
     /// The fronts of the verified designs, with what was chosen: by lengths the targets and the alternatives.
@@ -299,12 +309,7 @@ impl Reporting<'_> {
             lengths: lengths.clone(),
             point,
             text,
-            bounds: Bounds::new(
-                &verified.figures,
-                &verified.errors,
-                verified.startup_dps,
-                &self.confidence,
-            ),
+            bounds: self.bounds(&verified),
             verified,
         })
     }
@@ -315,18 +320,24 @@ impl Reporting<'_> {
     /// A start is an error of the bias: the whole of its interval, deg/s, has to be within the limit of the bias, deg/s,
     /// times the point's merit where that is above 1. A point says that its figures are within merit times their limits,
     /// and that has to be so after a start too.
-    fn failure(&self, c: &Checked) -> Option<&'static str> {
+    fn failure(&self, c: &Checked) -> Option<String> {
         if !c.verified.overflows.is_empty() {
-            return Some("a word can overflow that in the given design cannot");
+            return Some("a word can overflow that in the given design cannot".to_owned());
         }
-        let limit = self.scale.bias_dps.or(self.instrument.bias_dps);
+        let limit = self.scale.bias_dps.or(self.instrument.bias_dps)?;
         let claimed = self.scale.merit(&c.verified.figures).max(1.0);
-        match (c.bounds.startup_error_dps, limit) {
-            (Some(interval), Some(limit)) if largest(interval) > limit * claimed => Some(
-                "after a start from power-on the rate is not shown to be where it settles, within the limit of the bias",
-            ),
-            _ => None,
-        }
+        let start = largest(c.bounds.startup_error_dps?);
+        (start > limit * claimed).then(|| {
+            format!(
+                "after a start from power-on the rate is not shown to settle to within {} deg/s, the limit of the bias, or so many times that as the point's merit is",
+                number(limit, 3)
+            )
+        })
+    }
+
+    /// Of a verified design.
+    pub(super) fn bounds(&self, v: &Verified) -> Bounds {
+        Bounds::new(&v.figures, &v.errors, v.startup_dps, &self.confidence)
     }
 
     pub(super) fn named(&self, lengths: &[u32]) -> WordLengths {

@@ -274,6 +274,77 @@ fn designs_with_a_phase_loop_a_coarse_converter_and_a_free_tuning_word_are_studi
 }
 
 #[test]
+fn a_limit_on_the_bias_is_met_by_the_cheapest_design_that_is_shown_to_meet_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = changed(folder.path(), &[]);
+    let file = file.to_str().expect("UTF-8");
+    let out = folder.path().join("out");
+    let price = |point: &Value| point["price"]["fpga"].as_f64().expect("a price");
+    let size = |point: &Value, name: &str| {
+        let ends = point["bounds"][name].as_array().expect("two");
+        ends.iter()
+            .filter_map(Value::as_f64)
+            .map(f64::abs)
+            .fold(0.0, f64::max)
+    };
+    good(&study(&[file], &out));
+    let plain = json(&bytes(&out));
+    // With some room, for the bounds of two studies are not of the same number of points.
+    let shown = |p: &&Value| size(p, "bias_dps").max(size(p, "startup_error_dps")) <= 0.008;
+    let points = plain["front"].as_array().expect("a front").iter();
+    let cheapest = points
+        .filter(shown)
+        .map(price)
+        .fold(f64::INFINITY, f64::min);
+    assert!(cheapest < price(&plain["reference"]));
+
+    // A terminal of 100 columns has a row of a table in one line.
+    let mut command = Command::new(env!("CARGO_BIN_EXE_gyrogen"));
+    let limits = ["study", file, "--for", "bias_dps<=0.01", "--out"];
+    let done = command
+        .env("COLUMNS", "100")
+        .args(limits)
+        .arg(&out)
+        .output()
+        .expect("runs");
+    good(&done);
+    let said = String::from_utf8(done.stdout).expect("UTF-8");
+    assert!(said.lines().all(|l| l.chars().count() <= 100), "{said}");
+    let row = |first: &str| {
+        let mut lines = said
+            .lines()
+            .map(|l| l.split_whitespace().collect::<Vec<_>>());
+        lines.find(|l| l.first() == Some(&first))
+    };
+    let limit = ["limit", "0.0100", "-", "-", "-", "-", "1"];
+    assert_eq!(row("limit").expect("a row"), limit, "{said}");
+    assert_eq!(row("given").expect("a row").len(), 10, "{said}");
+
+    let result = json(&bytes(&out));
+    let chosen = result["chosen"].as_array().expect("two");
+    let fpga = chosen.iter().find(|c| c["target"] == "fpga").expect("one");
+    let number = fpga["point"].as_u64().expect("a point") as usize;
+    let point = &result["front"][number - 1];
+    assert!(price(point) <= cheapest, "{point} {cheapest}");
+    assert!(size(point, "bias_dps") <= 0.01 && size(point, "startup_error_dps") <= 0.01);
+    assert_eq!(result["required"][0]["can_be_met"], true);
+
+    // What cannot be shown is told with what can: the given design's own bound at most.
+    let done = study(&[file, "--for", "bias_dps<=1e-9"], &out);
+    assert_eq!(done.status.code(), Some(1));
+    assert!(
+        told(&done).contains("bias_dps cannot be met: 1.00e-9 is required, "),
+        "{}",
+        told(&done)
+    );
+    let result = json(&bytes(&out));
+    let best = result["required"][0]["best"].as_f64().expect("a number");
+    let given = &result["reference"];
+    let own = size(given, "bias_dps").max(size(given, "startup_error_dps"));
+    assert!(1e-5 < best && best <= own, "{best} {own}");
+}
+
+#[test]
 fn what_cannot_be_had_is_named_with_its_word_and_what_can_is_the_cheapest() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = changed(folder.path(), &[]);

@@ -126,7 +126,7 @@ pub fn quarter_less(s: &Study) -> Vec<String> {
             let target = &q.target;
             let less = significant(100.0 * (1.0 - q.share), 3);
             if let Some(point) = q.point {
-                return format!("{target}: point {point} costs at least {less} % less and is as good.");
+                return format!("{target}: point {point} costs at least {less} % less, with no figure of the data sheet more than one percent worse.");
             }
             let words: Vec<&str> = q.words.iter().map(|w| w.name).collect();
             let best = match (q.best_merit, q.best_limited_by) {
@@ -139,7 +139,7 @@ pub fn quarter_less(s: &Study) -> Vec<String> {
                 .cheap_enough
                 .map_or(String::new(), |n| format!(", {n} of them cheap enough{best}"));
             format!(
-                "{target}: no design costs {less} % less and is as good, in all {} combinations of {}{cheap}.",
+                "{target}: no design costs {less} % less with no figure of the data sheet more than one percent worse, in all {} combinations of {}{cheap}.",
                 q.designs,
                 words.join(", ")
             )
