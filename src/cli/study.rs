@@ -148,9 +148,9 @@ const COLUMNS: [&str; 5] = [
 fn print(s: &Study) {
     say!("what the word lengths add to the gyro's own errors; costs in % of the given design's");
     super::terminal::show(&points(s));
-    say!("*: on that target's front: of what is as fine nothing is cheaper");
+    say!("*: on that target's front: nothing cheaper has so small a merit");
     let held = if s.limits_from == "requirements" {
-        "every requirement that has a column is met"
+        "every figure with a requirement is within it"
     } else {
         s.limits_from
     };

@@ -283,6 +283,10 @@ mod tests {
         }
         assert!(fitted(&example(), Some(40)).contains("  bound: 41.507"));
         assert!(fitted(&example(), Some(60)).contains('─'));
+        // A title of two lines is one before its value.
+        let mut two = table(&["node", "bound\ndeg/s"]);
+        two.add_row(["circuit.demodulator.product", "41.507"]);
+        assert!(fitted(&two, Some(30)).contains("  bound, deg/s: 41.507"));
     }
 
     #[test]

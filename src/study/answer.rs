@@ -161,7 +161,9 @@ pub(super) fn answers(
         notes.extend(point.and_then(|(l, p)| {
             let worse = unlimited(work, &seen.good.get(l)?.verified.figures)?;
             let number = p.number;
-            Some(format!("{target}: point {number} has figures without a limit that are worse than the given design's: {worse}"))
+            Some(format!(
+                "{target}: point {number} makes figures of the data sheet that have no limit more than one percent worse: {worse}"
+            ))
         }));
         let reason = match point {
             Some((_, p)) => {

@@ -342,6 +342,20 @@ fn a_limit_on_the_bias_is_met_by_the_cheapest_design_that_is_shown_to_meet_it() 
     let given = &result["reference"];
     let own = size(given, "bias_dps").max(size(given, "startup_error_dps"));
     assert!(1e-5 < best && best <= own, "{best} {own}");
+    let notes = result["notes"].to_string();
+    for text in ["dropped: after a start from power-on", "may be up to "] {
+        assert!(notes.contains(text), "{notes}");
+    }
+
+    // The cheapest design of all is in a wide limit, and too noisy for the data sheet.
+    let done = study(&[file, "--for", "bias_dps<=0.5"], &out);
+    good(&done);
+    let notes = json(&bytes(&out))["notes"].to_string();
+    assert!(
+        notes.contains("more than one percent worse: ") && notes.contains("noise_dps_rthz 0.00"),
+        "{notes}"
+    );
+    assert!(!notes.contains("bias_dps"), "{notes}");
 }
 
 #[test]
