@@ -90,15 +90,17 @@ impl Scale {
     ///
     /// A mean is as uncertain as the noise is large. A search for a small bias alone ends at designs that are cheap and
     /// noisy and whose bias is small by chance, of which no run of the verification's length shows anything. How an
-    /// interval's width goes with the noise is taken from the given design, `f` and `e`: an estimate, which only steers the search.
+    /// interval's width goes with the noise is taken from the given design, `f` and `e`: an estimate, which only steers the
+    /// search.
     pub fn that_can_be_shown(self, f: &Figures, e: &Errors, start: [Option<f64>; 2]) -> Scale {
+        let [start_dps, start_error] = start;
         let z = Confidence::of(FIGURES * EXPECTED_POINTS).standard_errors;
         let widths = [
             (self.bias_dps, z * e.bias_dps),
             (self.drift_dps, z * e.drift_dps),
             (self.scale_factor_ppm, z * e.scale_factor_ppm),
             (self.spur_dps, f.spur_floor_dps),
-            (start[0], z * start[1].unwrap_or(0.0)),
+            (start_dps, z * start_error.unwrap_or(0.0)),
         ];
         let room = widths
             .into_iter()

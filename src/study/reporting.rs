@@ -329,7 +329,8 @@ impl Reporting<'_> {
         let start = largest(c.bounds.startup_error_dps?);
         (start > limit * claimed).then(|| {
             format!(
-                "after a start from power-on the rate is not shown to settle to within {} deg/s, the limit of the bias, or so many times that as the point's merit is",
+                "after a start from power-on the rate is not shown to settle to within {} deg/s, the limit of the bias \
+                 (times the point's merit where that is above 1)",
                 number(limit, 3)
             )
         })
