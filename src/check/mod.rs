@@ -15,9 +15,9 @@ use crate::cosim::stream::stimulus;
 use crate::cost::{self, Target};
 use crate::design::Design;
 use crate::emit::bundle::{Bundle, Part, trace_compensation};
-use crate::equivalence::{overflow, predicted};
+use crate::equivalence::predicted;
 use crate::error::Result;
-use crate::nodes::run;
+use crate::nodes::{repair, run};
 use outcome::{Check, NodeCheck, Overflows, Witness};
 use proved::Proved;
 use requirements::Requirement;
@@ -71,7 +71,23 @@ pub fn check(design: &Design, command: &str, samples: usize) -> Result<Check> {
     let others = nodes
         .iter()
         .filter(|n| of_vector.is_none() || n.name != vector_width::KEY);
-    let mut reasons: Vec<String> = others.filter_map(NodeCheck::failure).collect();
+    let mut repairs = repair::repairs(design, &seen, (&drive, &sense)).0;
+    let mut reasons: Vec<String> = Vec::new();
+    for node in others {
+        let Some(mut reason) = node.failure() else {
+            continue;
+        };
+        // Once, though several words have their format from a key.
+        if let Some(k) = repairs.iter().position(|r| r.is_of(&node.name)) {
+            let mend = repairs.remove(k);
+            reason += &format!(
+                ". The smallest change that mends it, in {}: {}",
+                design.place_of(&mend.key),
+                mend.change()
+            );
+        }
+        reasons.push(reason);
+    }
     reasons.splice(0..0, of_vector);
     reasons.extend(requirements.iter().filter_map(Requirement::failure));
     Ok(Check {
@@ -114,7 +130,7 @@ fn node(design: &Design, p: &Proved, budget: &budget::Budget) -> NodeCheck {
         overflow,
         operands: if open { p.operands.clone() } else { Vec::new() },
         path: if open {
-            overflow::path(design, &p.name)
+            repair::path(design, &p.name)
         } else {
             Vec::new()
         },

@@ -6,7 +6,7 @@ use crate::circuit::scale::{excitation_is_off, full_scale_is_off};
 use crate::circuit::vector_width::{self, TooShort};
 use crate::cosim::rest::rows_per_s;
 use crate::design::{Compensation, Design};
-use crate::equivalence::overflow;
+use crate::nodes::repair;
 use crate::numeric::format::Rounding;
 use crate::spectrum::nco_spurs;
 use crate::text::number;
@@ -198,7 +198,7 @@ fn wraps(design: &Design, node: &NodeCheck, all: &mut Vec<Remark>) {
             "the proved range {} to {} does not fit {}, and a word that wraps has the other sign; it reaches {}",
             node.proved[0],
             node.proved[1],
-            overflow::format_of(design, key(&node.name)),
+            repair::format_of(design, key(&node.name)),
             node.path.join(" > ")
         ),
         mend: format!("give {} more bits", key(&node.name)),

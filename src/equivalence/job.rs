@@ -1,14 +1,13 @@
 //! All of `gyrogen equiv`: the paired run, the emitted code, the overflow's repair.
 
 use super::outcome::{Emitted, Equivalence, FirstOverflow, LoopReport, NodeReport};
-use super::overflow::{self, Repair};
 use super::predicted;
 use super::{against, shrink};
 use crate::design::Design;
 use crate::emit::views::Language;
 use crate::error::Result;
 use crate::nodes::probe::Seen;
-use crate::nodes::run;
+use crate::nodes::{repair, run};
 use crate::simulation::hunting::{Hunting, hunting};
 use crate::spectrum::{NcoSpurs, nco_spurs};
 use crate::verify::compare;
@@ -16,9 +15,6 @@ use crate::verify::firmware::Firmware;
 
 /// Rows that are compared with emitted code; a decimator of small ratio makes as many rows as samples.
 const MOST_ROWS: usize = 1 << 20;
-
-/// Formats that are changed one after the other before a design is called beyond repair.
-const MOST_REPAIRS: usize = 12;
 
 /// The codes, and where they came from.
 #[derive(Debug, Clone, Copy)]
@@ -195,34 +191,6 @@ fn compared(
     Ok(emitted)
 }
 
-/// Repairs overflow after overflow, running the design again after each, until nothing overflows.
-/// Gives the changes and whether the last run was clean.
-pub fn repairs(design: &Design, seen: &Seen, stimulus: Stimulus) -> (Vec<Repair>, bool) {
-    let mut repairs: Vec<Repair> = Vec::new();
-    let (mut design, mut seen) = (design.clone(), seen.clone());
-    while seen.first_overflow.is_some() {
-        if repairs.len() == MOST_REPAIRS {
-            return (repairs, false);
-        }
-        let Some((mut repair, repaired)) = overflow::smallest_repair(&design, &seen) else {
-            return (repairs, false);
-        };
-        let run = |design: &Design| run::run(design, stimulus.drive, stimulus.sense);
-        (design, seen) = (repaired.clone(), run(&repaired));
-        while overflow::is_enough(&repair, &seen)
-            && let Some((shorter, less)) = overflow::one_bit_less(&repair, &design)
-        {
-            let tried = run(&less);
-            if !overflow::is_enough(&shorter, &tried) {
-                break;
-            }
-            (repair, design, seen) = (shorter, less, tried);
-        }
-        repairs.push(repair);
-    }
-    (repairs, true)
-}
-
 fn assemble(
     design: &Design,
     stimulus: Stimulus,
@@ -234,7 +202,7 @@ fn assemble(
     let predictions = predicted::predict(design, seen);
     let pairs = seen.nodes.iter().zip(&predictions);
     let nodes: Vec<NodeReport> = pairs.map(|(n, p)| NodeReport::new(n, p)).collect();
-    let (repairs, verified) = repairs(design, seen, stimulus);
+    let (repairs, verified) = repair::repairs(design, seen, (stimulus.drive, stimulus.sense));
     let first_overflow = FirstOverflow::new(design, seen, repairs.first().cloned());
     let repair_verified = first_overflow.is_some().then_some(verified);
     let mut reasons = Vec::new();

@@ -1,13 +1,13 @@
 //! `equiv.json` (`gyrogen.equiv/1`): what a run comes to.
 
 use super::against::{Against, FirstDifference};
-use super::overflow::{self, Repair};
 use super::predicted::Prediction;
 use crate::circuit::vector_width::{self, TooShort};
 use crate::design::Design;
 use crate::nodes::histogram::Histogram;
 use crate::nodes::node::Node;
 use crate::nodes::probe::Seen;
+use crate::nodes::repair::{self, Repair};
 use crate::simulation::hunting::Hunting;
 use crate::spectrum::NcoSpurs;
 use crate::verify::compare::Compared;
@@ -141,8 +141,8 @@ impl FirstOverflow {
             operands: event.operands.clone(),
             value: event.value,
             real_value: event.value as f64 * lsb,
-            format: overflow::format_of(design, event.label.key),
-            path: overflow::path(design, &event.part),
+            format: repair::format_of(design, event.label.key),
+            path: repair::path(design, &event.part),
             repair,
             mend: (event.label.key == vector_width::KEY)
                 .then(|| TooShort::of(design))
@@ -165,10 +165,7 @@ impl FirstOverflow {
         match (&self.mend, &self.repair) {
             (Some(mend), _) => text += &format!("; {mend}"),
             (None, Some(r)) => {
-                text += &format!(
-                    ". The smallest change that mends it: {} from {} to {}",
-                    r.key, r.from, r.to
-                )
+                text += &format!(". The smallest change that mends it: {}", r.change())
             }
             (None, None) => {
                 text += ". No wider format within 64 bits a word and 127 an intermediate holds it"

@@ -2,9 +2,9 @@
 
 use crate::cosim::stream::stimulus;
 use crate::design::Design;
-use crate::equivalence::job::{Stimulus, repairs};
 use crate::equivalence::outcome::FirstOverflow;
 use crate::error::{Error, Result};
+use crate::nodes::repair::repairs;
 use crate::nodes::run;
 
 /// ADC samples that are looked at.
@@ -17,12 +17,7 @@ const SAMPLES: usize = 120_000;
 pub fn refuse(design: &Design) -> Result<()> {
     let (drive, sense) = stimulus(design, SAMPLES)?;
     let seen = run::run(design, &drive, &sense);
-    let codes = Stimulus {
-        drive: &drive,
-        sense: &sense,
-        origin: "the design's thermal run",
-    };
-    let (repairs, _) = repairs(design, &seen, codes);
+    let (repairs, _) = repairs(design, &seen, (&drive, &sense));
     match FirstOverflow::new(design, &seen, repairs.into_iter().next()) {
         Some(first) => Err(Error::Check(format!(
             "{}; a study varies fraction bits, and integer bits have to hold first",

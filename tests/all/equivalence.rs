@@ -9,9 +9,8 @@ use crate::rng::Rng;
 use gyrogen::circuit::engine::{self, ArithmeticKind, Rows};
 use gyrogen::cosim::stream::stimulus;
 use gyrogen::design::{Design, reader};
-use gyrogen::equivalence::job::{Stimulus, repairs};
-use gyrogen::equivalence::overflow::{one_bit_less, smallest_repair};
 use gyrogen::equivalence::predicted::predict;
+use gyrogen::nodes::repair::{one_bit_less, repairs, smallest_repair};
 use gyrogen::nodes::run::{run, run_with_rows};
 use gyrogen::numeric::format::{Format, Overflow, Rounding};
 
@@ -132,12 +131,7 @@ fn the_smallest_repair_is_enough_and_one_bit_less_is_not() {
         if seen.first_overflow.is_none() {
             continue;
         }
-        let stimulus = Stimulus {
-            drive: &drive,
-            sense: &sense,
-            origin: "",
-        };
-        let (changes, clean) = repairs(&design, &seen, stimulus);
+        let (changes, clean) = repairs(&design, &seen, (&drive, &sense));
         assert!(!clean || !changes.is_empty(), "seed {seed}");
         // What cannot be repaired needs a word of more than 64 or 127 bits.
         repaired += u64::from(clean);

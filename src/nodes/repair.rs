@@ -1,11 +1,15 @@
-//! The first overflow: where it came from, where it goes, and the smallest format that removes it.
+//! Overflows: where a word goes, and the smallest formats that remove them.
 
+use super::node::Node;
+use super::probe::Seen;
+use super::run;
 use crate::circuit::vector_width::TooShort;
 use crate::design::{Design, limits};
-use crate::nodes::node::Node;
-use crate::nodes::probe::Seen;
 use crate::numeric::format::{Format, Overflow, Quantizer};
 use serde::Serialize;
+
+/// Formats that are changed one after the other before a design is called beyond repair.
+const MOST_REPAIRS: usize = 12;
 
 /// A change of one format.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, schemars::JsonSchema)]
@@ -16,6 +20,50 @@ pub struct Repair {
     pub from: String,
     /// As it would have to be.
     pub to: String,
+}
+
+impl Repair {
+    /// In words.
+    pub fn change(&self) -> String {
+        format!("{} from {} to {}", self.key, self.from, self.to)
+    }
+
+    /// True if a node of this name has its format from the key.
+    pub fn is_of(&self, node: &str) -> bool {
+        is_of(&self.key, node)
+    }
+}
+
+fn is_of(key: &str, node: &str) -> bool {
+    node == key || node.strip_prefix(key).is_some_and(|r| r.starts_with(' '))
+}
+
+/// Repairs overflow after overflow, running the design again on the same drive and sense codes after each, until nothing
+/// overflows. Gives the changes and whether the last run was clean.
+pub fn repairs(design: &Design, seen: &Seen, codes: (&[i32], &[i32])) -> (Vec<Repair>, bool) {
+    let mut repairs: Vec<Repair> = Vec::new();
+    let (mut design, mut seen) = (design.clone(), seen.clone());
+    while seen.first_overflow.is_some() {
+        if repairs.len() == MOST_REPAIRS {
+            return (repairs, false);
+        }
+        let Some((mut repair, repaired)) = smallest_repair(&design, &seen) else {
+            return (repairs, false);
+        };
+        let run = |design: &Design| run::run(design, codes.0, codes.1);
+        (design, seen) = (repaired.clone(), run(&repaired));
+        while is_enough(&repair, &seen)
+            && let Some((shorter, less)) = one_bit_less(&repair, &design)
+        {
+            let tried = run(&less);
+            if !is_enough(&shorter, &tried) {
+                break;
+            }
+            (repair, design, seen) = (shorter, less, tried);
+        }
+        repairs.push(repair);
+    }
+    (repairs, true)
 }
 
 /// The smallest change of the first overflowing node's format that holds every word which this run
@@ -88,9 +136,8 @@ fn quantizer_mut<'a>(design: &'a mut Design, key: &str) -> Option<&'a mut Quanti
 }
 
 fn nodes_of<'a>(seen: &'a Seen, key: &'a str) -> impl Iterator<Item = &'a Node> {
-    let of_key =
-        move |name: &str| name == key || name.strip_prefix(key).is_some_and(|r| r.starts_with(' '));
-    seen.nodes.iter().filter(move |n| of_key(&n.identity.name))
+    let nodes = seen.nodes.iter();
+    nodes.filter(move |n| is_of(key, &n.identity.name))
 }
 
 /// Greatest and least word before the overflow step, over all nodes of a key.
