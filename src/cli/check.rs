@@ -52,6 +52,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     match arguments.format {
         OutputFormat::Json => super::terminal::give(&json),
         OutputFormat::Text => {
+            super::common::say_what_is_emitted(&design);
             print(&check);
             if let Some(out) = &arguments.out {
                 super::common::wrote(out, &PLANNED[..1]);
@@ -68,24 +69,22 @@ fn print(check: &Check) {
     for reason in &check.reasons {
         say!("{reason}");
     }
-    let mut table = super::terminal::table(&[
-        "word",
-        "what it is",
-        "format",
-        "proved range, raw",
-        "has, bits",
-        "needs, bits",
-        "spare, bits",
-        "overflow",
-    ]);
+    // In two tables: one of all columns is too wide for a terminal.
+    let mut ranges = super::terminal::table(&["word", "what it is", "proved range, raw"]);
+    let mut bits = super::terminal::table(&["word", "format", "has", "needs", "spare", "overflow"]);
     for node in &check.nodes {
-        table.add_row(row(node));
+        let [word, what, format, range, has, needs, spare, overflow] = row(node);
+        ranges.add_row([word.clone(), what, range]);
+        bits.add_row([word, format, has, needs, spare, overflow]);
     }
-    super::terminal::numbers(&mut table, 3..);
-    super::terminal::show(&table);
+    super::terminal::numbers(&mut ranges, 2..);
+    super::terminal::numbers(&mut bits, 2..);
+    super::terminal::show(&ranges);
+    say!("proved range: every raw word that can come, for every ADC code and state.");
+    super::terminal::show(&bits);
     say!(
-        "proved range: every raw word that can come, for every ADC code and state. needs: the bits that hold this range. spare: has less \
-         needs; below 0 the word can overflow. -: does not apply."
+        "has: the bits of the word. needs: the bits that hold its proved range. spare: has less needs; below 0 the word can overflow. -: \
+         does not apply."
     );
     roundings(&check.nodes);
     let open = || {
@@ -115,7 +114,7 @@ fn print(check: &Check) {
             check.samples
         );
     }
-    for node in not_run {
+    for node in &not_run {
         say!(
             "{} was not run, as the thermometer is not a word of the circuit: whether it overflows is untested.",
             node.name
@@ -187,7 +186,10 @@ fn print(check: &Check) {
         );
         rest = others;
     }
-    say!("{}", verdict(check.holds, open().count(), check.samples));
+    say!(
+        "{}",
+        verdict(check.holds, [run.len(), not_run.len()], check.samples)
+    );
 }
 
 /// What each word's rounding makes, as a table beside that of the ranges: both in one are too wide for a terminal.
@@ -195,8 +197,8 @@ fn roundings(nodes: &[NodeCheck]) {
     let mut table = super::terminal::table(&[
         "word",
         "own rounding, LSB rms",
-        "adds to the rate, deg/s rms",
-        "mean, deg/s",
+        "rate, deg/s rms",
+        "rate, deg/s mean",
     ]);
     let some = |v: Option<f64>| v.map_or("-".to_owned(), |v| number(v, 3));
     for node in nodes {
@@ -215,22 +217,31 @@ fn roundings(nodes: &[NodeCheck]) {
     super::terminal::numbers(&mut table, 1..);
     super::terminal::show(&table);
     say!(
-        "own rounding: the error that the word's rounding makes by itself; beside it, what that adds to the rate, rms and mean. \
+        "own rounding: the error that the word's rounding makes by itself. rate: what that adds to the rate, rms and mean. \
          A word that is not here does not round."
     );
 }
 
-/// The verdict on a run of so many ADC samples; `open` words are not proved to hold every value.
-fn verdict(holds: bool, open: usize, samples: u64) -> String {
-    match (holds, open) {
-        (false, _) => "does not hold".to_owned(),
-        (true, 0) => "holds".to_owned(),
-        (true, _) => {
-            let words = counted(open as u64, "word");
-            format!(
-                "holds: no overflow in {samples} samples; {words} could overflow for inputs that did not occur"
-            )
-        }
+/// The verdict on a run of so many ADC samples; so many words that were run, and that were not, are not proved to hold every
+/// value.
+fn verdict(holds: bool, [run, not_run]: [usize; 2], samples: u64) -> String {
+    if !holds {
+        return "does not hold".to_owned();
+    }
+    let words = |count: usize| counted(count as u64, "word");
+    let of_run = match run {
+        0 => String::new(),
+        _ => format!(
+            ": no overflow in {samples} samples; {} could overflow for inputs that did not occur",
+            words(run)
+        ),
+    };
+    match not_run {
+        0 => format!("holds{of_run}"),
+        _ => format!(
+            "holds for the words that were run{of_run}; {} not run could overflow",
+            words(not_run)
+        ),
     }
 }
 
@@ -319,10 +330,10 @@ fn bits(n: &NodeCheck) -> Option<[u32; 2]> {
     ])
 }
 
-fn row(n: &NodeCheck) -> Vec<String> {
+fn row(n: &NodeCheck) -> [String; 8] {
     let overflow = match n.overflow {
         Overflows::Impossible => "impossible (proved)".to_owned(),
-        Overflows::Possible => format!("possible (would {})", n.mode),
+        Overflows::Possible => format!("possible ({})", n.mode),
         Overflows::Certain => match n.follows_from {
             Some(key) => format!("follows from {key}"),
             None => format!("CERTAIN ({})", n.mode),
@@ -342,9 +353,9 @@ fn row(n: &NodeCheck) -> Vec<String> {
     let format = match n.name == name {
         true => n.format.clone(),
         // The engine's own, which no key sets.
-        false => format!("{has} bits, internal"),
+        false => "internal".to_owned(),
     };
-    vec![
+    [
         name.to_owned(),
         what.to_owned(),
         format,
@@ -400,19 +411,12 @@ mod tests {
         let check = checked(&[]);
         let of = |name: &str| row(check.nodes.iter().find(|n| n.name == name).unwrap());
         let magnitude = of("circuit.cordic.gain_bits");
-        let due = [
-            "circuit.cordic magnitude",
-            "drive magnitude",
-            "64 bits, internal",
-        ];
-        assert_eq!(
-            (&magnitude[..3], magnitude.len()),
-            (&due.map(str::to_owned)[..], 8)
-        );
+        let due = ["circuit.cordic magnitude", "drive magnitude", "internal"];
+        assert_eq!(magnitude[..3], due);
         assert_eq!(magnitude[4..7], ["64", "24", "40"]);
         assert_eq!(of("circuit.cordic.width")[4..7], ["32", "31", "1"]);
         let bias = of("compensation.output bias");
-        let due = ["24", "25", "-1", "possible (would saturate)"];
+        let due = ["24", "25", "-1", "possible (saturate)"];
         assert_eq!(bias[4..8], due);
         assert_eq!(
             of("circuit.cordic phase")[4..8],
@@ -422,13 +426,22 @@ mod tests {
 
     #[test]
     fn the_verdict_says_what_is_not_proved() {
-        assert_eq!(verdict(true, 0, 1000), "holds");
-        assert_eq!(verdict(false, 2, 1000), "does not hold");
+        assert_eq!(verdict(true, [0, 0], 1000), "holds");
+        assert_eq!(verdict(false, [2, 0], 1000), "does not hold");
         for (open, words) in [(1, "1 word"), (2, "2 words")] {
             let due = format!(
                 "holds: no overflow in 1000 samples; {words} could overflow for inputs that did not occur"
             );
-            assert_eq!(verdict(true, open, 1000), due);
+            assert_eq!(verdict(true, [open, 0], 1000), due);
         }
+        assert_eq!(
+            verdict(true, [0, 1], 1000),
+            "holds for the words that were run; 1 word not run could overflow"
+        );
+        assert_eq!(
+            verdict(true, [1, 2], 1000),
+            "holds for the words that were run: no overflow in 1000 samples; 1 word could overflow for inputs that did not occur; \
+             2 words not run could overflow"
+        );
     }
 }

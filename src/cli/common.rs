@@ -1,6 +1,7 @@
 //! What the subcommands share: lines and tables on the terminal, progress, JSON, the design that was named.
 
 use super::terminal;
+use crate::design::{CompensationInput, Design};
 use crate::emit::views::Language;
 use crate::error::Result;
 use crate::firmware::files::EmittedFile;
@@ -253,6 +254,18 @@ fn wrote_line(out: &Path, next: &[&str]) -> String {
     let there: Vec<&str> = next.iter().copied().filter(is_there).collect();
     let colon = if there.is_empty() { "" } else { ": " };
     format!("wrote {}{colon}{}", out.display(), there.join(", "))
+}
+
+/// Says so where the firmware has no circuit, though its words are checked.
+pub(super) fn say_what_is_emitted(design: &Design) {
+    let input = design.compensation.as_ref().map(|c| &c.input);
+    if let Some(CompensationInput::Channel(channel)) = input {
+        say!(
+            "The firmware of this design is the compensation alone: its input, {}, is no word of the circuit. What is said of circuit.* \
+             below is about the design's [circuit], which is not in that firmware.",
+            channel.column
+        );
+    }
 }
 
 #[cfg(test)]

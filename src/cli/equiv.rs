@@ -12,7 +12,7 @@ use crate::equivalence::shrink;
 use crate::error::{Error, Result};
 use crate::output::name_of;
 use crate::record::capture::CaptureReader;
-use crate::text::{away_from_zero_decimals, number};
+use crate::text::{away_from_zero_decimals, constant, number};
 use crate::timing;
 use std::path::{Path, PathBuf};
 
@@ -111,7 +111,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     results.finish()?;
     match arguments.format {
         OutputFormat::Json => super::terminal::give(&json),
-        OutputFormat::Text => print(&result, &arguments.out),
+        OutputFormat::Text => print(&design, &result, &arguments.out),
     }
     if result.holds {
         return Ok(());
@@ -160,30 +160,34 @@ fn read(design: &Design, path: &Path, most: usize) -> Result<(Vec<i32>, Vec<i32>
     Ok((drive, sense))
 }
 
-fn print(e: &Equivalence, out: &Path) {
-    let mut table = super::terminal::table(&[
+fn print(design: &Design, e: &Equivalence, out: &Path) {
+    super::common::say_what_is_emitted(design);
+    // In two tables: one of all columns is too wide for a terminal.
+    let mut errors = super::terminal::table(&[
         "node",
         "max error, LSB",
         "bound, LSB",
         "rms, LSB",
         "predicted rms, LSB",
-        "one LSB is",
-        "headroom, bits",
-        "overflows",
-        "flags",
     ]);
+    let mut words =
+        super::terminal::table(&["node", "one LSB is", "headroom", "overflows", "flags"]);
     let usual = usual_flag(e.nodes.iter().map(|n| &n.flags[..]));
     for n in &e.nodes {
-        table.add_row(row(n, usual));
+        errors.add_row(error_row(n));
+        words.add_row(word_row(n, usual));
     }
-    super::terminal::numbers(&mut table, 1..1 + 7);
-    super::terminal::show(&table);
+    super::terminal::numbers(&mut errors, 1..);
+    super::terminal::numbers(&mut words, 1..4);
+    super::terminal::show(&errors);
     say!(
         "error: fixed point less floating point, in LSB of the node. Its bound holds at every sample. A node whose LSB is in \
          deg/s is the bias or the rate, or a step on the way to them."
     );
+    super::terminal::show(&words);
+    say!("headroom: bits by which the words could grow before they overflow.");
     if let Some(flag) = usual {
-        say!("flags: every node without one has {flag}.");
+        say!("flags: an empty cell stands for {flag}.");
     }
     if e.nodes.iter().any(|n| n.name.contains(" inner ")) {
         say!(
@@ -282,12 +286,11 @@ fn usual_flag<'a>(nodes: impl Iterator<Item = &'a [&'static str]> + Clone) -> Op
     (4 * having >= 3 * all && nodes.clone().all(is_told_apart)).then_some(flag)
 }
 
-/// A node as the table has it; of its flags not the `usual` one.
-fn row(n: &NodeReport, usual: Option<&str>) -> Vec<String> {
+/// A node's errors.
+fn error_row(n: &NodeReport) -> Vec<String> {
     let decimals = |v: f64| if v.abs() < 1e3 { 3 } else { 0 };
     let lsb = |v: f64| format!("{:.*}", decimals(v / n.lsb), v / n.lsb);
     let bound = n.bound / n.lsb;
-    let unit = if n.unit == "1" { "" } else { n.unit };
     let some = |v: Option<f64>| v.map_or("-".to_owned(), lsb);
     vec![
         n.name.clone(),
@@ -295,7 +298,17 @@ fn row(n: &NodeReport, usual: Option<&str>) -> Vec<String> {
         away_from_zero_decimals(bound, decimals(bound)),
         lsb(n.rms_error),
         some(n.predicted_rms),
-        format!("{} {unit}", number(n.lsb, 3)).trim_end().to_owned(),
+    ]
+}
+
+/// A node's words; of its flags not the `usual` one.
+fn word_row(n: &NodeReport, usual: Option<&str>) -> Vec<String> {
+    let unit = if n.unit == "1" { "" } else { n.unit };
+    vec![
+        n.name.clone(),
+        format!("{} {unit}", constant(n.lsb, 3))
+            .trim_end()
+            .to_owned(),
         n.headroom_bits.map_or("-".into(), |b| format!("{b:.2}")),
         n.overflows.to_string(),
         match usual.is_some_and(|flag| n.flags == [flag]) {

@@ -286,13 +286,13 @@ fn print_sentences(outcome: &Outcome) {
 pub(super) fn show_loops(found: &[Hunting]) {
     let mut table = super::terminal::table(&[
         "loop, unit of its output",
-        "chamber, degC",
-        "output pp: circuit",
-        "reduced model",
-        "error pp, LSB: circuit",
-        "reduced model",
-        "limit",
-        "mean error, LSB",
+        "degC",
+        "output pp\ncircuit",
+        "output pp\nmodel",
+        "error pp\ncircuit",
+        "error pp\nmodel",
+        "error pp\nlimit",
+        "mean\nerror",
     ]);
     for h in found {
         table.add_row([
@@ -308,7 +308,7 @@ pub(super) fn show_loops(found: &[Hunting]) {
     }
     super::terminal::numbers(&mut table, 1..);
     super::terminal::show(&table);
-    say!("{}", hunting::caption());
+    say!("{}", hunting::caption(found));
 }
 
 /// Decimals that show a tolerance.

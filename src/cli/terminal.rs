@@ -241,7 +241,10 @@ fn by_line(table: &Table) -> String {
                 (0, content) => out.push(content.to_owned()),
                 (_, "") => {}
                 (_, content) if title.is_empty() => out.push(format!("  {content}")),
-                (_, content) => out.push(format!("  {title}: {}", content.replace('\n', "; "))),
+                (_, content) => {
+                    let (title, content) = (title.replace('\n', " "), content.replace('\n', "; "));
+                    out.push(format!("  {title}: {content}"));
+                }
             }
         }
     }

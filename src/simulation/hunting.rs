@@ -27,6 +27,7 @@ use crate::numeric::fixed::Fixed;
 use crate::numeric::format::pow2;
 use crate::plant::noise::Noise;
 use crate::plant::profile::{self, Profile};
+use crate::text::number;
 use serde::Serialize;
 use std::f64::consts::TAU;
 
@@ -58,6 +59,8 @@ pub struct Hunting {
     pub converters_pp_lsb: f64,
     /// Mean error, measured, LSB: the dead band's mark.
     pub error_mean_lsb: f64,
+    /// Mean error over the rows for each step of the output that the integral part moves in them, LSB.
+    pub error_mean_per_step_lsb: f64,
     /// Width of the dead band by theory, LSB of the error.
     pub predicted_dead_band_lsb: f64,
     /// The wave of the error in physical units, peak to peak: rad, or relative amplitude.
@@ -72,14 +75,23 @@ impl Hunting {
 }
 
 /// What the columns of a table of loops hold, and what is compared with what.
-pub fn caption() -> String {
+pub fn caption(found: &[Hunting]) -> String {
+    let mut means: Vec<String> = Vec::new();
+    for h in found {
+        let mean = format!("{} LSB ({})", number(h.error_mean_per_step_lsb, 3), h.name);
+        if !means.contains(&mean) {
+            means.push(mean);
+        }
+    }
     format!(
         "The loops run without noise at the first, the middle and the last temperature on the way up of [thermal_run]. pp: the largest \
          less the smallest value in {ROWS} rows. An output is in the unit beside the loop's name. An error is the setpoint's \
-         difference from the magnitude or the phase, in LSB of that word. Circuit: the bit-accurate loop with ADC and NCO. Reduced model: the same \
-         loop without these two, so that its error may be the smaller one. Limit: the reduced model's error plus the most that ADC and NCO \
+         difference from the magnitude or the phase, in LSB of that word. Circuit: the bit-accurate loop with ADC and NCO. Model: the same \
+         loop without these two, so that its error may be the smaller one. Limit: the model's error plus the most that ADC and NCO \
          can add; the circuit's error must stay below it. By theory the loops have no dead band: they correct every error, \
-         however small, and the mean error goes to 0."
+         however small. The mean error is what the integrator moved, divided by the rows, and goes to 0 with more of them: in {ROWS} rows it \
+         is {} for each step that the integral part of the output moved.",
+        means.join(" and ")
     )
 }
 
@@ -138,6 +150,8 @@ fn at(design: &Design, degc: f64) -> Result<Vec<Hunting>> {
             name: "phase_loop",
             chamber_degc: degc,
             output_unit: "tuning word step",
+            error_mean_per_step_lsb: pow2(l.integral.shift as i32)
+                / (l.integral.raw as f64 * ROWS as f64),
             converters_pp_lsb: turn / TAU * converters,
             error_pp: peak_to_peak(&errors) / turn * TAU,
             ..compare(&outputs, &errors, &predicted)
@@ -157,6 +171,7 @@ fn at(design: &Design, degc: f64) -> Result<Vec<Hunting>> {
             name: "amplitude_loop",
             chamber_degc: degc,
             output_unit: "gain LSB",
+            error_mean_per_step_lsb: pow2(l.integrator_shift as i32) / ROWS as f64,
             converters_pp_lsb: l.setpoint_raw as f64 * converters,
             error_pp: peak_to_peak(&errors) / l.setpoint_raw as f64,
             ..compare(&outputs, &errors, &predicted)
@@ -191,6 +206,7 @@ fn compare(outputs: &[f64], errors: &[f64], (by_model, errors_by_model): &Series
         error_pp_lsb: peak_to_peak(errors),
         predicted_error_pp_lsb: peak_to_peak(errors_by_model),
         converters_pp_lsb: 0.0,
+        error_mean_per_step_lsb: 0.0,
         error_mean_lsb: errors.iter().sum::<f64>() / errors.len().max(1) as f64,
         predicted_dead_band_lsb: 0.0,
         error_pp: 0.0,
@@ -321,7 +337,9 @@ mod tests {
             assert_eq!(found.len(), count);
             for h in found {
                 assert!(h.error_pp_lsb <= h.most_error_pp_lsb(), "{h:?}");
-                assert!(h.error_mean_lsb.abs() < 1.0, "{h:?}");
+                // The integral part moves no more than the output, but for a rounding.
+                let most = h.error_mean_per_step_lsb * (h.output_pp_lsb + 1.0);
+                assert!(h.error_mean_lsb.abs() <= most && most < 4.0, "{h:?}");
             }
         }
     }

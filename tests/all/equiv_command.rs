@@ -1,6 +1,6 @@
 //! `gyrogen equiv` as a user runs it: repairs, two designs, threads, counterexamples.
 
-use crate::common::command::{gyrogen_here, told};
+use crate::common::command::{gyrogen_here, gyrogen_in, told};
 use gyrogen::design::{Design, reader};
 use gyrogen::equivalence::job::{Stimulus, counterexample};
 use gyrogen::equivalence::outcome::Emitted;
@@ -132,6 +132,28 @@ fn words_four_bits_too_short_are_reported_with_the_repair_that_works() {
     let arguments = ["--samples", "300000", "--stimulus", "adversarial"];
     for key in ["circuit.demodulator.product", "circuit.decimator.output"] {
         repaired(&design, key, "Q5.22", "Q1.22", &arguments);
+    }
+}
+
+#[test]
+fn tables_of_words_fit_a_terminal_of_100_columns() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let longest = [
+        ("check", "circuit.decimator integrators drive_i"),
+        ("equiv", "circuit.demodulator.product drive_i"),
+    ];
+    for (command, name) in longest {
+        let arguments = [command, "--samples", "100000", "--out", "out"];
+        let output = gyrogen_in(folder.path(), &arguments, &[("COLUMNS", "100")]);
+        assert_eq!(output.status.code(), Some(0), "{}", told(&output));
+        let said = String::from_utf8(output.stdout).expect("UTF-8");
+        // Each row on one line, in both tables.
+        let rows = said
+            .lines()
+            .filter(|l| l.starts_with(&format!(" {name}  ")));
+        assert_eq!(rows.count(), 2, "{said}");
+        let wide = said.lines().find(|l| l.chars().count() > 100);
+        assert_eq!(wide, None, "{said}");
     }
 }
 

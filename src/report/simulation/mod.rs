@@ -78,7 +78,7 @@ pub fn html(outcome: &Outcome) -> Result<String> {
             .collect(),
         figures: figures::all(outcome),
         loops: loops(outcome),
-        loops_caption: hunting::caption(),
+        loops_caption: hunting::caption(&outcome.summary.loops),
         facts_are: match (s.fit.is_some(), s.lock.is_some()) {
             (true, true) => "Fit, lock and power-on",
             (true, false) => "Fit and power-on",
