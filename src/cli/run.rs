@@ -117,11 +117,15 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         say!("read: {columns}");
         say!("rows: {rows}");
     }
-    let (first, others) = super::common::parted(&outcome.summary.warnings, &parts.of_record);
+    let (first, mut others) = super::common::parted(&outcome.summary.warnings, &parts.of_record);
     super::warnings(&first);
     match arguments.format {
         OutputFormat::Json => super::terminal::give(&json),
-        OutputFormat::Text => print(&outcome, &arguments.out),
+        OutputFormat::Text => {
+            print(&outcome, &arguments.out);
+            // What it says stands beside the drift.
+            others.retain(|w| w.code != "heating_cooling_loop");
+        }
     }
     super::warnings(&others);
     if design.correction.is_some() {
@@ -129,7 +133,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     }
     if outcome.holds() {
         // A thermometer that stands is to be mended first.
-        if outcome.not_fitted().is_none() {
+        if outcome.not_fitted().is_none() && outcome.leaves_drift() {
             talk!("{}", next(arguments));
         }
         return Ok(());
@@ -164,7 +168,8 @@ fn print(outcome: &Outcome, out: &Path) {
     }
     super::terminal::show(&super::comparison_table(&s.equivalence.functions));
     say!(
-        "words compared: per call its results, its state and its fault number; per row of the chain its words; per table its entries."
+        "words compared: of a function its results, state and fault number at each call; of the chain every output word of each row; of a \
+         table every entry."
     );
     let mut table = super::terminal::table(&[
         "rate output at rest",
@@ -220,11 +225,16 @@ fn print(outcome: &Outcome, out: &Path) {
     for line in bias {
         say!("{line}");
     }
-    say!(
-        "The rate adds two roundings, of the thermometer to its word and of the rate to the output: it is at most {} deg/s from what \
-         the fitted polynomial gives (proved). The fit's own error is the held-out rms (an estimate).",
-        at_most(s.budget.bound_dps, 3)
-    );
+    // The rate can saturate where the bias cannot: the gyro turns.
+    let rate = match s.certainty.saturates {
+        true => "Nor does the rate".to_owned(),
+        false => format!(
+            "The rate adds two roundings, of the thermometer to its word and of the rate to the output: it is at most {} deg/s from \
+             what the fitted polynomial gives (proved, unless a word saturates)",
+            at_most(s.budget.bound_dps, 3)
+        ),
+    };
+    say!("{rate}. The fit's own error is the held-out rms (an estimate).");
     for line in others {
         say!("{line}");
     }
@@ -253,6 +263,7 @@ fn print(outcome: &Outcome, out: &Path) {
         s.equivalence.mismatches
     );
     let mut next = vec!["report.html", "design.toml"];
+    next.extend(outcome.parts.record_csv.as_ref().map(|_| "record.csv"));
     next.extend(outcome.parts.firmware.bundles().map(|(_, folder)| folder));
     super::common::wrote(out, &next);
 }

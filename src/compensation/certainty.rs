@@ -266,18 +266,22 @@ fn farthest(evaluation: &Evaluation, wanted: &Enclosure, end: i128, far: i128) -
         .fold(0.0, f64::max)
 }
 
+/// What a run knows beside the bounds.
+#[derive(Debug, Clone, Copy)]
+pub struct OfRun<'a> {
+    /// The reading of the thermometer at which the fitted polynomial has its largest standard deviation, with its unit.
+    pub least_certain: Option<&'a str>,
+    /// See [`Certainty::saturates`].
+    pub saturates: bool,
+}
+
 /// Sentences for the head of emitted sources.
 pub fn sentences(design: &Design, bounds: &Bounds) -> Vec<String> {
     sentences_with(design, bounds, None)
 }
 
-/// The same for the terminal and the report; `least_certain`: the reading of the thermometer at which the fitted polynomial has
-/// its largest standard deviation, with its unit.
-pub fn sentences_with(
-    design: &Design,
-    bounds: &Bounds,
-    least_certain: Option<&str>,
-) -> Vec<String> {
+/// The same for the terminal and the report, which say what a run says of heating and cooling elsewhere.
+pub fn sentences_with(design: &Design, bounds: &Bounds, of_run: Option<OfRun>) -> Vec<String> {
     let Some(c) = &design.compensation else {
         return Vec::new();
     };
@@ -290,15 +294,21 @@ pub fn sentences_with(
     } else {
         ""
     };
-    let mut lines = vec![format!(
-        "For a given word of the thermometer the firmware's bias is at most {} from the {against} (proved{unless}). Of this the coefficients' words make {}, the \
+    let saturates = of_run.is_some_and(|r| r.saturates);
+    let mut lines = vec![if saturates {
+        "The firmware's bias keeps to no bound: a word saturates inside the calibrated range."
+            .to_owned()
+    } else {
+        format!(
+            "For a given word of the thermometer the firmware's bias is at most {} from the {against} (proved{unless}). Of this the coefficients' words make {}, the \
          rounding of the steps {} and that of the output {} deg/s.",
-        figure(design, bounds.certified_max_dps),
-        at_most(bounds.coefficients_dps, 3),
-        at_most(bounds.evaluation_dps, 3),
-        at_most(bounds.output_dps, 3)
-    )];
-    if let Some(asked) = design.bound {
+            figure(design, bounds.certified_max_dps),
+            at_most(bounds.coefficients_dps, 3),
+            at_most(bounds.evaluation_dps, 3),
+            at_most(bounds.output_dps, 3)
+        )
+    }];
+    if let Some(asked) = design.bound.filter(|_| !saturates) {
         let covered = bounds.certified_max_dps + output_rounding_dps(c);
         let word = if covered <= asked.bound_dps {
             "kept"
@@ -321,11 +331,13 @@ pub fn sentences_with(
         lines.push(format!(
             "Where the fitted polynomial is least certain{}, its standard deviation is {} deg/s. Rows that the fit has not seen are \
              {} deg/s rms from it.",
-            least_certain.map_or(String::new(), |at| format!(" (at {at})")),
+            of_run
+                .and_then(|r| r.least_certain)
+                .map_or(String::new(), |at| format!(" (at {at})")),
             number(fitted.std_max_dps, 3),
             number(fitted.heldout_rms_dps, 3)
         ));
-        if let Some(rms) = fitted.loop_rms_dps {
+        if let (Some(rms), None) = (fitted.loop_rms_dps, of_run) {
             lines.push(format!(
                 "Heating and cooling differ by {} deg/s rms at the same reading of the thermometer. No polynomial in it follows both: \
                  `gyrogen close` looks for the cause.",
@@ -334,8 +346,12 @@ pub fn sentences_with(
         }
     }
     if let Some((low, high)) = c.flagged_range() {
+        let bound = match saturates {
+            true => "",
+            false => " for which the bound above holds,",
+        };
         lines.push(format!(
-            "guaranteed: in_range is 1 for the inputs {low} .. {high}, for which the bound above holds, and 0 for every \
+            "guaranteed: in_range is 1 for the inputs {low} .. {high},{bound} and 0 for every \
              other one, for which no error is promised: the bias is that of the nearer end"
         ));
     }
@@ -357,7 +373,11 @@ pub fn sentences_with(
 pub fn run_sentence(design: &Design, certainty: &Certainty) -> String {
     let c = certainty;
     format!(
-        "The bound of the bias was tried on {}{} {}: the bias was at most {} from the polynomial (at input word {}){}.",
+        "{} on {}{} {}: the bias was at most {} from the polynomial (at input word {}){}.",
+        match c.saturates {
+            true => "The bias was run",
+            false => "The bound of the bias was tried",
+        },
         if c.exhaustive { "all " } else { "" },
         c.inputs_checked,
         match design.compensation.as_ref().and_then(|c| c.clamp_raw) {

@@ -1,6 +1,6 @@
 //! The bounds against the bias itself, on random polynomials in random formats.
 
-use super::certainty::{bounds, certainty, sentences, sentences_with};
+use super::certainty::{OfRun, bounds, certainty, sentences, sentences_with};
 use super::{Evaluation, coefficients};
 use crate::approx::draws::Draws;
 use crate::design::{Design, Fitted, Outside, reader};
@@ -178,10 +178,26 @@ fn a_loop_of_heating_and_cooling_is_told() {
     assert!(!sentences(&design, &found).join(" ").contains("cooling"));
     let fitted = design.compensation.as_mut().and_then(|c| c.fitted.as_mut());
     fitted.unwrap().loop_rms_dps = Some(0.125);
-    let at = sentences_with(&design, &found, Some("85 degC")).join(" ");
+    let of_run = OfRun {
+        least_certain: Some("85 degC"),
+        saturates: false,
+    };
+    let at = sentences_with(&design, &found, Some(of_run)).join(" ");
     assert!(
         at.contains("least certain (at 85 degC), its standard deviation is"),
         "{at}"
+    );
+    // The run says it beside the drift.
+    assert!(!at.contains("Heating and cooling"), "{at}");
+    assert!(at.contains("proved"), "{at}");
+    let saturates = OfRun {
+        saturates: true,
+        ..of_run
+    };
+    let none = sentences_with(&design, &found, Some(saturates)).join(" ");
+    assert!(
+        none.contains("keeps to no bound") && !none.contains("proved"),
+        "{none}"
     );
     let said = sentences(&design, &found).join(" ");
     assert!(

@@ -29,6 +29,7 @@ use crate::emit::views::Language;
 use crate::error::Result;
 use crate::record::{self, Warning};
 use outcome::Outcome;
+use own_run::Overflowing;
 pub use points::{DRIFT_BINS, Point, Points, drift_pp, rms};
 use reading::{clamped_bias, compensation, no_compensation, thermometer_raw, warning};
 use std::path::Path;
@@ -70,16 +71,6 @@ pub fn run(
     }
     let (fit, chosen, rounded) = (calibration.fit, calibration.chosen, calibration.rounded);
     let certainty = certainty::certainty(&design)?.ok_or_else(no_compensation)?;
-    if certainty.saturates {
-        warnings.push(warning(
-            "bias_saturates",
-            format!(
-                "the bias leaves its formats inside the calibrated range: at input {} it is {:.4} deg/s from the fit. Give \
-                 compensation.accumulator or compensation.output more integer bits: `gyrogen check` names the word that overflows",
-                certainty.at_input_raw, certainty.exhaustive_max_dps
-            ),
-        ));
-    }
     if calibration.kept.is_some() {
         bound::refuse_saturation(&certainty)?;
     }
@@ -106,6 +97,23 @@ pub fn run(
             points.iter().map(|p| (p.fixed_dps, p.float_dps)).unzip();
         WordLengths::measure(&design, &fit, &fixed, &float, simulated.as_ref())?
     };
+    if certainty.saturates {
+        let of_bias =
+            |o: &&Overflowing| o.repairs.iter().any(|r| r.key.starts_with("compensation."));
+        let overflow = word_lengths.overflow.as_ref().filter(of_bias);
+        let mend = overflow.and_then(Overflowing::mend).unwrap_or_else(|| {
+            "Give compensation.accumulator or compensation.output more integer bits: `gyrogen check` says which of them can \
+             overflow"
+                .to_owned()
+        });
+        warnings.push(warning(
+            "bias_saturates",
+            format!(
+                "the bias leaves its formats inside the calibrated range: at input {} it is {:.4} deg/s from the fit. {mend}",
+                certainty.at_input_raw, certainty.exhaustive_max_dps
+            ),
+        ));
+    }
     let record_csv = simulated.map(|run| run.record_csv());
     Ok(Outcome::new(outcome::Parts {
         design,

@@ -7,7 +7,7 @@ pub use super::points::{Point, Points};
 use super::word_lengths::WordLengths;
 use super::{drift_pp, rms};
 use crate::compensation::certainty;
-use crate::compensation::certainty::Certainty;
+use crate::compensation::certainty::{Certainty, OfRun};
 use crate::design::Design;
 use crate::digest::sha256;
 use crate::output::name_of;
@@ -210,7 +210,7 @@ pub fn single_readings(summary: &Summary, points: &Points) -> Option<String> {
         let largest = points.iter().map(|p| p.fixed_dps.abs());
         format!(
             "Heating and cooling differ, and the drift is that of their average: single readings are off by {} deg/s rms and by \
-             up to {} deg/s after compensation. `gyrogen close`, with the same record and design, looks for the lag.",
+             up to {} deg/s after compensation.",
             number(summary.after.fixed.rms_dps, 3),
             number(largest.fold(0.0, f64::max), 3)
         )
@@ -227,6 +227,9 @@ pub fn not_fitted(summary: &Summary) -> Option<String> {
         )
     })
 }
+
+/// Up to this many times the noise floor the held-out error is taken for noise alone (convention).
+const NOISE_ALONE: f64 = 1.5;
 
 impl Outcome {
     /// Draws the conclusions.
@@ -295,7 +298,11 @@ impl Outcome {
                 let least_certain = format!("{} {}", number(fit.least_certain(), 5), fit.unit);
                 let at = (fit.order > 0).then_some(least_certain.as_str());
                 let bounds = &parts.certainty.bounds;
-                let mut text = certainty::sentences_with(&parts.design, bounds, at);
+                let of_run = OfRun {
+                    least_certain: at,
+                    saturates: parts.certainty.saturates,
+                };
+                let mut text = certainty::sentences_with(&parts.design, bounds, Some(of_run));
                 text.push(certainty::run_sentence(&parts.design, &parts.certainty));
                 text
             },
@@ -325,6 +332,15 @@ impl Outcome {
                 .collect(),
         };
         Outcome { summary, parts }
+    }
+
+    /// True if something is left that may have a cause beside the bias: not noise, and not words that overflow.
+    pub fn leaves_drift(&self) -> bool {
+        let (fit, words) = (&self.summary.fit, &self.summary.word_lengths);
+        let overflows = self.parts.certainty.saturates || words.overflow.is_some();
+        let is_left = self.single_readings().is_some()
+            || fit.heldout_rms_dps > NOISE_ALONE * fit.noise_floor_rms_dps;
+        is_left && !overflows
     }
 
     /// True if emitted code and model agree everywhere.

@@ -12,13 +12,33 @@ use crate::cosim::{readings, stream};
 use crate::design::{CompensationInput, Design};
 use crate::emit::views::Language;
 use crate::error::{Error, InputError, Result};
+use crate::nodes::repair::{self, Repair};
 use crate::nodes::run;
 use crate::numeric::format::pow2;
 use crate::plant::profile::{Profile, Reading};
 use crate::record::Warning;
 use crate::thermal::BaselineFit;
 use crate::verify::firmware::Firmware;
+use serde::Serialize;
 use std::f64::consts::TAU;
+
+/// A word that overflows in a run.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, schemars::JsonSchema)]
+pub struct Overflowing {
+    /// The dotted key of the first one.
+    pub word: String,
+    /// The smallest formats that hold every word of the run; empty where none does.
+    pub repairs: Vec<Repair>,
+}
+
+impl Overflowing {
+    /// What to change, in words; `None` where nothing mends it.
+    pub fn mend(&self) -> Option<String> {
+        let changes: Vec<String> = self.repairs.iter().map(Repair::change).collect();
+        (!changes.is_empty())
+            .then(|| format!("The smallest change that mends it: {}", changes.join(", ")))
+    }
+}
 
 /// Codes of the whole run and what the uncompensated circuit makes of them.
 pub struct OwnRun {
@@ -128,6 +148,15 @@ impl OwnRun {
             first.sample,
             short.sentence()
         ))
+    }
+
+    /// The first word of a design that overflows on the run's codes, and the formats that hold them.
+    pub fn overflow(&self, design: &Design) -> Option<Overflowing> {
+        let (drive, sense) = (&self.stream.drive, &self.stream.sense);
+        let seen = run::run(design, drive, sense);
+        let word = seen.first_overflow.as_ref()?.label.key.to_owned();
+        let (repairs, _) = repair::repairs(design, &seen, (drive, sense));
+        Some(Overflowing { word, repairs })
     }
 
     /// Mean thermometer and rate output of each reading, without compensation.

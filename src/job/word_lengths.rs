@@ -2,7 +2,7 @@
 //! and which word does most of it, found by giving each one more bits while the others stay.
 
 use super::coefficients;
-use super::own_run::OwnRun;
+use super::own_run::{Overflowing, OwnRun};
 use crate::design::{Design, limits};
 use crate::error::Result;
 use crate::numeric::format::Format;
@@ -52,6 +52,9 @@ pub struct WordLengths {
     pub max_dps: f64,
     /// The word that does most; null where none does a notable part alone, and for a record.
     pub largest: Option<Widened>,
+    /// What overflows, looked for where the word lengths limit the design's own run; then no word is tried longer.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub overflow: Option<Overflowing>,
     /// Every word that was tried, the one that does most first.
     pub widened: Vec<Widened>,
 }
@@ -70,9 +73,16 @@ impl WordLengths {
     ) -> Result<Self> {
         let apart = apart(fixed, float);
         let rms_dps = rms(&apart);
+        let is_limiting = rms_dps >= fit.heldout_rms_dps;
+        let overflow = run
+            .filter(|_| is_limiting)
+            .and_then(|run| run.overflow(design));
         let mut widened = Vec::new();
         for (key, widen) in WORDS {
-            let Some(run) = run else { break };
+            // More fraction bits hold no larger value.
+            let Some(run) = run.filter(|_| overflow.is_none()) else {
+                break;
+            };
             let Some((from, to, other)) = tried(design, fit, *widen) else {
                 continue;
             };
@@ -97,6 +107,7 @@ impl WordLengths {
             mean_dps: apart.iter().sum::<f64>() / apart.len().max(1) as f64,
             max_dps: apart.iter().fold(0.0, |m, v| m.max(v.abs())),
             largest: largest.cloned(),
+            overflow,
             widened,
         })
     }
@@ -108,9 +119,12 @@ impl WordLengths {
             Covers::Compensation => "word lengths of the compensation",
         };
         let largest = self.largest.as_ref();
-        let largest = largest.map_or(String::new(), |w| {
+        let mut largest = largest.map_or(String::new(), |w| {
             format!(" (largest part: {} = {})", w.key, w.from)
         });
+        if let Some(overflow) = &self.overflow {
+            largest = format!(" ({} overflows)", overflow.word);
+        }
         format!(
             "{} deg/s from the fit, {} deg/s from {whose}{largest}",
             shown(fit_dps, 3),
@@ -139,6 +153,11 @@ impl WordLengths {
         );
         if self.covers == Covers::Compensation {
             text += ". The circuit before the compensation is not in it: a record begins after it";
+        }
+        if let Some(overflow) = &self.overflow {
+            text += &format!(". {} overflows", overflow.word);
+            let mend = overflow.mend();
+            text += &mend.map_or(String::new(), |mend| format!(". {mend}"));
         }
         match &self.largest {
             Some(w) => {

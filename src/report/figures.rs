@@ -5,8 +5,9 @@ use super::axis::{Axis, Interval};
 use super::figure::{Figure, both};
 use super::scene::Scene;
 use super::svg::{Frame, Shape, Svg, Swatch};
-use super::text::{bounding, significant};
+use super::text::significant;
 use crate::job::outcome::Point;
+use crate::text::away_from_zero;
 
 /// All of them, in the order of the page.
 pub fn all(shown: &Shown) -> Vec<Figure> {
@@ -82,11 +83,11 @@ impl Scene<'_> {
         svg.add(&frame);
         let title = "Rate output without compensation against the thermometer";
         svg.figure(title, format!(
-                "Applied rate subtracted{}. Sigma is the uncertainty of the fitted curve, at most {} deg/s. It follows from \
+                "Applied rate subtracted{}. Sigma is the uncertainty of the fitted curve, {} deg/s where it is largest. It follows from \
                  the fit's residuals and from their correlation in time, so it counts what the curve cannot follow as \
                  well as noise. It is not the scatter of a single reading.{}",
                 self.span_degc(),
-                significant(fit.std_max_dps(), 2),
+                significant(fit.std_max_dps(), 3),
                 self.crowded
             ))
     }
@@ -187,7 +188,8 @@ impl Scene<'_> {
 
     fn fixed_minus_float(&self, width: f64) -> Figure {
         let lsb = self.shown.output_lsb;
-        let bound = self.shown.summary.budget.bound_dps / lsb;
+        // As the legend says it.
+        let bound = away_from_zero(self.shown.summary.budget.bound_dps / lsb, 3);
         let apart = |p: Point| (p.fixed_dps - p.float_dps) / lsb;
         let all = self.shown.points.iter().map(apart);
         let interval = Interval::of(all.chain([bound, -bound])).padded(0.1);
@@ -208,7 +210,7 @@ impl Scene<'_> {
                 Swatch::Line,
                 format!(
                     "± bound of the compensation alone, {} LSB",
-                    bounding(bound, 3)
+                    significant(bound, 3)
                 ),
             ),
         ];

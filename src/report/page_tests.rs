@@ -304,3 +304,18 @@ fn the_lead_says_what_the_mean_of_heating_and_cooling_leaves_out() {
     assert!(html.contains("Heating and cooling differ, and the drift is that of their average"));
     assert!(html.contains(">1 warning, 1 note</a>"));
 }
+
+#[test]
+fn the_page_and_the_terminal_say_the_same_uncertainty() {
+    let made = usual(60);
+    let std = crate::text::number(made.fit.std_max_dps(), 3);
+    let said =
+        format!("Sigma is the uncertainty of the fitted curve, {std} deg/s where it is largest");
+    assert!(made.html().contains(&said), "{said}");
+    let on_terminal = format!("its standard deviation is {std} deg/s");
+    let told = &made.summary.certainty_text;
+    assert!(
+        told.iter().any(|line| line.contains(&on_terminal)),
+        "{told:?}"
+    );
+}

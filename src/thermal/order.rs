@@ -110,12 +110,14 @@ pub fn choose(sample: &Sample, wanted: FitOrder, most: usize, blocks: &[Range<us
             .get(smallest)
             .map_or(best_rms, |r| r.0.heldout_clean_rms_dps);
         let given = t.heldout_clean_rms_dps;
-        let least = match smallest == best_order {
-            true => "the least".to_owned(),
-            false => format!("the least is {best_rms:.4}, by order {best_order}"),
+        let why = match smallest == best_order {
+            true => "which has the least".to_owned(),
+            false => format!(
+                "the lowest within one standard error of the least ({best_rms:.4} deg/s rms by order {best_order})"
+            ),
         };
         reason.push_str(&format!(
-            ". By held-out error it would be order {smallest}: {by_rule:.4} deg/s rms against {given:.4} ({least})"
+            ". By held-out error it would be order {smallest}, {why}: {by_rule:.4} deg/s rms against {given:.4}"
         ));
     }
     let heldout = chosen.map_or_else(HeldOut::nothing, |(_, h)| h.clone());

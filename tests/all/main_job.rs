@@ -106,6 +106,45 @@ fn the_same_run_gives_the_same_bytes() {
     assert_eq!(of("one"), of("two"));
 }
 
+#[test]
+fn a_word_that_overflows_is_named_with_its_mend_and_nothing_is_called_proved() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let text = include_str!("../../src/design/default.toml");
+    let (from, to) = (
+        "output = { format = \"Q12.12\"",
+        "output = { format = \"Q7.12\"",
+    );
+    assert_eq!(text.matches(from).count(), 1);
+    std::fs::write(at.join("o.toml"), text.replace(from, to)).expect("a design");
+    let output = gyrogen(&["run", "o.toml", "--out", "out"], at);
+    good(&output);
+    let all = all_of(&output);
+    let change = "The smallest change that mends it: compensation.output from Q7.12 to Q9.12";
+    for said in [
+        "The firmware's bias keeps to no bound: a word saturates",
+        "Nor does the rate.",
+        "compensation.output overflows. ",
+    ] {
+        assert!(all.contains(said), "{said}: {all}");
+    }
+    // With the result and in the warning.
+    assert_eq!(all.matches(change).count(), 2, "{all}");
+    for wrong in ["proved", "No word alone", "next: "] {
+        assert!(!all.contains(wrong), "{wrong}: {all}");
+    }
+    assert!(all.contains(", record.csv, "), "{all}");
+
+    let checked = gyrogen(&["check", "o.toml", "--samples", "100000"], at);
+    assert_eq!(checked.status.code(), Some(1));
+    let told = told(&checked);
+    let line = text.lines().position(|l| l.starts_with(from)).expect("it") + 1;
+    let mend = format!(
+        ". The smallest change that mends it, in o.toml, line {line}: compensation.output from Q7.12 to Q9.12"
+    );
+    assert_eq!(told.matches(&mend).count(), 1, "{told}");
+}
+
 /// Records of real chips: the held-out error is no worse than the table beside them (polynomials of degree 1 to 5, both
 /// autopilots' cubics).
 #[test]
