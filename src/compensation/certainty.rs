@@ -4,8 +4,9 @@
 use super::{Evaluation, alternatives, one_rounding};
 use crate::approx::form::stored::Stored;
 use crate::approx::real::{Domain, Dyadic, Enclosure};
-use crate::design::{Compensation, Design, Outside};
+use crate::design::{Compensation, Design, Outside, limits};
 use crate::error::{Error, InputError, Result};
+use crate::nodes::repair::{self, Repair};
 use crate::tabulate::choice;
 use crate::tabulate::describe;
 use crate::text::{at_most, number};
@@ -145,6 +146,60 @@ pub fn certainty(design: &Design) -> Result<Option<Certainty>> {
         exhaustive: i128::from(run.words) == high - low + 1,
         saturates,
     }))
+}
+
+/// The smallest change of one format with which no word of the bias saturates in the calibrated range; `None` where no such
+/// change is enough, or a form was made for the formats.
+///
+/// # Errors
+/// See [`certainty`].
+pub fn mend(design: &Design, found: &Certainty) -> Result<Option<Repair>> {
+    let has_form = |c: &Compensation| c.form.is_some();
+    if design.compensation.as_ref().is_some_and(has_form) {
+        return Ok(None);
+    }
+    for key in ["compensation.output", "compensation.accumulator"] {
+        let (mut wide, mut found) = (design.clone(), found.clone());
+        let from =
+            repair::quantizer_mut(&mut wide, key).map_or(String::new(), |q| q.format.to_string());
+        while let Some(quantizer) = repair::quantizer_mut(&mut wide, key) {
+            let format = &mut quantizer.format;
+            format.integer_bits += 1;
+            let (bits, to) = (format.bits(), format.to_string());
+            if bits > 64 || limits::check(&wide).is_err() {
+                break;
+            }
+            // The farthest word first: all of them take long.
+            if is_far(&wide, &found) {
+                continue;
+            }
+            match certainty(&wide)? {
+                Some(again) if again.saturates => found = again,
+                _ => {
+                    return Ok(Some(Repair {
+                        key: key.to_owned(),
+                        from: from.clone(),
+                        to,
+                    }));
+                }
+            }
+        }
+    }
+    Ok(None)
+}
+
+/// True if the word that was farthest from the polynomial is still beyond the bound.
+fn is_far(design: &Design, found: &Certainty) -> bool {
+    let Some(c) = &design.compensation else {
+        return false;
+    };
+    let evaluation = Evaluation::new(&design.circuit, c);
+    let variable = evaluation.variable(found.at_input_raw);
+    let terms = evaluation.wanted().into_iter().rev();
+    let wanted = terms.fold(0.0, |sum, term| sum * variable + term);
+    let error = (evaluation.bias_dps(found.at_input_raw) - wanted).abs();
+    // Far beyond what double precision adds, and far below what a word that saturates loses.
+    error > 2.0 * found.bounds.certified_max_dps
 }
 
 fn calibrated(evaluation: &Evaluation, wanted: &[f64]) -> Result<Enclosure> {

@@ -1,6 +1,6 @@
 //! The bounds against the bias itself, on random polynomials in random formats.
 
-use super::certainty::{OfRun, bounds, certainty, sentences, sentences_with};
+use super::certainty::{OfRun, bounds, certainty, mend, sentences, sentences_with};
 use super::{Evaluation, coefficients};
 use crate::approx::draws::Draws;
 use crate::design::{Design, Fitted, Outside, reader};
@@ -204,4 +204,25 @@ fn a_loop_of_heating_and_cooling_is_told() {
         said.contains("Heating and cooling differ by 0.125 deg/s rms"),
         "{said}"
     );
+}
+
+#[test]
+fn the_smallest_format_that_holds_the_bias_is_found_by_trial() {
+    let mut text = crate::design::template::DEFAULT.to_owned();
+    for (from, to) in [
+        (
+            "output = { format = \"Q12.12\"",
+            "output = { format = \"Q7.12\"",
+        ),
+        ("#clamp_raw = [", "clamp_raw = ["),
+    ] {
+        assert!(text.contains(from), "{from}");
+        text = text.replacen(from, to, 1);
+    }
+    let design = crate::design::reader::parse(&text, None).unwrap();
+    let found = certainty(&design).unwrap().unwrap();
+    assert!(found.saturates);
+    let mend = mend(&design, &found).unwrap().unwrap();
+    // 241 deg/s at the far end.
+    assert_eq!(mend.change(), "compensation.output from Q7.12 to Q9.12");
 }

@@ -101,7 +101,12 @@ pub fn run(
         let of_bias =
             |o: &&Overflowing| o.repairs.iter().any(|r| r.key.starts_with("compensation."));
         let overflow = word_lengths.overflow.as_ref().filter(of_bias);
-        let mend = overflow.and_then(Overflowing::mend).unwrap_or_else(|| {
+        let mend = match overflow.and_then(Overflowing::mend) {
+            Some(mend) => Some(mend),
+            None => certainty::mend(&design, &certainty)?
+                .map(|r| format!("The smallest change that mends it: {}", r.change())),
+        };
+        let mend = mend.unwrap_or_else(|| {
             "Give compensation.accumulator or compensation.output more integer bits: `gyrogen check` says which of them can \
              overflow"
                 .to_owned()

@@ -125,7 +125,8 @@ pub fn is_enough(repair: &Repair, seen: &Seen) -> bool {
         && nodes_of(seen, &repair.key).all(|n| n.overflows == 0)
 }
 
-fn quantizer_mut<'a>(design: &'a mut Design, key: &str) -> Option<&'a mut Quantizer> {
+/// The format and its rules behind a key, where it has them.
+pub fn quantizer_mut<'a>(design: &'a mut Design, key: &str) -> Option<&'a mut Quantizer> {
     match key {
         "circuit.demodulator.product" => Some(&mut design.circuit.demodulator.product),
         "circuit.decimator.output" => Some(&mut design.circuit.decimator.output),

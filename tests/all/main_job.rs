@@ -135,6 +135,28 @@ fn a_word_that_overflows_is_named_with_its_mend_and_nothing_is_called_proved() {
     }
     assert!(all.contains(", record.csv, "), "{all}");
 
+    // The same for a record of one's own.
+    let order = text
+        .replace(from, to)
+        .replace("order = \"by_record\"", "order = 2");
+    std::fs::write(at.join("again.toml"), order).expect("a design");
+    let again = [
+        "run",
+        "again.toml",
+        "--record",
+        "out/record.csv",
+        "--out",
+        "again",
+    ];
+    let again = gyrogen(&again, at);
+    good(&again);
+    let all = all_of(&again);
+    assert!(
+        all.contains("Nor does the rate.") && all.contains(change),
+        "{all}"
+    );
+    assert!(!all.contains("proved") && !all.contains("next: "), "{all}");
+
     let checked = gyrogen(&["check", "o.toml", "--samples", "100000"], at);
     assert_eq!(checked.status.code(), Some(1));
     let told = told(&checked);
