@@ -122,7 +122,7 @@ impl Converter {
     /// [`analog`](Self::analog) of inputs with noise of an rms added first, LSB; `noise` is of rms 1.
     pub fn front_end(&self, inputs: &mut [f64], rms_lsb: f64, noise: &[f32]) {
         pulp::Arch::new().dispatch(FrontEnd {
-            converter: *self,
+            converter: self,
             inputs,
             noisy: Noisy { rms_lsb, noise },
         });
@@ -131,7 +131,7 @@ impl Converter {
     /// The [`code`](Self::code)s of the same, as many as there are inputs.
     pub fn codes(&self, inputs: &[f64], rms_lsb: f64, noise: &[f32], codes: &mut [i32]) {
         pulp::Arch::new().dispatch(Codes {
-            converter: *self,
+            converter: self,
             inputs,
             noisy: Noisy { rms_lsb, noise },
             codes,
@@ -211,7 +211,7 @@ struct Noisy<'a> {
 
 /// Inputs with their noise through the front end, in the widest SIMD that the processor has; the same values with each.
 struct FrontEnd<'a> {
-    converter: Converter,
+    converter: &'a Converter,
     inputs: &'a mut [f64],
     noisy: Noisy<'a>,
 }
@@ -237,7 +237,7 @@ impl pulp::WithSimd for FrontEnd<'_> {
 
 /// Codes of inputs, as [`FrontEnd`].
 struct Codes<'a> {
-    converter: Converter,
+    converter: &'a Converter,
     inputs: &'a [f64],
     noisy: Noisy<'a>,
     codes: &'a mut [i32],
@@ -248,7 +248,7 @@ impl pulp::WithSimd for Codes<'_> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _simd: S) {
-        let (adc, Noisy { rms_lsb, noise }) = (&self.converter, self.noisy);
+        let (adc, Noisy { rms_lsb, noise }) = (self.converter, self.noisy);
         let all = self.codes.iter_mut().zip(self.inputs.iter().zip(noise));
         if adc.bend.is_none() && adc.missing.is_none() {
             for (code, (input, noise)) in all {
