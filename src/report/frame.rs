@@ -80,8 +80,11 @@ impl Frame {
         self.marks.push_str(&path(class, &d));
     }
 
-    /// A level across the frame.
+    /// A level across the frame, where it is inside.
     pub fn level(&mut self, class: &str, y: f64) {
+        if !(self.y.low..=self.y.high).contains(&y) {
+            return;
+        }
         self.line(class, &[(self.x.low, y), (self.x.high, y)]);
         if class == "zero" {
             // No data.

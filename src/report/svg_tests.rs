@@ -157,6 +157,22 @@ fn a_line_breaks_at_a_missing_value() {
 }
 
 #[test]
+fn a_level_is_drawn_inside_the_frame_alone() {
+    let levels = |y: f64| {
+        let mut svg = Svg::new(900.0);
+        let mut frame = svg.frame(200.0, 70.0, axis(0.0, 1.0), axis(-2.0, -1.0));
+        frame.level("bound", y);
+        svg.add(&frame);
+        let page = svg.figure("a plot", "").html();
+        page.contains("class=\"bound\"")
+    };
+    assert_eq!(
+        [-1.5, -1.0, 0.0, -2.5].map(levels),
+        [true, true, false, false]
+    );
+}
+
+#[test]
 fn text_is_escaped() {
     let mut svg = Svg::new(300.0);
     svg.legend([("fixed", Swatch::Line, "<script>".to_owned())]);
