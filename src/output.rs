@@ -4,10 +4,12 @@
 //! [`standard`] is the standard output, whose failures are found at the end.
 
 mod known;
+mod marks;
 mod results;
 mod same;
 pub mod standard;
 
+pub use marks::{is_own, sealed};
 pub use results::Results;
 pub use same::refuse as refuse_inputs;
 

@@ -11,7 +11,6 @@ use crate::error::{Error, InputError, Result};
 use crate::firmware::approximation;
 use crate::firmware::replace;
 use crate::numeric::format::Format;
-use crate::output::Results;
 use crate::tabulate::job;
 use crate::tabulate::job::{Asked, Request, Weight};
 use crate::tabulate::outcome::{Alternative, Outcome, Search};
@@ -85,9 +84,8 @@ pub struct Arguments {
     /// Folder for the results; made if it does not exist.
     #[arg(long, value_name = "DIR", default_value = "gyrogen-approx")]
     out: PathBuf,
-    /// Overwrite firmware in the folder that was edited; files that are none of a bundle's stay.
-    #[arg(long)]
-    force: bool,
+    #[command(flatten)]
+    force: super::common::Force,
     /// How the result is printed on stdout.
     #[arg(long, value_enum, default_value = "text")]
     format: OutputFormat,
@@ -101,8 +99,9 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let watch = Stages::start("approximating");
     let request = request(arguments)?;
     let planned = ["approx.json", "report.html", timing::NAME];
-    let mut results = Results::claim(&arguments.out, &planned, &recorded.inputs)?;
-    if !arguments.force {
+    let mut results =
+        super::common::claim(&arguments.out, &planned, &recorded.inputs, arguments.force)?;
+    if !arguments.force.force {
         for folder in ["c", "rust"] {
             replace::refuse(&[], &arguments.out.join(folder))?;
         }
@@ -131,7 +130,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let json = super::json(&made.outcome);
     watch.stage("writing");
     for (files, folder) in [(&c, "c"), (&rust, "rust")] {
-        super::common::bundle(files, folder, &mut results, arguments.force)?;
+        super::common::bundle(files, folder, &mut results, arguments.force.force)?;
     }
     results.write("approx.json", json.as_bytes())?;
     let page = crate::report::approx::html(&made)?;

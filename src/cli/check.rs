@@ -8,7 +8,6 @@ use crate::check::remarks::Remark;
 use crate::check::{self, SAMPLES};
 use crate::error::{Error, Result};
 use crate::numeric::trace::ir::Interval;
-use crate::output::Results;
 use crate::text::{counted, number};
 use crate::timing;
 use std::path::PathBuf;
@@ -24,6 +23,8 @@ pub struct Arguments {
     /// Folder for check.json; made if it does not exist. Nothing is written if left out.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    force: super::common::Force,
     /// How the result is printed on stdout.
     #[arg(long, value_enum, default_value = "text")]
     format: OutputFormat,
@@ -39,7 +40,8 @@ const PLANNED: [&str; 2] = ["check.json", timing::NAME];
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let watch = Stages::start("proving and running");
     let design = arguments.design.read()?;
-    let claim = |out: &PathBuf| Results::claim(out, &PLANNED, &recorded.inputs);
+    let claim =
+        |out: &PathBuf| super::common::claim(out, &PLANNED, &recorded.inputs, arguments.force);
     let results = arguments.out.as_ref().map(claim).transpose()?;
     let samples = arguments.samples.map_or(SAMPLES, |n| n as usize);
     let check = check::check(&design, &recorded.command, samples)?;

@@ -65,9 +65,8 @@ pub struct Arguments {
     /// writes no files.
     #[arg(long, value_name = "DIR")]
     pub(super) out: Option<PathBuf>,
-    /// Overwrite firmware in the folder that was edited; files that are none of a bundle's stay.
-    #[arg(long, conflicts_with_all = ["capture", "self_test"])]
-    force: bool,
+    #[command(flatten)]
+    pub(super) force: super::common::Force,
     /// How the result is printed on stdout.
     #[arg(long, value_enum, default_value = "text")]
     pub(super) format: OutputFormat,
@@ -121,7 +120,9 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         (None, Some(path)) => CaptureReader::open(path, design.circuit.adc.format).map(drop),
         (None, None) => Ok(()),
     };
-    let mut results = super::common::claim(out, &PLANNED, recorded, look)?;
+    let mut results =
+        super::common::claim_after(out, &PLANNED, &recorded.inputs, arguments.force, look)?;
+    results.replaces("firmware/");
     let mut of_record = Vec::new();
     let (closure, said, compared, controls) = if let Some(path) = &arguments.capture {
         watch.stage("closing");
@@ -131,7 +132,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         results.write("report.html", page.as_bytes())?;
         (closed.closure, None, None, None)
     } else if let Some(path) = &arguments.record {
-        if !arguments.force {
+        if !arguments.force.force {
             crate::verify::firmware::refuse_edited(out)?;
         }
         let (record, warnings) = crate::record::read_any(path, &design.record)?;
@@ -177,7 +178,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
             (&design, augmented.as_deref()),
             &sources,
             beside,
-            (&mut results, arguments.force),
+            (&mut results, arguments.force.force),
         )?;
         let said = Some(Said::of(&closed));
         (closed.closure, said, compared, controls)
@@ -309,13 +310,6 @@ fn write(
         ..beside
     };
     let page = crate::report::closure::html_beside(closed, &beside, &name_of(path))?;
-    let out = results.folder();
-    if augmented.is_none() && out.join("firmware").exists() {
-        talk!(
-            "warning: design.toml, design.diff and firmware/ in {} are of an earlier record: this one has no firmware",
-            out.display()
-        );
-    }
     if let Some((diff, text)) = &augmented {
         results.write("design.toml", text.as_bytes())?;
         results.write("design.diff", diff.unified.as_bytes())?;

@@ -37,6 +37,14 @@ impl DesignFile {
     }
 }
 
+/// `--force`, as every command with a folder of results takes it.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub struct Force {
+    /// Overwrite files in the folder that you wrote or edited, where a result has their name; other files stay.
+    #[arg(long)]
+    pub(super) force: bool,
+}
+
 /// Reads the design named on the command line, or the embedded default.
 pub(super) fn design(path: Option<&Path>) -> Result<crate::design::Design> {
     if let Some(path) = path {
@@ -55,16 +63,31 @@ pub(super) fn design(path: Option<&Path>) -> Result<crate::design::Design> {
 
 /// Claims a command's folder. What `look` finds wrong with the measured data is said before what is wrong with the folder,
 /// but for data that would be written over.
-pub(super) fn claim(
+pub(super) fn claim_after(
     out: &Path,
     planned: &[&str],
-    recorded: &super::Recorded,
+    inputs: &[PathBuf],
+    force: Force,
     look: impl FnOnce() -> Result<()>,
 ) -> Result<Results> {
     for name in planned {
-        crate::output::refuse_inputs(&out.join(name), &recorded.inputs)?;
+        crate::output::refuse_inputs(&out.join(name), inputs)?;
     }
-    Results::claim(out, planned, &recorded.inputs).or_else(|e| look().and(Err(e)))
+    claim(out, planned, inputs, force).or_else(|e| look().and(Err(e)))
+}
+
+/// Claims a command's folder; says what of the user's is written over where that is forced.
+pub(super) fn claim(
+    out: &Path,
+    planned: &[&str],
+    inputs: &[PathBuf],
+    force: Force,
+) -> Result<Results> {
+    let results = Results::claim_forced(out, planned, inputs, force.force)?;
+    if !results.lost().is_empty() {
+        talk!("--force overwrites: {}", replace::listed(results.lost()));
+    }
+    Ok(results)
 }
 
 /// Whether a design's text is empty, or has nothing but comments.

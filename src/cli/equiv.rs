@@ -43,6 +43,8 @@ pub struct Arguments {
     /// compiler.
     #[arg(long, value_enum, ignore_case = true)]
     lang: Option<Language>,
+    #[command(flatten)]
+    force: super::common::Force,
     /// How the result is printed on stdout.
     #[arg(long, value_enum, default_value = "text")]
     format: OutputFormat,
@@ -77,7 +79,13 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         Some(path) => CaptureReader::open(path, design.circuit.adc.format).map(drop),
         None => Ok(()),
     };
-    let mut results = super::common::claim(&arguments.out, &planned, recorded, look)?;
+    let mut results = super::common::claim_after(
+        &arguments.out,
+        &planned,
+        &recorded.inputs,
+        arguments.force,
+        look,
+    )?;
     let languages = super::common::languages(arguments.lang)?;
     let (drive, sense, origin) = codes(&design, arguments)?;
     let stimulus = Stimulus {
@@ -103,9 +111,6 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     if let Some((drive, sense)) = counterexample {
         let text = shrink::capture_text(&design, &drive, &sense);
         results.write(job::COUNTEREXAMPLE, text.as_bytes())?;
-    } else {
-        // That of an earlier run would contradict this one.
-        results.remove(job::COUNTEREXAMPLE);
     }
     watch.write(&mut results, &result.design_sha256, &recorded.command)?;
     results.finish()?;

@@ -37,9 +37,8 @@ pub struct Arguments {
     /// which there is a compiler.
     #[arg(long, value_enum, ignore_case = true)]
     lang: Option<Language>,
-    /// Overwrite firmware in the folder that was edited; files that are none of a bundle's stay.
-    #[arg(long)]
-    force: bool,
+    #[command(flatten)]
+    force: super::common::Force,
     /// How the result is printed on stdout.
     #[arg(long, value_enum, default_value = "text")]
     format: OutputFormat,
@@ -69,8 +68,14 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         Some(record) => crate::record::read_any(record, &design.record).map(drop),
         None => Ok(()),
     };
-    let mut results = super::common::claim(&arguments.out, &PLANNED, recorded, look)?;
-    if !arguments.force {
+    let mut results = super::common::claim_after(
+        &arguments.out,
+        &PLANNED,
+        &recorded.inputs,
+        arguments.force,
+        look,
+    )?;
+    if !arguments.force.force {
         crate::verify::firmware::refuse_edited(&arguments.out)?;
     }
     if arguments.record.is_none() && !design.record.columns.is_empty() {
@@ -90,7 +95,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let html = crate::report::html(&outcome)?;
     let json = super::json(&outcome.summary);
     for (files, folder) in outcome.parts.firmware.bundles() {
-        super::common::bundle(files, folder, &mut results, arguments.force)?;
+        super::common::bundle(files, folder, &mut results, arguments.force.force)?;
     }
     if let Some(record) = &outcome.parts.record_csv {
         results.write("record.csv", record.as_bytes())?;

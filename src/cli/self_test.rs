@@ -6,7 +6,6 @@ use super::stages::Stages;
 use super::terminal::OutputFormat;
 use crate::design::Design;
 use crate::error::{Error, Result};
-use crate::output::Results;
 use crate::report::text::significant;
 use crate::selftest::outcome::{EffectScore, Minimum, Outcome};
 use crate::selftest::{self, Request};
@@ -53,7 +52,8 @@ pub fn run(
 ) -> Result<()> {
     let options = &arguments.test;
     let planned = ["selftest.json", "selftest.html", timing::NAME];
-    let claim = |out: &PathBuf| Results::claim(out, &planned, &recorded.inputs);
+    let claim =
+        |out: &PathBuf| super::common::claim(out, &planned, &recorded.inputs, arguments.force);
     let results = arguments.out.as_ref().map(claim).transpose()?;
     let read = match &arguments.record {
         Some(path) => Some(crate::record::read_any(path, &design.record)?),

@@ -3,7 +3,7 @@
 
 use super::terminal;
 use crate::error::Result;
-use crate::output::Results;
+use crate::output::sealed;
 use clap::Command;
 use std::path::PathBuf;
 
@@ -21,6 +21,8 @@ pub struct Man {
     /// Folder for the pages (`gyrogen.1`, `gyrogen-run.1`, ...); the page of `gyrogen` is printed if left out.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    force: super::common::Force,
 }
 
 /// Prints the script.
@@ -52,9 +54,9 @@ pub fn man(arguments: &Man, mut parser: Command) -> Result<()> {
     let mut pages = vec![("gyrogen.1".to_owned(), page(&parser))];
     pages.extend(of_commands);
     let names: Vec<&str> = pages.iter().map(|(name, _)| name.as_str()).collect();
-    let mut results = Results::claim(folder, &names, &[])?;
+    let mut results = super::common::claim(folder, &names, &[], arguments.force)?;
     for (name, text) in &pages {
-        results.write(name, text)?;
+        results.write(name, sealed(&String::from_utf8_lossy(text)).as_bytes())?;
     }
     results.finish()?;
     say!("wrote {} pages to {}", pages.len(), folder.display());

@@ -54,6 +54,8 @@ pub struct Arguments {
     /// Threads, 1 to 1024; as many as the machine has if left out. The result does not depend on it.
     #[arg(long, value_name = "N", value_parser = super::values::whole::<u16>(1..=1024))]
     threads: Option<u16>,
+    #[command(flatten)]
+    force: super::common::Force,
     /// How the result is printed on stdout.
     #[arg(long, value_enum, default_value = "text")]
     format: OutputFormat,
@@ -97,7 +99,10 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         "simulate.json",
         timing::NAME,
     ];
-    let mut results = Results::claim(&arguments.out, &planned, &recorded.inputs)?;
+    let mut results =
+        super::common::claim(&arguments.out, &planned, &recorded.inputs, arguments.force)?;
+    // In another format.
+    results.replaces("trace.");
     let request = Request {
         course: match (&arguments.duration, &arguments.profile) {
             (Some(seconds), _) => Course::Continuous(*seconds),

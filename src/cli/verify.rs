@@ -8,7 +8,6 @@ use crate::emit::views::Language;
 use crate::error::{Error, InputError, Result};
 use crate::firmware::files::EmittedFile;
 use crate::firmware::manifest::{self, Manifest};
-use crate::output::Results;
 use crate::timing;
 use crate::verify::bundle::{self, Against, Verification};
 use crate::verify::compare::Compared;
@@ -36,6 +35,8 @@ pub struct Arguments {
     /// Folder for verify.json; made if it does not exist. The bundle's folder if left out.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    force: super::common::Force,
     /// How the result is printed on stdout.
     #[arg(long, value_enum, default_value = "text")]
     format: OutputFormat,
@@ -72,7 +73,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     for name in planned {
         refuse_link(&folder.join(name))?;
     }
-    let mut results = Results::claim(folder, &planned, &recorded.inputs)?;
+    let mut results = super::common::claim(folder, &planned, &recorded.inputs, arguments.force)?;
     let verification = bundle::verify(
         &arguments.bundle,
         arguments.target,

@@ -86,7 +86,10 @@ impl Found {
         let is = |path: &str, name: &str| path.rsplit('/').next() == Some(name);
         let others = files.into_iter();
         let others = others.filter(|f| !found.old.contains(f) && !is(f, BUILT));
-        let (verified, foreign) = others.partition(|f| VERIFIED.iter().any(|name| is(f, name)));
+        let (verified, foreign) = others.partition(|f| {
+            let is_own = |bytes: Vec<u8>| crate::output::is_own(f, &bytes) == Some(true);
+            VERIFIED.iter().any(|name| is(f, name)) && folder.read(f).is_ok_and(is_own)
+        });
         (found.verified, found.foreign) = (verified, foreign);
         Ok(found)
     }

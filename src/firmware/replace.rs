@@ -189,6 +189,24 @@ mod tests {
     }
 
     #[test]
+    fn a_verification_goes_with_its_bundle_and_a_file_of_that_name_is_asked_for() {
+        let made = tempfile::tempdir().expect("a folder");
+        let folder = made.path().join("c");
+        let verify = folder.join("verify.json");
+        write(&bundle(&["a.c"]), &folder, false).expect("written");
+        std::fs::write(&verify, "{\n  \"schema\": \"gyrogen.verify/2\"\n}\n").expect("written");
+        write(&bundle(&["b.c"]), &folder, false).expect("written");
+        assert!(!verify.exists());
+        std::fs::write(&verify, "mine").expect("written");
+        let refused = refuse(&bundle(&["a.c"]), &folder).expect_err("refused");
+        assert!(
+            refused
+                .to_string()
+                .contains("\"verify.json\" (not of the bundle)")
+        );
+    }
+
+    #[test]
     fn beside_other_files_a_first_bundle_overwrites_nothing() {
         let made = tempfile::tempdir().expect("a folder");
         std::fs::write(made.path().join("design.toml"), "mine").expect("written");

@@ -11,7 +11,7 @@ use crate::error::{Error, InputError, Result, cause, io_error};
 use crate::leftovers::{TemporaryFolder, undisturbed};
 use std::fs;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// Remedy for a folder that cannot be used.
 const ANOTHER: &str = "name another folder with --out";
@@ -31,6 +31,10 @@ pub struct Results {
     names: Vec<PathBuf>,
     /// Names of an earlier run's files that would contradict this one's.
     removed: Vec<PathBuf>,
+    /// Beginnings of the names of what an earlier run of the same command has listed.
+    outdated: Vec<String>,
+    /// What of the user's is written over, as that was asked for.
+    lost: Vec<String>,
     /// What earlier commands have put there; none where results are not listed.
     known: Option<Known>,
 }
@@ -39,8 +43,23 @@ impl Results {
     /// Claims `out` for results, of which `planned` are known by name. `inputs` are the files that the command reads.
     ///
     /// # Errors
-    /// An input that would be written over; a folder or a file in it that cannot be written.
+    /// An input that would be written over, a file that the user wrote or edited; a folder or a file in it that cannot
+    /// be written.
     pub fn claim(out: &Path, planned: &[&str], inputs: &[PathBuf]) -> Result<Self> {
+        Self::claim_forced(out, planned, inputs, false)
+    }
+
+    /// As [`Results::claim`]; with `forced`, what the user wrote or edited is written over, which [`Results::lost`]
+    /// names.
+    ///
+    /// # Errors
+    /// As [`Results::claim`], but for that.
+    pub fn claim_forced(
+        out: &Path,
+        planned: &[&str],
+        inputs: &[PathBuf],
+        forced: bool,
+    ) -> Result<Self> {
         let failed = |e: &io::Error| io_error(out, "make the folder", e);
         let (existing, missing) = existing(out).map_err(|e| failed(&e))?;
         let is_there = missing == Path::new("");
@@ -57,10 +76,8 @@ impl Results {
             same::refuse(&path, inputs)?;
             super::check_writable(&path)?;
         }
-        let known = known::are_listed(planned).then(|| Known::of(out));
-        if let Some(known) = &known {
-            known.refuse(out, planned)?;
-        }
+        let known = Known::of(out);
+        let lost = known.refuse(out, planned, forced)?;
         let staged = TemporaryFolder::new(&existing).map_err(|e| {
             let (why, help) = match e.kind() {
                 // The folder is there: the system keeps its own files in it, as in /proc.
@@ -94,13 +111,26 @@ impl Results {
             new,
             names: Vec::new(),
             removed: Vec::new(),
-            known,
+            outdated: planned.iter().map(|name| (*name).to_owned()).collect(),
+            lost,
+            known: known::are_listed(planned).then_some(known),
         })
     }
 
     /// The folder as the user named it.
     pub fn folder(&self) -> &Path {
         &self.out
+    }
+
+    /// What of the user's will be written over, as that was asked for.
+    pub fn lost(&self) -> &[String] {
+        &self.lost
+    }
+
+    /// Whose listed names begin so was made by an earlier run of this command, as the planned files were: what this run
+    /// does not make goes, but an edited file, which is no longer listed.
+    pub fn replaces(&mut self, beginning: &str) {
+        self.outdated.push(beginning.to_owned());
     }
 
     /// Adds a file.
@@ -169,7 +199,11 @@ impl Results {
                 Ok((sha256(&bytes), name.clone()))
             };
             let written: Result<Vec<_>> = self.names.iter().map(digest).collect();
-            let list = known.after(&written?, &self.removed);
+            let gone = self.gone(&known);
+            let whole = gone.iter().filter(|name| known.is_whole(&self.out, name));
+            let whole: Vec<PathBuf> = whole.cloned().collect();
+            let list = known.after(&written?, &[&self.removed[..], &gone].concat());
+            self.removed.extend(whole);
             self.write(known::SUMS, list.as_bytes())?;
         }
         if let Some((from, to)) = &self.new
@@ -217,8 +251,29 @@ impl Results {
             if path.symlink_metadata().is_ok() {
                 fs::remove_file(&path).map_err(|e| io_error(&path, "remove", &e))?;
             }
+            // Only what is empty can be removed so.
+            let above = path.ancestors().skip(1);
+            _ = above
+                .take_while(|folder| *folder != self.out)
+                .try_for_each(fs::remove_dir);
         }
         Ok(())
+    }
+
+    /// Listed results of an earlier run of this command which this one does not make. An input stays.
+    fn gone(&self, known: &Known) -> Vec<PathBuf> {
+        if !known.has_earlier(&self.names) {
+            return Vec::new();
+        }
+        let is_outdated = |name: &&PathBuf| {
+            let text = name.to_string_lossy();
+            self.outdated.iter().any(|o| text.starts_with(o.as_str()))
+                // A list is a file that anybody may have changed.
+                && name.components().all(|c| matches!(c, Component::Normal(_)))
+                && !self.names.contains(name)
+                && same::refuse(&self.out.join(name), &self.inputs).is_ok()
+        };
+        known.names().filter(is_outdated).cloned().collect()
     }
 }
 

@@ -9,6 +9,16 @@ fn listed(folder: &Path) -> Vec<String> {
     names
 }
 
+/// Wall times, which say by themselves that they are no user's own.
+const TIMING: &[u8] = b"{\n  \"schema\": \"gyrogen.timing/1\"\n}\n";
+
+fn bytes_of(name: &str) -> &[u8] {
+    match name {
+        "timing.json" => TIMING,
+        name => name.as_bytes(),
+    }
+}
+
 fn two(out: &Path) -> Results {
     let mut results = Results::claim(out, &["a.json"], &[]).unwrap();
     results.write("a.json", b"a").unwrap();
@@ -195,14 +205,21 @@ fn a_result_that_was_edited_is_not_written_over() {
     let write = || {
         let mut results = Results::claim(top.path(), &planned, &[])?;
         for name in planned {
-            results.write(name, name.as_bytes())?;
+            results.write(name, bytes_of(name))?;
         }
         results.finish()
     };
     write().unwrap();
-    // Wall times are no result.
-    fs::write(top.path().join("timing.json"), "other").unwrap();
+    // Wall times are no result, but a file of that name may be the user's.
+    fs::write(top.path().join("timing.json"), [TIMING, b"\n"].concat()).unwrap();
     write().unwrap();
+    fs::write(top.path().join("timing.json"), "mine").unwrap();
+    let told = write().unwrap_err().to_string();
+    assert!(
+        told.contains("timing.json") && told.contains("gyrogen did not write it"),
+        "{told}"
+    );
+    fs::write(top.path().join("timing.json"), TIMING).unwrap();
     let sums = fs::read_to_string(top.path().join("SHA256SUMS")).unwrap();
     assert!(sums.contains("  summary.json\n") && !sums.contains("timing.json"));
     fs::write(top.path().join("design.toml"), "mine").unwrap();
@@ -220,7 +237,12 @@ fn results_of_another_command_are_not_written_over() {
     let write = |planned: &[&str]| {
         let mut results = Results::claim(top.path(), planned, &[])?;
         for name in planned {
-            results.write(name, planned[0].as_bytes())?;
+            let bytes = if *name == "timing.json" {
+                TIMING
+            } else {
+                planned[0].as_bytes()
+            };
+            results.write(name, bytes)?;
         }
         results.finish()
     };
@@ -238,4 +260,94 @@ fn results_of_another_command_are_not_written_over() {
     write(&EQUIV).unwrap();
     write(&SIMULATE).unwrap();
     assert!(write(&CLOSE).is_err());
+}
+
+#[test]
+fn what_is_forced_is_named_and_results_of_another_command_stay() {
+    let top = tempfile::tempdir().unwrap();
+    let force = |planned: &[&str]| Results::claim_forced(top.path(), planned, &[], true);
+    let mut results = force(&["check.json"]).unwrap();
+    assert!(results.lost().is_empty());
+    results.write("check.json", b"1").unwrap();
+    results.finish().unwrap();
+    for name in ["check.json", "timing.json", "report.html"] {
+        fs::write(top.path().join(name), "mine").unwrap();
+    }
+    let mut results = force(&["check.json", "timing.json", "study.json", "report.html"]).unwrap();
+    assert_eq!(
+        results.lost(),
+        [
+            "check.json (edited)",
+            "timing.json (not as gyrogen wrote it)",
+            "report.html (no result of an earlier run)"
+        ]
+    );
+    for name in ["study.json", "report.html"] {
+        results.write(name, b"2").unwrap();
+    }
+    results.finish().unwrap();
+    assert_eq!(fs::read(top.path().join("report.html")).unwrap(), b"2");
+    let told = force(&["closure.json", "report.html"])
+        .unwrap_err()
+        .to_string();
+    assert!(
+        told.contains("study.json lies beside it") && !told.contains("--force"),
+        "{told}"
+    );
+    // An input is none of what is forced.
+    let input = [top.path().join("study.json")];
+    assert!(Results::claim_forced(top.path(), &["study.json"], &input, true).is_err());
+}
+
+#[test]
+fn what_an_earlier_run_made_and_this_one_does_not_goes_unless_it_was_edited() {
+    let top = tempfile::tempdir().unwrap();
+    let planned = ["summary.json", "record.csv"];
+    let write = |names: &[&str], inputs: &[PathBuf]| {
+        let mut results = Results::claim_forced(top.path(), &planned, inputs, true).unwrap();
+        results.replaces("designs/");
+        for name in names {
+            results.write(name, bytes_of(name)).unwrap();
+        }
+        results.finish().unwrap();
+        fs::read_to_string(top.path().join("SHA256SUMS")).unwrap()
+    };
+    let all = [
+        "summary.json",
+        "record.csv",
+        "designs/1.toml",
+        "designs/2.toml",
+        "other.csv",
+    ];
+    write(&all, &[]);
+    // What no list names is the user's.
+    fs::write(top.path().join("designs/mine.toml"), "mine").unwrap();
+    let list = write(&["summary.json", "designs/1.toml"], &[]);
+    assert_eq!(listed(&top.path().join("designs")), ["1.toml", "mine.toml"]);
+    assert!(
+        !list.contains("record.csv") && !list.contains("2.toml"),
+        "{list}"
+    );
+    assert!(
+        list.contains("other.csv"),
+        "it is none of this command's: {list}"
+    );
+    assert!(!top.path().join("record.csv").exists());
+    // Edited: it stays, and is no longer listed. So does an input.
+    write(&all, &[]);
+    fs::write(top.path().join("record.csv"), "mine").unwrap();
+    let list = write(&["summary.json"], &[top.path().join("designs/1.toml")]);
+    assert_eq!(fs::read(top.path().join("record.csv")).unwrap(), b"mine");
+    assert!(
+        !list.contains("record.csv") && list.contains("designs/1.toml"),
+        "{list}"
+    );
+    assert_eq!(listed(&top.path().join("designs")), ["1.toml", "mine.toml"]);
+    // A folder that has become empty goes with its last file.
+    fs::remove_file(top.path().join("designs/mine.toml")).unwrap();
+    write(&["summary.json"], &[]);
+    assert_eq!(
+        listed(top.path()),
+        ["SHA256SUMS", "other.csv", "record.csv", "summary.json"]
+    );
 }

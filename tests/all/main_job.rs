@@ -368,6 +368,40 @@ fn a_constant_thermometer_is_the_first_thing_said() {
     assert!(page.expect("a report").contains(headline));
 }
 
+/// What an earlier run made and this one does not goes: its record would be taken for that of these results. What was edited
+/// is asked for first.
+#[test]
+fn a_run_leaves_nothing_of_an_earlier_one() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    sixty(at, 60, |k| 20.0 + 0.5 * f64::from(k));
+    good(&gyrogen(&["run", "--lang", "c", "--out", "out"], at));
+    assert!(at.join("out/record.csv").is_file());
+    let measured = [
+        "run",
+        "--lang",
+        "c",
+        "--out",
+        "out",
+        "--record",
+        "record.csv",
+    ];
+    std::fs::write(at.join("out/design.toml"), "mine").expect("written");
+    let refused = gyrogen(&measured, at);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(told(&refused).contains("it was edited since it was written"));
+    let forced = gyrogen(&[&measured[..], &["--force"]].concat(), at);
+    good(&forced);
+    let said = told(&forced);
+    assert!(
+        said.contains("--force overwrites: design.toml (edited)"),
+        "{said}"
+    );
+    assert!(!at.join("out/record.csv").exists());
+    let sums = shell("cd out && sha256sum --check --quiet SHA256SUMS", at);
+    good(&sums);
+}
+
 /// A rate that was not measured in some rows counts as none, and the fitted design reproduces the
 /// firmware.
 #[test]

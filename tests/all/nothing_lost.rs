@@ -105,6 +105,53 @@ fn no_command_writes_over_its_input() {
     }
 }
 
+/// The user's own file in a result's place is refused, and overwritten where that is forced; a result of an earlier call is
+/// written over without being asked.
+#[test]
+fn a_file_of_the_users_own_is_overwritten_by_force_alone() {
+    let top = tempfile::tempdir().expect("a folder");
+    let here = top.path();
+    let commands: [(&[&str], &str); 3] = [
+        (
+            &["check", "--samples", "1000", "--out", "check"],
+            "check/check.json",
+        ),
+        (
+            &["check", "--samples", "1000", "--out", "wall"],
+            "wall/timing.json",
+        ),
+        (&["man", "--out", "man"], "man/gyrogen.1"),
+    ];
+    for (arguments, name) in commands {
+        let own = here.join(name);
+        fs::create_dir_all(own.parent().expect("a folder")).expect("made");
+        fs::write(&own, "mine").expect("written");
+        let out = gyrogen_in(here, arguments, &[]);
+        let said = told(&out);
+        assert_eq!(out.status.code(), Some(2), "{arguments:?}: {said}");
+        assert!(
+            said.contains("would be written over") && said.contains("`--force`"),
+            "{said}"
+        );
+        assert_eq!(fs::read(&own).expect("there"), b"mine", "{arguments:?}");
+        let out = gyrogen_in(here, &[arguments, &["--force"]].concat(), &[]);
+        good(&out);
+        let said = told(&out);
+        let file = own.file_name().expect("a name").to_string_lossy();
+        assert!(
+            said.contains(&format!("--force overwrites: {file} (")),
+            "{said}"
+        );
+        good(&gyrogen_in(here, arguments, &[]));
+        // Edited since; of wall times that is not told.
+        let written = fs::read_to_string(&own).expect("there");
+        fs::write(&own, format!("{written}mine\n")).expect("written");
+        let out = gyrogen_in(here, arguments, &[]);
+        let is_refused = out.status.code() == Some(2);
+        assert_eq!(is_refused, !name.ends_with("timing.json"), "{}", told(&out));
+    }
+}
+
 #[test]
 fn a_link_to_nothing_stays_a_link() {
     let top = tempfile::tempdir().expect("a folder");

@@ -407,6 +407,19 @@ fn links_pipes_and_endless_files_are_not_opened() {
     );
 }
 
+/// A file in the result's place that `verify` did not write is the user's.
+#[test]
+fn a_result_replaces_no_file_of_the_users_own() {
+    let (folder, at) = bundle();
+    let own = at.join("verify.json");
+    std::fs::write(&own, "mine").expect("written");
+    refused(&at, 2, "gyrogen did not write it");
+    assert_eq!(std::fs::read_to_string(&own).expect("read"), "mine");
+    for more in [&["--force"][..], &[]] {
+        good(&gyrogen(&[&["verify", "c"], more].concat(), folder.path()));
+    }
+}
+
 #[test]
 fn a_folder_with_the_name_of_an_option_is_a_folder() {
     let folder = tempfile::tempdir().expect("a folder");
