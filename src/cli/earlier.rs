@@ -5,9 +5,9 @@ use crate::text::{Place, shown};
 use serde_json::Value;
 use std::path::Path;
 
-/// Keys of a result that are the same only for the same design and the same measurement: the text's digest (without a design that of
-/// the request), and the errors before anything was fitted, where there are such.
-const WHOSE: [&str; 2] = ["design_sha256", "before"];
+/// Keys of a result that are the same only for the same design, measurement and limits: the text's digest (without a design
+/// that of the request), the errors before anything was fitted and the limits of a study, where there are such.
+const WHOSE: [&str; 3] = ["design_sha256", "before", "limits"];
 
 /// What a result of a record or a capture is of.
 pub(super) const MEASURED: &str = "measurement or design";

@@ -10,11 +10,11 @@ use crate::study::job::{self, Request};
 use crate::study::journal;
 use crate::study::outcome::{Point, Study};
 use crate::study::progress::{Progress, Step};
-use crate::study::reporting::RESOLUTION;
+use crate::study::reporting::{DESIGNS, RESOLUTION};
 use crate::study::shard::Part;
 use crate::text::number;
 use crate::timing;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::Instant;
 
@@ -39,13 +39,15 @@ pub struct Arguments {
     /// Folder for the results; made if it does not exist.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    #[command(flatten)]
+    force: super::common::Force,
     /// How the result is printed on stdout.
     #[arg(long, value_enum, default_value = "text")]
     format: OutputFormat,
 }
 
-/// What it writes beside the designs.
-const PLANNED: [&str; 3] = ["study.json", "report.html", timing::NAME];
+/// What it writes beside the designs; the journal while it runs.
+const PLANNED: [&str; 4] = ["study.json", "report.html", timing::NAME, journal::NAME];
 
 /// Runs the command.
 ///
@@ -60,17 +62,50 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         None => design.requirements.clone(),
     };
     let was_there = arguments.out.exists();
+    let planned = match arguments.shard {
+        Some(part) => vec![part.file_name()],
+        None => {
+            let always = PLANNED.map(str::to_owned);
+            always
+                .into_iter()
+                .chain(earlier_designs(&arguments.out))
+                .collect()
+        }
+    };
+    let planned: Vec<&str> = planned.iter().map(String::as_str).collect();
     // What cannot be written is said as of any command.
-    drop(Results::claim(&arguments.out, &PLANNED, &recorded.inputs)?);
+    drop(super::common::claim(
+        &arguments.out,
+        &planned,
+        &recorded.inputs,
+        arguments.force,
+    )?);
     // The journal of a study that was stopped stands in the folder itself.
     std::fs::create_dir_all(&arguments.out)
         .map_err(|e| io_error(&arguments.out, "make the folder", &e))?;
-    let done = into_folder(arguments, recorded, &design, limits, watch);
+    let forced = arguments.force.force;
+    let done = Results::claim_forced(&arguments.out, &planned, &recorded.inputs, forced)
+        .and_then(|results| into_folder(arguments, recorded, &design, limits, (results, watch)));
     if done.is_err() && !was_there {
         // Only what is empty can be removed so: a journal stays.
         let _ = std::fs::remove_dir(&arguments.out);
     }
     done
+}
+
+/// The points' designs that are in a folder: a study replaces those of an earlier one, and how many it makes is known at
+/// its end.
+fn earlier_designs(out: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(out.join(DESIGNS)).into_iter().flatten();
+    let names = entries
+        .flatten()
+        .filter_map(|e| e.file_name().into_string().ok());
+    let mut points: Vec<String> = names
+        .filter(|name| name.starts_with("point-") && name.ends_with(".toml"))
+        .map(|name| format!("{DESIGNS}/{name}"))
+        .collect();
+    points.sort();
+    points
 }
 
 /// The study, written into a folder that is there.
@@ -79,10 +114,9 @@ fn into_folder(
     recorded: &Recorded,
     design: &Design,
     limits: Limits,
-    watch: Stages,
+    (mut results, watch): (Results, Stages),
 ) -> Result<()> {
     let threads = super::threads(arguments.threads);
-    let mut results = Results::claim(&arguments.out, &PLANNED, &recorded.inputs)?;
     let begun: Mutex<Option<(Step, Instant)>> = Mutex::new(None);
     let said = |progress: Progress| {
         if let Ok(mut begun) = begun.lock() {
@@ -117,13 +151,16 @@ fn into_folder(
     results.write(PLANNED[0], json.as_bytes())?;
     results.write(PLANNED[1], html.as_bytes())?;
     watch.write(&mut results, &done.study.design_sha256, &recorded.command)?;
+    let note = super::earlier::note(&arguments.out, PLANNED[0], "design or limits", &json);
+    results.replaces(DESIGNS);
     results.finish()?;
+    note.iter().for_each(|note| talk!("{note}"));
     journal::remove(&arguments.out)?;
     match arguments.format {
         OutputFormat::Json => super::terminal::give(&json),
         OutputFormat::Text => {
             print(&done.study);
-            super::common::wrote(&arguments.out, &["report.html", "designs"]);
+            super::common::wrote(&arguments.out, &["report.html", DESIGNS]);
         }
     }
     let unmet = done.study.chosen.iter().filter(|c| c.point.is_none());

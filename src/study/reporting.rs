@@ -27,6 +27,9 @@ use std::collections::BTreeMap;
 /// to about this, with the rows that a verification runs.
 pub const RESOLUTION: f64 = 0.03;
 
+/// The folder of the points' designs, below that of the results.
+pub const DESIGNS: &str = "designs";
+
 /// What is at hand when the search is over.
 pub(super) struct Reporting<'a> {
     pub(super) design: &'a Design,
@@ -93,7 +96,7 @@ impl Reporting<'_> {
         let mut files = Vec::new();
         for (k, (_, c, point)) in points.iter_mut().enumerate() {
             point.number = k + 1;
-            let name = format!("designs/point-{:0digits$}.toml", k + 1);
+            let name = format!("{DESIGNS}/point-{:0digits$}.toml", k + 1);
             files.push((name.clone(), c.text.clone()));
             point.design = Some(name);
         }

@@ -21,6 +21,13 @@ pub struct Part {
     pub of: u32,
 }
 
+impl Part {
+    /// The file that its results are written to.
+    pub fn file_name(self) -> String {
+        format!("shard-{}-of-{}.runs", self.number, self.of)
+    }
+}
+
 impl std::str::FromStr for Part {
     type Err = String;
 
@@ -84,7 +91,7 @@ pub fn run(bench: &mut Bench, part: Part, hash: &str, folder: &Path) -> Result<P
     for lengths in &own {
         text += &journal::line(lengths, &bench.figures(lengths).copied());
     }
-    let path = folder.join(format!("shard-{}-of-{}.runs", part.number, part.of));
+    let path = folder.join(part.file_name());
     crate::output::write_whole(&path, text.as_bytes())?;
     Ok(path)
 }

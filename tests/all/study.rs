@@ -190,6 +190,63 @@ fn limits_are_met_by_the_cheapest_or_the_word_in_the_way_is_named() {
 }
 
 /// The default with some of its text changed, and a space of 70 designs, searched whole.
+/// Designs of an earlier study go and are said to; what the user wrote or edited stays.
+#[test]
+fn a_study_replaces_an_earlier_one_and_nothing_of_the_users() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = design(folder.path(), 2000, "");
+    let file = file.to_str().expect("UTF-8");
+    let out = folder.path().join("out");
+    std::fs::create_dir(&out).expect("a folder");
+    std::fs::write(out.join("report.html"), "mine").expect("written");
+    let asked = ["--for", "bias_dps<=1"];
+    let limited = |more: &[&str]| study(&[&[file], &asked[..], more].concat(), &out);
+    let refused = limited(&[]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(told(&refused).contains("no result of an earlier run"));
+    let own = std::fs::read_to_string(out.join("report.html"));
+    assert_eq!(own.expect("there"), "mine");
+    good(&study(&[file, "--force"], &out));
+    let designs = || {
+        let entries = std::fs::read_dir(out.join("designs")).expect("designs");
+        let names = entries
+            .flatten()
+            .map(|e| e.file_name().into_string().expect("UTF-8"));
+        let mut names: Vec<String> = names.map(|name| format!("designs/{name}")).collect();
+        names.sort();
+        names
+    };
+    let of = |key: &str| {
+        let json = json(&bytes(&out));
+        let front = json["front"].as_array().expect("a front").clone();
+        let names = front
+            .iter()
+            .map(|p| p[key].as_str().expect("a file").to_owned());
+        let mut names: Vec<String> = names.collect();
+        names.sort();
+        names
+    };
+    let first = of("design");
+    assert_eq!(designs(), first);
+    // With limits the front is another one.
+    let said = limited(&[]);
+    good(&said);
+    assert!(told(&said).contains("of another design or limits: they were replaced"));
+    assert!(of("design") != first, "the test needs fronts of two sizes");
+    assert_eq!(designs(), of("design"));
+    // An edited design is not written over.
+    let edited = out.join(&designs()[0]);
+    std::fs::write(&edited, "mine").expect("written");
+    let refused = limited(&[]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(told(&refused).contains("it was edited since it was written"));
+    // Neither is a file that has the name of a part.
+    std::fs::write(out.join("shard-1-of-9.runs"), "mine").expect("written");
+    let refused = study(&[file, "--shard", "1/9"], &out);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(told(&refused).contains("gyrogen did not write it"));
+}
+
 fn changed(folder: &Path, changes: &[(&str, &str)]) -> PathBuf {
     let mut text = include_str!("../../src/design/default.toml").to_owned();
     let space = "[study]\nwords = [\"circuit.demodulator.product\", \"circuit.cordic.angle_bits\"]";
