@@ -179,7 +179,7 @@ const COLUMNS: [&str; 5] = [
     "drift\ndeg/s",
     "noise\ndeg/s/rtHz",
     "SF\nppm",
-    "line\ndeg/s",
+    "spur\ndeg/s",
 ];
 
 fn print(s: &Study) {
@@ -192,12 +192,19 @@ fn print(s: &Study) {
         s.limits_from
     };
     say!(
-        "merit: the largest part that a column is of its limit (`by`: which column); at most 1: {held}"
+        "merit: the largest part that a column is of its limit (`by`: which column). At most 1, by the estimates: {held}."
     );
+    let mut all = std::iter::once(&s.reference).chain(&s.front);
+    if all.any(is_within_by_estimate_alone) {
+        say!(
+            "?: the estimates are within the limits, the whole of their {:.0} % intervals (study.json) is not. No such point is chosen.",
+            100.0 * s.confidence.joint
+        );
+    }
     say!("angle random walk in deg/rth: 42.4 times the noise");
     if let Some(hz) = s.conditions.detuned_hz {
         say!(
-            "line: the largest, at rest or with the oscillator off by {} Hz; `equiv` runs at the design's own frequency alone",
+            "spur: the largest line of the error's spectrum, at rest or with the oscillator off by {} Hz; `equiv` runs at the design's own frequency alone",
             number(hz, 3)
         );
     }
@@ -241,7 +248,7 @@ fn print(s: &Study) {
         100.0 * s.confidence.each,
         s.confidence.standard_errors
     );
-    for line in crate::report::study::quarter_less(s) {
+    for line in crate::report::study::none_a_quarter_less(&s.quarter_less) {
         say!("{line}");
     }
     for note in &s.notes {
@@ -271,6 +278,11 @@ fn points(s: &Study) -> comfy_table::Table {
     table
 }
 
+/// A merit of at most 1 does not say by itself that a point may be chosen.
+fn is_within_by_estimate_alone(p: &Point) -> bool {
+    p.merit <= 1.0 && !p.shown
+}
+
 fn row(p: &Point, targets: &[String]) -> Vec<String> {
     let mut row = vec![if p.number == 0 {
         "given".to_owned()
@@ -288,14 +300,63 @@ fn row(p: &Point, targets: &[String]) -> Vec<String> {
         number(p.noise_dps_rthz, 3),
         format!("{:.1}", p.scale_factor_ppm),
         number(p.spur_dps, 3),
-        format!("{:.3}", p.merit),
+        // A column of its own would make the table wider than 100.
+        match is_within_by_estimate_alone(p) {
+            true => format!("?{:.3}", p.merit),
+            false => format!("{:.3}", p.merit),
+        },
         // Its column.
         match p.limited_by.split('_').next() {
             Some("scale") => "SF",
-            Some("spur") => "line",
             name => name.unwrap_or_default(),
         }
         .to_owned(),
     ]);
     row
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::outcome::WordLengths;
+
+    #[test]
+    fn a_merit_within_the_limits_by_the_estimates_alone_is_marked() {
+        let mut point = Point {
+            number: 4,
+            design: None,
+            targets: vec!["fpga".to_owned()],
+            word_lengths: WordLengths::new(),
+            cost: Default::default(),
+            price: Default::default(),
+            price_of_given: Default::default(),
+            bias_error_dps: 0.0,
+            drift_residual_dps: 0.0,
+            noise_dps_rthz: 0.0,
+            arw_deg_rth: 0.0,
+            scale_factor_ppm: 0.0,
+            spur_dps: 0.0534,
+            spur_hz: 1.0,
+            spur_detuned: true,
+            spur_floor_dps: 0.0,
+            merit: 0.926,
+            limited_by: "spur_dps",
+            parts: Default::default(),
+            bounds: Default::default(),
+            as_good_as_given: false,
+            shown: false,
+            verified: true,
+            startup_error_dps: None,
+            changes: Default::default(),
+            alternatives: Vec::new(),
+        };
+        let told = |p: &Point| row(p, &[]).split_off(1 + COLUMNS.len());
+        assert_eq!(told(&point), ["?0.926", "spur"]);
+        assert_eq!(COLUMNS[4], "spur\ndeg/s");
+        point.shown = true;
+        assert_eq!(told(&point), ["0.926", "spur"]);
+        // What is beyond its limits needs no mark.
+        (point.shown, point.merit) = (false, 2.81);
+        assert_eq!(told(&point), ["2.810", "spur"]);
+    }
 }

@@ -102,22 +102,31 @@ pub(super) fn chosen(work: &Reporting, good: &BTreeMap<Lengths, Checked>) -> Vec
     (0..work.bench.objectives.len()).map(of).collect()
 }
 
-/// True if a verified design holds what is asked on a target: every requirement with the whole of its interval, or
-/// without requirements the given design's figures.
+/// True if a verified design holds what is asked on a target.
 pub(super) fn holds(work: &Reporting, c: &Checked, objective: usize) -> bool {
-    let limits = work.limits;
-    if limits.is_empty() {
+    let cost = work.bench.costs(&c.lengths).and_then(|c| c.get(objective));
+    let is_fabric = target(work, objective) == "fpga";
+    // Without requirements there is none on the cost.
+    let has_cost = cost.map_or(work.limits.is_empty(), |c| {
+        costs_hold(c, is_fabric, work.limits)
+    });
+    figures_hold(work, c) && has_cost
+}
+
+/// True if a verified design's figures are shown to hold what is asked: every requirement with the whole of its interval,
+/// or without requirements the given design's figures.
+pub(super) fn figures_hold(work: &Reporting, c: &Checked) -> bool {
+    if work.limits.is_empty() {
         return work
             .instrument
             .holds(&c.verified.figures, &c.bounds, work.own);
     }
-    let cost = work.bench.costs(&c.lengths).and_then(|c| c.get(objective));
-    let is_fabric = target(work, objective) == "fpga";
-    let figures = limits.iter().all(|limit| match c.bounds.most(limit.name) {
-        Some(most) => most <= limit.value,
-        None => limit.name != LimitName::Bandwidth || work.bandwidth_hz >= limit.value,
-    });
-    figures && cost.is_some_and(|c| costs_hold(c, is_fabric, limits))
+    work.limits
+        .iter()
+        .all(|limit| match c.bounds.most(limit.name) {
+            Some(most) => most <= limit.value,
+            None => limit.name != LimitName::Bandwidth || work.bandwidth_hz >= limit.value,
+        })
 }
 
 /// True if bytes and cycles are within their limits. An FPGA has no cycles of a processor.
@@ -169,9 +178,9 @@ pub(super) fn answers(
             Some((_, p)) => {
                 let part = 100.0 * cost(p) / cost(given).max(f64::MIN_POSITIVE);
                 let what = if limits.is_empty() {
-                    "the cheapest point with no figure of the data sheet more than one percent worse than the given design's"
+                    "the cheapest point that is shown to have no figure of the data sheet more than one percent worse than the given design's"
                 } else if requires_a_figure(limits) {
-                    "the cheapest point with everything that is required"
+                    "the cheapest point that is shown to hold everything that is required"
                 } else {
                     "the finest point with everything that is required"
                 };

@@ -75,6 +75,9 @@ pub struct Point {
     /// Each figure of the data sheet is at most one percent worse than the given design's: the whole of its bounds is
     /// within that, or what the words add is at most one percent above what those of the given design add on the same noise.
     pub as_good_as_given: bool,
+    /// Its figures hold what is asked, with the whole of their bounds; without requirements `as_good_as_given`. A target's
+    /// chosen point is one of these.
+    pub shown: bool,
     /// Run bit for bit with other noise than the search's, started from power-on, ranges proved.
     pub verified: bool,
     /// Mean error after a start from power-on less that of the settled circuit under the same conditions, deg/s.

@@ -52,6 +52,37 @@ pub(super) struct Reporting<'a> {
     pub(super) said: &'a (dyn Fn(Progress) + Sync),
 }
 
+/// Why a point is dropped of which a word can overflow: an error of its own, whatever its figures are.
+const OVERFLOWS: &str = "a word can overflow that in the given design cannot";
+
+/// A start from power-on after which the error may be too large.
+#[derive(Debug, Clone, Copy)]
+struct Late {
+    /// The largest error that the interval does not exclude, deg/s.
+    start_dps: f64,
+    /// The limit of the bias, deg/s.
+    limit_dps: f64,
+}
+
+/// Why points with such starts are dropped; `None` without any.
+fn late_starts(late: &[Late]) -> Option<String> {
+    let starts = || late.iter().map(|l| l.start_dps);
+    let limit = number(late.first()?.limit_dps, 3);
+    let [least, most] = [
+        starts().fold(f64::INFINITY, f64::min),
+        starts().fold(0.0, f64::max),
+    ]
+    .map(|v| number(v, 3));
+    let range = match least == most {
+        true => most,
+        false => format!("{least} to {most}"),
+    };
+    Some(format!(
+        "the error after power-on may be as large as {range} deg/s. Allowed is the limit of the bias, {limit} deg/s (for a \
+         point with merit above 1: that limit times the merit)"
+    ))
+}
+
 /// What stands in the result as it is.
 pub(super) struct Method<'a> {
     pub(super) method: &'static str,
@@ -172,32 +203,26 @@ impl Reporting<'_> {
             late: Vec::new(),
         };
         let mut reasons: BTreeMap<String, u64> = BTreeMap::new();
-        let mut late = None;
+        let mut late: Vec<Late> = Vec::new();
         for (lengths, checked) in wanted.iter().zip(checked) {
-            match checked.map(|c| (self.failure(&c), c)) {
-                Ok((why, c)) if why.is_none() || *lengths == given => {
+            let is_given = *lengths == given;
+            match checked.map(|c| (self.late(&c), c)) {
+                Ok((_, c)) if !c.verified.overflows.is_empty() && !is_given => {
+                    *reasons.entry(OVERFLOWS.to_owned()).or_default() += 1;
+                }
+                Ok((Some(one), c)) if !is_given => {
+                    late.push(one);
+                    seen.late.push(c);
+                }
+                Ok((one, c)) => {
+                    let why = one.and_then(|one| late_starts(&[one]));
                     notes.extend(why.map(|why| format!("the given design itself: {why}")));
                     seen.good.insert(lengths.clone(), c);
                 }
-                Ok((why, c)) if c.verified.overflows.is_empty() => {
-                    late = why;
-                    seen.late.push(c);
-                }
-                Ok((why, _)) => *reasons.entry(why.unwrap_or_default()).or_default() += 1,
                 Err(why) => *reasons.entry(why).or_default() += 1,
             }
         }
-        if let Some(why) = late {
-            let starts = seen.late.iter().filter_map(|c| c.bounds.startup_error_dps);
-            let mut starts: Vec<f64> = starts.map(largest).collect();
-            starts.sort_by(f64::total_cmp);
-            let ends = starts.first().zip(starts.last());
-            let bounds = ends.map_or(String::new(), |(least, most)| {
-                let [least, most] = [least, most].map(|v| number(*v, 3));
-                format!("; their errors there may be up to {least} to {most} deg/s")
-            });
-            reasons.insert(format!("{why}{bounds}"), seen.late.len() as u64);
-        }
+        reasons.extend(late_starts(&late).map(|why| (why, late.len() as u64)));
         let told =
             |(why, count): (&String, &u64)| format!("{} dropped: {why}", counted(*count, "point"));
         notes.extend(reasons.iter().map(told));
@@ -317,25 +342,18 @@ impl Reporting<'_> {
         })
     }
 
-    /// Why a point cannot be reported: an overflow that the given design cannot have; a start from power-on that is
-    /// not shown to end where the settled circuit is.
+    /// A start from power-on that is not shown to end where the settled circuit is: the point cannot be reported.
     ///
     /// A start is an error of the bias: the whole of its interval, deg/s, has to be within the limit of the bias, deg/s,
     /// times the point's merit where that is above 1. A point says that its figures are within merit times their limits,
     /// and that has to be so after a start too.
-    fn failure(&self, c: &Checked) -> Option<String> {
-        if !c.verified.overflows.is_empty() {
-            return Some("a word can overflow that in the given design cannot".to_owned());
-        }
-        let limit = self.scale.bias_dps.or(self.instrument.bias_dps)?;
+    fn late(&self, c: &Checked) -> Option<Late> {
+        let limit_dps = self.scale.bias_dps.or(self.instrument.bias_dps)?;
         let claimed = self.scale.merit(&c.verified.figures).max(1.0);
-        let start = largest(c.bounds.startup_error_dps?);
-        (start > limit * claimed).then(|| {
-            format!(
-                "after a start from power-on the rate is not shown to settle to within {} deg/s, the limit of the bias \
-                 (times the point's merit where that is above 1)",
-                number(limit, 3)
-            )
+        let start_dps = largest(c.bounds.startup_error_dps?);
+        (start_dps > limit_dps * claimed).then_some(Late {
+            start_dps,
+            limit_dps,
         })
     }
 
@@ -398,6 +416,7 @@ impl Reporting<'_> {
             parts: self.scale.parts(f).into_iter().collect(),
             bounds: c.bounds,
             as_good_as_given: self.instrument.holds(f, &c.bounds, self.own),
+            shown: answer::figures_hold(self, c),
             verified: true,
             startup_error_dps: c.verified.startup_dps.map(|[value, _]| value),
             changes: changes

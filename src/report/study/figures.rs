@@ -26,7 +26,7 @@ fn axis(values: impl IntoIterator<Item = f64>, quantity: &str, unit: &str) -> Ax
 fn hint(p: &Point) -> String {
     let lengths = p.word_lengths.iter().map(|(k, v)| format!("{k} {v}"));
     format!(
-        "point {}: merit {} by {}\nbias {} deg/s, drift {} deg/s, noise {} deg/s/√Hz\nscale factor {} ppm, line {} deg/s\n{}",
+        "point {}: merit {} by {}\nbias {} deg/s, drift {} deg/s, noise {} deg/s/√Hz\nscale factor {} ppm, spur {} deg/s\n{}",
         name(p),
         significant(p.merit, 3),
         p.limited_by,

@@ -6,7 +6,7 @@ use super::figure::{Figure, both, one};
 use super::narrow::rendered;
 use super::text::significant;
 use crate::error::Result;
-use crate::study::outcome::{Point, Study};
+use crate::study::outcome::{Point, Quarter, Study};
 use askama::Template;
 
 /// The page.
@@ -38,6 +38,7 @@ struct Row {
     prices: Vec<String>,
     figures: Vec<String>,
     limited_by: String,
+    shown: &'static str,
     file: String,
     changes: String,
 }
@@ -53,7 +54,8 @@ pub fn html(s: &Study) -> Result<String> {
         headline: headline(s),
         finding: format!(
             "{} designs were considered and {} run bit for bit ({}); {} undominated points were run again with other noise \
-             over {} temperatures, and their ranges proved. A merit of 1: {}. Bounds in study.json hold at once for all {} \
+             over {} temperatures, and their ranges proved. A merit of at most 1, by the estimates: {}. A point is shown to hold what is \
+             asked if the whole of its bounds does; only such a point is chosen. Bounds in study.json hold at once for all {} \
              figures with {} % confidence ({}). {}",
             s.designs_considered,
             s.designs_simulated,
@@ -64,7 +66,7 @@ pub fn html(s: &Study) -> Result<String> {
             s.confidence.intervals,
             significant(100.0 * s.confidence.joint, 3),
             s.confidence.correction,
-            quarter_less(s).join(" ")
+            none_a_quarter_less(&s.quarter_less).join(" ")
         ),
         chosen: s
             .chosen
@@ -115,19 +117,13 @@ pub fn html(s: &Study) -> Result<String> {
     rendered(&page)
 }
 
-/// A sentence for each target of which it is known whether a design costs a quarter less.
-pub fn quarter_less(s: &Study) -> Vec<String> {
-    let known = s
-        .quarter_less
-        .iter()
-        .filter(|q| q.point.is_some() || q.proved_none);
-    known
+/// A sentence for each target on which no design costs a quarter less. Where one does, the chosen point says what it costs.
+pub fn none_a_quarter_less(known: &[Quarter]) -> Vec<String> {
+    let none = known.iter().filter(|q| q.proved_none);
+    none
         .map(|q| {
             let target = &q.target;
             let less = significant(100.0 * (1.0 - q.share), 3);
-            if let Some(point) = q.point {
-                return format!("{target}: point {point} costs at least {less} % less, with no figure of the data sheet more than one percent worse.");
-            }
             let words: Vec<&str> = q.words.iter().map(|w| w.name).collect();
             let best = match (q.best_merit, q.best_limited_by) {
                 (Some(merit), Some(by)) => {
@@ -213,6 +209,7 @@ fn row(p: &Point, targets: &[String]) -> Row {
         .map(|v| significant(v, 3))
         .to_vec(),
         limited_by: p.limited_by.to_owned(),
+        shown: if p.shown { "yes" } else { "no" },
         file: p.design.clone().unwrap_or_default(),
         changes: changes.join("\n"),
     }
@@ -259,4 +256,34 @@ fn word_rows(s: &Study) -> Vec<[String; 5]> {
             ]
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::outcome::WordLengths;
+
+    #[test]
+    fn a_quarter_less_is_told_where_it_is_proved_that_there_is_none() {
+        let mut quarter = Quarter {
+            target: "fpga".to_owned(),
+            share: 0.75,
+            point: Some(14),
+            proved_none: false,
+            words: Vec::new(),
+            others: WordLengths::new(),
+            designs: 12,
+            cheap_enough: None,
+            best_merit: None,
+            best_limited_by: None,
+        };
+        // The sentence about the chosen point has the figure.
+        assert!(none_a_quarter_less(std::slice::from_ref(&quarter)).is_empty());
+        (quarter.point, quarter.proved_none) = (None, true);
+        let told = none_a_quarter_less(&[quarter]).concat();
+        assert!(
+            told.starts_with("fpga: no design costs 25.0 % less "),
+            "{told}"
+        );
+    }
 }
