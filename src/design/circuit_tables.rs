@@ -414,24 +414,50 @@ fn coefficients(t: &Table, format: Format, accumulator: Format) -> Result<Vec<i1
     // c << shift is a value of the accumulator's format exactly if c is between these.
     let shift = accumulator.fraction_bits - format.fraction_bits;
     let held = -(-accumulator.min_raw() >> shift)..=accumulator.max_raw() >> shift;
-    elements
-        .iter()
-        .map(|element| {
-            let raw: i128 = element.integer(
-                format.min_raw()..=format.max_raw(),
-                &format!("a raw value of coefficient_format, {format}"),
-            )?;
-            if held.contains(&raw) {
-                return Ok(raw);
-            }
-            Err(element
-                .error(format!(
-                    "is {raw}, which the accumulator's format {accumulator} cannot hold"
-                ))
-                .help("give the accumulator more integer bits")
-                .into())
-        })
-        .collect()
+    let raws = elements.iter().map(|element| {
+        element.integer(
+            format.min_raw()..=format.max_raw(),
+            &format!("a raw value of coefficient_format, {format}"),
+        )
+    });
+    let raws = raws.collect::<Result<Vec<i128>>>()?;
+    let mut pairs = elements.iter().zip(&raws);
+    if let Some((element, raw)) = pairs.find(|(_, raw)| !held.contains(*raw)) {
+        let wider = holding(&raws, format, accumulator);
+        return Err(element
+            .error(format!(
+                "is {raw}, which the accumulator's format {accumulator} cannot hold"
+            ))
+            .help(match wider.bits() {
+                0..=64 => format!(
+                    "at least {} integer bits hold all coefficients: {wider}",
+                    wider.integer_bits
+                ),
+                bits => format!(
+                    "{wider} would hold all coefficients, but has {bits} bits, and a word at most 64: give coefficients and accumulator \
+                     fewer fraction bits"
+                ),
+            })
+            .into());
+    }
+    Ok(raws)
+}
+
+/// The accumulator's format with the fewest integer bits that hold all coefficients; it is signed if one of them is negative.
+fn holding(raws: &[i128], coefficient: Format, accumulator: Format) -> Format {
+    let signed = accumulator.signed || raws.iter().any(|raw| *raw < 0);
+    let bits = |raw: &i128| {
+        let magnitude = if *raw < 0 { !*raw } else { *raw };
+        128 - magnitude.leading_zeros() + u32::from(signed)
+    };
+    let most = raws.iter().map(bits).max().unwrap_or(0);
+    Format {
+        signed,
+        integer_bits: most
+            .saturating_sub(coefficient.fraction_bits)
+            .max(accumulator.integer_bits),
+        fraction_bits: accumulator.fraction_bits,
+    }
 }
 
 fn clamp(t: &Table, input: &CompensationInput, circuit: &Circuit) -> Result<Option<(i128, i128)>> {

@@ -60,7 +60,7 @@ fn keys_that_contradict_each_other_are_refused() {
     says(
         &replaced(&[("\"Q13.27\"", "\"Q11.27\""), ("1415954326", "¦1415954326")]),
         "Q11.27 cannot hold",
-        "more integer bits",
+        "at least 12 integer bits hold all coefficients: Q12.27",
     );
     says(
         &replaced(&[
@@ -68,7 +68,7 @@ fn keys_that_contradict_each_other_are_refused() {
             ("[114923930, ", "[114923930, ¦-1, "),
         ]),
         "UQ12.27 cannot hold",
-        "more integer bits",
+        "at least 12 integer bits hold all coefficients: Q12.27",
     );
 }
 
