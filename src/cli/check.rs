@@ -82,7 +82,10 @@ fn print(check: &Check) {
     super::terminal::numbers(&mut ranges, 2..);
     super::terminal::numbers(&mut bits, 2..);
     super::terminal::show(&ranges);
-    say!("proved range: every raw word that can come, for every ADC code and state.");
+    say!(
+        "proved range: of the value before the word saturates or wraps, for every ADC code and state. Of a word that wraps or limits by design: \
+         after that."
+    );
     super::terminal::show(&bits);
     say!(
         "has: the bits of the word. needs: the bits that hold its proved range. spare: has less needs; below 0 the word can overflow. -: \
