@@ -17,6 +17,7 @@ use crate::design::Design;
 use crate::emit::bundle::{Bundle, Part, trace_compensation};
 use crate::equivalence::predicted;
 use crate::error::Result;
+use crate::nodes::node::operation;
 use crate::nodes::{repair, run};
 use outcome::{Check, NodeCheck, Overflows, Witness};
 use proved::Proved;
@@ -56,6 +57,7 @@ pub fn check(design: &Design, command: &str, samples: usize) -> Result<Check> {
                     words: overflows,
                     sample: event.map(|e| e.sample),
                     operands: event.map_or(Vec::new(), |e| e.operands.clone()),
+                    operation: event.map(|e| operation(&e.part, &e.operands)),
                     value: event.map(|e| e.value),
                 });
             }

@@ -32,6 +32,8 @@ pub struct Witness {
     pub sample: Option<u64>,
     /// What went in, raw.
     pub operands: Vec<i128>,
+    /// What was done with it, in words.
+    pub operation: Option<String>,
     /// The raw word before the overflow step.
     pub value: Option<i128>,
 }
@@ -103,17 +105,10 @@ impl NodeCheck {
         let [low, high] = self.proved;
         match &self.witness {
             Some(w) => {
-                let first = w
-                    .sample
-                    .zip(w.value)
-                    .map_or(String::new(), |(sample, value)| {
-                        let operands: Vec<String> =
-                            w.operands.iter().map(i128::to_string).collect();
-                        format!(
-                            ", the first at sample {sample}: the raw word {value}, made of the raw words {}",
-                            operands.join(" and ")
-                        )
-                    });
+                let first = w.sample.zip(w.value).zip(w.operation.as_deref());
+                let first = first.map_or(String::new(), |((sample, value), operation)| {
+                    format!(", the first at sample {sample}: the raw word {value} ({operation})")
+                });
                 format!("{} words of the design's own gyro{first}", w.words)
             }
             None => format!("every value, {low} to {high}"),

@@ -73,6 +73,11 @@ fn a_vector_that_is_too_narrow_overflows_for_certain_and_says_so() {
     let vector = node(&c, "circuit.cordic.width");
     assert_eq!(vector.overflow, Overflows::Certain, "{vector:?}");
     assert!(vector.witness.as_ref().unwrap().words > 0);
+    let seen = vector.seen();
+    assert!(
+        seen.contains("(x or y of the CORDIC, whose inputs are drive_i "),
+        "{seen}"
+    );
     assert!(
         !c.holds && c.reasons[0].starts_with("circuit.cordic.width overflows 27 bits"),
         "{:?}",

@@ -5,7 +5,7 @@ use super::predicted::Prediction;
 use crate::circuit::vector_width::{self, TooShort};
 use crate::design::Design;
 use crate::nodes::histogram::Histogram;
-use crate::nodes::node::Node;
+use crate::nodes::node::{Node, operation};
 use crate::nodes::probe::Seen;
 use crate::nodes::repair::{self, Repair};
 use crate::simulation::hunting::Hunting;
@@ -153,14 +153,13 @@ impl FirstOverflow {
 
     /// One sentence.
     pub fn sentence(&self) -> String {
-        let operands: Vec<String> = self.operands.iter().map(i128::to_string).collect();
         let mut text = format!(
-            "overflow at sample {} in {}: the raw word {} does not fit {} (it was made of the raw words {})",
+            "overflow at sample {} in {}: the raw word {} does not fit {} ({})",
             self.sample,
             self.node,
             self.value,
             self.format,
-            operands.join(" and ")
+            operation(&self.part, &self.operands)
         );
         match (&self.mend, &self.repair) {
             (Some(mend), _) => text += &format!("; {mend}"),

@@ -41,6 +41,32 @@ pub struct Event {
     pub value: i128,
 }
 
+/// What a node made its word of, in words: the operation, and the raw words that went in by name.
+pub fn operation(part: &str, operands: &[i128]) -> String {
+    let key = part.split(' ').next().unwrap_or_default();
+    match (key, operands) {
+        ("circuit.demodulator.product", [code, entry]) => {
+            format!("ADC code {code} times table entry {entry}")
+        }
+        ("circuit.cordic.width", [i, q]) => {
+            format!("x or y of the CORDIC, whose inputs are drive_i {i} and drive_q {q}")
+        }
+        ("compensation.accumulator", [step, input]) if part.contains(" inner ") => {
+            format!("step {step} times input {input}")
+        }
+        ("compensation.accumulator", [coefficient, product]) => {
+            format!("aligned coefficient {coefficient} plus product {product}")
+        }
+        ("compensation.output", [rate, bias]) => format!("rate {rate} less bias {bias}"),
+        // The only cast that names none.
+        (_, []) => "integrator plus phase error".to_owned(),
+        _ => {
+            let operands: Vec<String> = operands.iter().map(i128::to_string).collect();
+            format!("from the raw word {}", operands.join(" and "))
+        }
+    }
+}
+
 /// Every word of a node, fixed and float.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct History {
@@ -237,5 +263,34 @@ impl Node {
         };
         let bits = up.min(down);
         bits.is_finite().then_some(bits)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_word_was_made_of_is_named_with_its_operation() {
+        assert_eq!(
+            operation("circuit.cordic.width", &[-32047, -185_330]),
+            "x or y of the CORDIC, whose inputs are drive_i -32047 and drive_q -185330"
+        );
+        assert_eq!(
+            operation("circuit.demodulator.product sense_i", &[3, -5]),
+            "ADC code 3 times table entry -5"
+        );
+        assert_eq!(
+            operation("compensation.accumulator inner 1", &[7, 9]),
+            "step 7 times input 9"
+        );
+        assert_eq!(
+            operation("compensation.accumulator outer 1", &[7, 9]),
+            "aligned coefficient 7 plus product 9"
+        );
+        assert_eq!(
+            operation("circuit.decimator.output sense_i", &[7]),
+            "from the raw word 7"
+        );
     }
 }
