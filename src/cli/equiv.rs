@@ -177,10 +177,9 @@ fn print(design: &Design, e: &Equivalence, out: &Path) {
     ]);
     let mut words =
         super::terminal::table(&["node", "one LSB is", "headroom", "overflows", "flags"]);
-    let usual = usual_flag(e.nodes.iter().map(|n| &n.flags[..]));
     for n in &e.nodes {
         errors.add_row(error_row(n));
-        words.add_row(word_row(n, usual));
+        words.add_row(word_row(n));
     }
     super::terminal::numbers(&mut errors, 1..);
     super::terminal::numbers(&mut words, 1..4);
@@ -191,9 +190,6 @@ fn print(design: &Design, e: &Equivalence, out: &Path) {
     );
     super::terminal::show(&words);
     say!("headroom: bits by which the words could grow before they overflow.");
-    if let Some(flag) = usual {
-        say!("flags: an empty cell stands for {flag}.");
-    }
     if e.nodes.iter().any(|n| n.name.contains(" inner ")) {
         say!(
             "compensation.accumulator: of step k of Horner's scheme, inner k is the product of the input and the step before, outer k its \
@@ -281,16 +277,6 @@ fn print_spurs(e: &Equivalence) {
     );
 }
 
-/// The flag that most nodes have, if every other node has another one and none has it beside others: it is said once.
-fn usual_flag<'a>(nodes: impl Iterator<Item = &'a [&'static str]> + Clone) -> Option<&'static str> {
-    let flag = *nodes.clone().find(|flags| flags.len() == 1)?.first()?;
-    let having = nodes.clone().filter(|flags| **flags == [flag]).count();
-    let all = nodes.clone().count();
-    let is_told_apart =
-        |flags: &'a [&'static str]| flags == [flag] || !(flags.is_empty() || flags.contains(&flag));
-    (4 * having >= 3 * all && nodes.clone().all(is_told_apart)).then_some(flag)
-}
-
 /// A node's errors.
 fn error_row(n: &NodeReport) -> Vec<String> {
     let decimals = |v: f64| if v.abs() < 1e3 { 3 } else { 0 };
@@ -306,8 +292,8 @@ fn error_row(n: &NodeReport) -> Vec<String> {
     ]
 }
 
-/// A node's words; of its flags not the `usual` one.
-fn word_row(n: &NodeReport, usual: Option<&str>) -> Vec<String> {
+/// A node's words and flags.
+fn word_row(n: &NodeReport) -> Vec<String> {
     let unit = if n.unit == "1" { "" } else { n.unit };
     vec![
         n.name.clone(),
@@ -316,24 +302,6 @@ fn word_row(n: &NodeReport, usual: Option<&str>) -> Vec<String> {
             .to_owned(),
         n.headroom_bits.map_or("-".into(), |b| format!("{b:.2}")),
         n.overflows.to_string(),
-        match usual.is_some_and(|flag| n.flags == [flag]) {
-            true => String::new(),
-            false => n.flags.join(" "),
-        },
+        n.flags.join(" "),
     ]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_flag_that_nearly_all_nodes_have_is_said_once_and_no_other() {
-        let of = |nodes: &[&[&'static str]]| usual_flag(nodes.iter().copied());
-        assert_eq!(of(&[&["a"], &["a"], &["a"], &["b"]]), Some("a"));
-        // No flag would read as the usual one.
-        assert_eq!(of(&[&["a"], &["a"], &["a"], &[]]), None);
-        assert_eq!(of(&[&["a"], &["b"], &["a"]]), None);
-        assert_eq!(of(&[]), None);
-    }
 }

@@ -260,7 +260,7 @@ fn notes(design: &Design, seen: &Seen, predictions: &[predicted::Prediction]) ->
     let mut notes = Vec::new();
     for (flag, meaning) in predicted::FLAGS {
         if predictions.iter().any(|p| p.flags.contains(&flag)) {
-            notes.push(format!("{meaning} [{flag}]"));
+            notes.push(format!("nodes flagged [{flag}]: {meaning}"));
         }
     }
     if seen.cut_rows > 0 {

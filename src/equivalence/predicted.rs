@@ -69,7 +69,7 @@ pub const FLAGS: [(&str, &str); 12] = [
     ("closed_loop", "the phase loop feeds the error back"),
     (
         "open_loop_integral",
-        "the node sums its errors over the rows, so that they grow with time. Its rms is not predicted",
+        "their errors add up over the rows, so that they grow with time. Their rms is not predicted",
     ),
     (
         "other_form",
@@ -77,7 +77,7 @@ pub const FLAGS: [(&str, &str); 12] = [
     ),
     (
         "overflow",
-        "the node or one before it has overflowed, so that its error is not one of rounding",
+        "they have overflowed, or a node before them has, so that their error is not one of rounding",
     ),
     (
         "phase_cut",
@@ -85,7 +85,7 @@ pub const FLAGS: [(&str, &str); 12] = [
     ),
     (
         "few_rows",
-        "the node has fewer than 1000 words, so that the observed rms is itself uncertain. Take more samples",
+        "they have fewer than 1000 words, so that the observed rms is itself uncertain. Take more samples",
     ),
 ];
 

@@ -154,6 +154,12 @@ fn tables_of_words_fit_a_terminal_of_100_columns() {
         assert_eq!(rows.count(), 2, "{said}");
         let wide = said.lines().find(|l| l.chars().count() > 100);
         assert_eq!(wide, None, "{said}");
+        let told = match command {
+            "check" => "proved range: of the value before the word saturates or wraps",
+            // Each node with its flags.
+            _ => "  coherent_nco\n",
+        };
+        assert!(said.contains(told), "{said}");
     }
 }
 
