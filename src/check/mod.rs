@@ -10,6 +10,7 @@ pub mod proved;
 pub mod remarks;
 pub mod requirements;
 
+use crate::circuit::setpoint::OutOfReach;
 use crate::circuit::{engine, vector_width};
 use crate::cosim::stream::stimulus;
 use crate::cost::{self, Target};
@@ -91,6 +92,7 @@ pub fn check(design: &Design, command: &str, samples: usize) -> Result<Check> {
         reasons.push(reason);
     }
     reasons.splice(0..0, of_vector);
+    reasons.extend(OutOfReach::of(design).map(|far| far.sentence()));
     reasons.extend(requirements.iter().filter_map(Requirement::failure));
     Ok(Check {
         schema: "gyrogen.check/1",

@@ -143,7 +143,7 @@ pub struct Check {
     pub requirements: Vec<Requirement>,
     /// With which confidence the bounds of these hold; null without any.
     pub confidence: Option<Confidence>,
-    /// Nothing overflows for certain, and every requirement is met.
+    /// Nothing overflows for certain, the amplitude loop can reach its setpoint, and every requirement is met.
     pub holds: bool,
     /// Why not.
     pub reasons: Vec<String>,

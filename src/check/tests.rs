@@ -121,6 +121,21 @@ fn overflows_that_only_follow_from_a_narrow_vector_are_marked_and_no_reasons() {
 }
 
 #[test]
+fn a_setpoint_that_no_magnitude_reaches_does_not_hold() {
+    let c = checked(&[("\nsetpoint_raw = 1048576", "\nsetpoint_raw = 100000000")]);
+    assert!(!c.holds);
+    let [reason] = &c.reasons[..] else {
+        panic!("{:?}", c.reasons)
+    };
+    assert!(
+        reason.contains("is 100000000, above the largest magnitude, 5931461 (proved)"),
+        "{reason}"
+    );
+    let magnitude = node(&c, "circuit.cordic magnitude");
+    assert_eq!(magnitude.proved[1], 5_931_461);
+}
+
+#[test]
 fn a_vector_that_may_wrap_is_told_its_width_and_line() {
     let c = checked(&[("width = 32", "width = 29")]);
     assert!(c.holds, "{:?}", c.reasons);

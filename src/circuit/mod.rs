@@ -37,6 +37,7 @@ mod sample_lanes;
 #[cfg(target_arch = "x86_64")]
 mod sample_lanes_x86;
 pub mod scale;
+pub mod setpoint;
 pub mod vector_width;
 
 /// The four channels, in the contract's order.

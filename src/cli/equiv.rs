@@ -118,6 +118,7 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         OutputFormat::Json => super::terminal::give(&json),
         OutputFormat::Text => print(&design, &result, &arguments.out),
     }
+    super::warnings(&result.warnings);
     if result.holds {
         return Ok(());
     }

@@ -276,7 +276,7 @@ fn print_sentences(outcome: &Outcome) {
     let time = |t: Option<f64>| t.map_or("not seen".to_owned(), |t| format!("{:.0} ms", 1e3 * t));
     let up = &s.startup;
     say!(
-        "After power-on at {} degC the amplitude is within 1 % after {}, the phase within 0.1 deg after {}{}.",
+        "After power-on at {} degC the amplitude is within 1 % of its final value after {}, the phase within 0.1 deg of its own after {}{}.",
         up.chamber_degc,
         time(up.amplitude_s),
         time(up.phase_s),

@@ -8,6 +8,7 @@ use crate::emit::views::Language;
 use crate::error::Result;
 use crate::nodes::probe::Seen;
 use crate::nodes::{repair, run};
+use crate::record::Warning;
 use crate::simulation::hunting::{Hunting, hunting};
 use crate::spectrum::{NcoSpurs, nco_spurs};
 use crate::verify::compare;
@@ -248,6 +249,7 @@ fn assemble(
         holds: reasons.is_empty(),
         reasons,
         notes: [notes(design, seen, &predictions), beside.notes].concat(),
+        warnings: Warning::of_setpoint(design).into_iter().collect(),
         nco_spurs: beside.nco_spurs,
         loops: beside.loops,
         against: None,

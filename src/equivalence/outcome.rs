@@ -8,6 +8,7 @@ use crate::nodes::histogram::Histogram;
 use crate::nodes::node::{Node, operation};
 use crate::nodes::probe::Seen;
 use crate::nodes::repair::{self, Repair};
+use crate::record::Warning;
 use crate::simulation::hunting::Hunting;
 use crate::spectrum::NcoSpurs;
 use crate::verify::compare::Compared;
@@ -240,6 +241,8 @@ pub struct Equivalence {
     pub reasons: Vec<String>,
     /// What the flags mean, and what else to know.
     pub notes: Vec<String>,
+    /// Where the design's own numbers do not fit each other.
+    pub warnings: Vec<Warning>,
     /// The oscillator's spurs, at the design's tuning word.
     pub nco_spurs: NcoSpurs,
     /// What quantisation leaves of the loops: dead band and limit cycle, measured and predicted; empty without a loop.

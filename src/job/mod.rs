@@ -69,6 +69,11 @@ pub fn run(
     if let Some(run) = &simulated {
         warnings.extend(run.warnings(&design));
     }
+    // Without the circuit in the firmware its loops matter to a simulated run alone.
+    let input = design.compensation.as_ref().map(|c| &c.input);
+    if simulated.is_some() || input.is_some_and(|i| i.is_of_chain()) {
+        warnings.extend(Warning::of_setpoint(&design));
+    }
     let (fit, chosen, rounded) = (calibration.fit, calibration.chosen, calibration.rounded);
     let certainty = certainty::certainty(&design)?.ok_or_else(no_compensation)?;
     if calibration.kept.is_some() {

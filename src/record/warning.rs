@@ -1,5 +1,7 @@
 //! What is usable but unlikely, or was handled in a way that the user should know of.
 
+use crate::circuit::setpoint::OutOfReach;
+use crate::design::Design;
 use serde::Serialize;
 
 /// One remark on a record or on a fit; `closure.json` carries it as is.
@@ -64,6 +66,12 @@ impl Warning {
             column: None,
             message: message.into(),
         }
+    }
+
+    /// Of an amplitude loop that cannot reach its setpoint; `None` of any other.
+    pub fn of_setpoint(design: &Design) -> Option<Self> {
+        let far = OutOfReach::of(design)?;
+        Some(Warning::general("setpoint_out_of_reach", far.sentence()))
     }
 }
 

@@ -65,6 +65,8 @@ pub struct Hunting {
     pub predicted_dead_band_lsb: f64,
     /// The wave of the error in physical units, peak to peak: rad, or relative amplitude.
     pub error_pp: f64,
+    /// The output is at an end of its range in all rows: the loop corrects no error.
+    pub stands_at_limit: bool,
 }
 
 impl Hunting {
@@ -77,22 +79,42 @@ impl Hunting {
 /// What the columns of a table of loops hold, and what is compared with what.
 pub fn caption(found: &[Hunting]) -> String {
     let mut means: Vec<String> = Vec::new();
-    for h in found {
-        let mean = format!("{} LSB ({})", number(h.error_mean_per_step_lsb, 3), h.name);
+    for h in found.iter().filter(|h| !h.stands_at_limit) {
+        let mean = format!(
+            "a change by one {} is a mean error of {} LSB ({})",
+            h.output_unit,
+            number(h.error_mean_per_step_lsb, 3),
+            h.name
+        );
         if !means.contains(&mean) {
             means.push(mean);
         }
     }
-    format!(
+    let mut text = format!(
         "The loops run without noise at the first, the middle and the last temperature on the way up of [thermal_run]. pp: the largest \
          less the smallest value in {ROWS} rows. An output is in the unit beside the loop's name. An error is the setpoint's \
          difference from the magnitude or the phase, in LSB of that word. Circuit: the bit-accurate loop with ADC and NCO. Model: the same \
          loop without these two, so that its error may be the smaller one. Limit: the model's error plus the most that ADC and NCO \
-         can add; the circuit's error must stay below it. By theory the loops have no dead band: they correct every error, \
-         however small. The mean error is what the integrator moved, divided by the rows, and goes to 0 with more of them: in {ROWS} rows it \
-         is {} for each step that the integral part of the output moved.",
-        means.join(" and ")
-    )
+         can add; the circuit's error must stay below it."
+    );
+    if !means.is_empty() {
+        text += &format!(
+            " By theory the loops have no dead band: they correct every error, however small. Mean error = change of the integrator / \
+             number of rows: in {ROWS} rows {}. It goes to 0 in a longer run.",
+            means.join(", ")
+        );
+    }
+    let stand = found.iter().filter(|h| h.stands_at_limit);
+    let stand: Vec<String> = stand
+        .map(|h| format!("{} at {} degC", h.name, h.chamber_degc))
+        .collect();
+    if !stand.is_empty() {
+        text += &format!(
+            " The output stands at its limit in all rows ({}): there the loop corrects no error, and the mean error does not go to 0.",
+            stand.join(", ")
+        );
+    }
+    text
 }
 
 /// Both loops at the run's start, middle and top.
@@ -174,6 +196,9 @@ fn at(design: &Design, degc: f64) -> Result<Vec<Hunting>> {
             error_mean_per_step_lsb: pow2(l.integrator_shift as i32) / ROWS as f64,
             converters_pp_lsb: l.setpoint_raw as f64 * converters,
             error_pp: peak_to_peak(&errors) / l.setpoint_raw as f64,
+            stands_at_limit: [0.0, l.gain_limit() as f64]
+                .iter()
+                .any(|end| outputs.iter().all(|o| o == end)),
             ..compare(&outputs, &errors, &predicted)
         });
     }
@@ -210,6 +235,7 @@ fn compare(outputs: &[f64], errors: &[f64], (by_model, errors_by_model): &Series
         error_mean_lsb: errors.iter().sum::<f64>() / errors.len().max(1) as f64,
         predicted_dead_band_lsb: 0.0,
         error_pp: 0.0,
+        stands_at_limit: false,
     }
 }
 
@@ -342,6 +368,28 @@ mod tests {
                 assert!(h.error_mean_lsb.abs() <= most && most < 4.0, "{h:?}");
             }
         }
+    }
+
+    #[test]
+    fn a_loop_that_stands_at_its_limit_is_not_said_to_correct_its_error() {
+        let mut design = default_design().expect("the default");
+        let working = caption(&hunting(&design).expect("a run"));
+        assert!(
+            working.contains(
+                "in 8192 rows a change by one gain LSB is a mean error of 0.500 LSB (amplitude_loop). It goes to 0 in a longer run."
+            ) && !working.contains("limit in all rows"),
+            "{working}"
+        );
+        if let Some(l) = &mut design.circuit.amplitude_loop {
+            l.setpoint_raw = 100_000_000;
+        }
+        let found = hunting(&design).expect("a run");
+        assert!(found.iter().all(|h| h.stands_at_limit), "{found:?}");
+        let said = caption(&found);
+        assert!(
+            said.contains("(amplitude_loop at 0 degC, ") && !said.contains("no dead band"),
+            "{said}"
+        );
     }
 
     /// The default with its phase loop switched on.

@@ -332,6 +332,7 @@ fn warnings(parts: &Parts) -> Vec<Warning> {
             ),
         ));
     }
+    warnings.extend(Warning::of_setpoint(design));
     if let Some((what, mend)) = crate::circuit::scale::excitation_is_off(design) {
         warnings.push(Warning::general(
             "excitation_off_resonance",

@@ -164,6 +164,39 @@ fn tables_of_words_fit_a_terminal_of_100_columns() {
 }
 
 #[test]
+fn a_setpoint_out_of_reach_is_warned_of_and_its_loop_is_not_praised() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (file, out) = (folder.path().join("high.toml"), folder.path().join("out"));
+    let key = "circuit.amplitude_loop.setpoint_raw";
+    let design = edit(&default_text(), key, "1048576", "100000000");
+    std::fs::write(&file, design).expect("written");
+    let name = file.to_str().expect("UTF-8");
+    let output = equiv(&[name, "--samples", "20000"], &out);
+    let talk = told(&output);
+    assert!(
+        talk.contains("warning: high.toml, line ") && talk.contains("[setpoint_out_of_reach]"),
+        "{talk}"
+    );
+    let said = String::from_utf8(output.stdout).expect("UTF-8");
+    assert!(
+        said.contains("The output stands at its limit in all rows")
+            && !said.contains("no dead band")
+            && said.contains("note: nodes flagged [open_loop_integral]: their errors add up"),
+        "{said}"
+    );
+    assert_eq!(result(&out)["warnings"][0]["code"], "setpoint_out_of_reach");
+    for command in ["simulate", "run"] {
+        let out = folder.path().join(command);
+        let arguments = [command, name, "--out", out.to_str().expect("UTF-8")];
+        let talk = told(&gyrogen_here(&arguments));
+        assert!(
+            talk.contains("[setpoint_out_of_reach]"),
+            "{command}: {talk}"
+        );
+    }
+}
+
+#[test]
 fn two_designs_are_compared_word_by_word() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str, text: &str| {

@@ -91,7 +91,10 @@ pub fn html(design: &Design, e: &Equivalence) -> Result<String> {
             .flat_map(|m| m.parts.iter().map(Equivalent::of))
             .collect(),
         equivalence_sum: [grouped(compared), grouped(mismatches)],
-        notes: e.notes.clone(),
+        notes: {
+            let warnings = e.warnings.iter().map(|w| w.message.clone());
+            warnings.chain(e.notes.iter().cloned()).collect()
+        },
         provenance: [
             ("command", e.command.clone()),
             ("version", e.version.to_owned()),

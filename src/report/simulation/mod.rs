@@ -216,10 +216,13 @@ fn facts(outcome: &Outcome) -> Vec<[String; 2]> {
         })
     };
     add(
-        "power-on: amplitude within 1 %",
+        "power-on: amplitude within 1 % of its final value",
         time(s.startup.amplitude_s),
     );
-    add("power-on: phase within 0.1 deg", time(s.startup.phase_s));
+    add(
+        "power-on: phase within 0.1 deg of its final value",
+        time(s.startup.phase_s),
+    );
     if s.lock.is_some() {
         add("power-on: frequency within 10 ppm", time(s.startup.lock_s));
     }
