@@ -202,19 +202,21 @@ pub struct Outcome {
     pub parts: Parts,
 }
 
-/// By how much single readings are off where heating and cooling differ, which means over bins of temperature do not
-/// show; `None` without the warning that says so.
+/// By how much single readings are off where heating and cooling differ, or may, which means over bins of temperature do
+/// not show; `None` without the warning that says so.
 pub fn single_readings(summary: &Summary, points: &Points) -> Option<String> {
-    let mut warnings = summary.warnings.iter();
-    warnings.any(|w| w.code == "heating_cooling_loop").then(|| {
-        let largest = points.iter().map(|p| p.fixed_dps.abs());
-        format!(
-            "Heating and cooling differ, and the drift is that of their average: single readings are off by {} deg/s rms and by \
-             up to {} deg/s after compensation.",
-            number(summary.after.fixed.rms_dps, 3),
-            number(largest.fold(0.0, f64::max), 3)
-        )
-    })
+    let differ = summary.warnings.iter().find_map(|w| match w.code {
+        "heating_cooling_loop" => Some("differ"),
+        "loop_or_slow_noise" => Some("may differ (see the warning)"),
+        _ => None,
+    })?;
+    let largest = points.iter().map(|p| p.fixed_dps.abs());
+    Some(format!(
+        "Heating and cooling {differ}, and the drift is that of their average: single readings are off by {} deg/s rms and by \
+         up to {} deg/s after compensation.",
+        number(summary.after.fixed.rms_dps, 3),
+        number(largest.fold(0.0, f64::max), 3)
+    ))
 }
 
 /// What stands for the drift over temperature where the thermometer never moves, a sentence; `None`: it does.

@@ -303,6 +303,12 @@ fn the_lead_says_what_the_mean_of_heating_and_cooling_leaves_out() {
     is_sound(&html);
     assert!(html.contains("Heating and cooling differ, and the drift is that of their average"));
     assert!(html.contains(">1 warning, 1 note</a>"));
+    // Where the record does not decide it, the readings are as far off.
+    made.summary.warnings = vec![Warning::on("loop_or_slow_noise", "die_degc", "seen")];
+    let html = made.html();
+    assert!(html.contains(
+        "Heating and cooling may differ (see the warning), and the drift is that of their average"
+    ));
 }
 
 #[test]

@@ -52,8 +52,8 @@ pub fn fit(shown: &Shown) -> Vec<[String; 2]> {
         lines.push(line(
             "heating against cooling",
             format!(
-                "they differ by {} rms at the same reading; by chance, residuals with the same rms and autocorrelation would \
-                 differ by {} rms: {}",
+                "they differ by {} rms at the same reading; noise with the rms and autocorrelation of the residuals would \
+                 make {} rms: {}",
                 dps(l.rms_dps),
                 dps(l.noise_dps),
                 l.finding(f.noise_floor_rms_dps)

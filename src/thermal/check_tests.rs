@@ -74,6 +74,29 @@ fn coloured_noise_makes_no_loop() {
     }
 }
 
+/// A lag of 400 s: its first cycle starts at rest and differs from the next, which leaves residuals that wander slowly. The
+/// loop is ten times what they make by chance over any number of cycles.
+#[test]
+fn a_thermal_lag_is_a_loop_over_one_cycle_two_and_three() {
+    for cycles in 1..=3u32 {
+        let (mut lagging, mut random) = (-20.0, Random::new(1));
+        let (mut t, mut e) = (Vec::new(), Vec::new());
+        for k in 0..400 * cycles {
+            let degc = 20.0 - 40.0 * (std::f64::consts::TAU * f64::from(k) / 400.0).cos();
+            lagging += (degc - lagging) / 40.0;
+            t.push(degc);
+            e.push(0.03 * degc + 0.02 * (lagging - degc) + 0.005 * random.normal());
+        }
+        let f = fit(
+            &record("die_degc", &t, &e),
+            &RecordMapping::default(),
+            &few(FitOrder::Fixed(1)),
+        );
+        let l = f.unwrap().sweep_loop.unwrap();
+        assert!(l.significant && l.rms_dps > 8.0 * l.noise_dps, "{l:?}");
+    }
+}
+
 #[test]
 fn each_shortcoming_has_its_warning() {
     let t = triangle(400);

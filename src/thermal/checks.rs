@@ -253,12 +253,12 @@ fn extrapolation(c: &Checked<'_>) -> Option<Warning> {
 /// Heating against cooling in figures.
 fn seen(fit: &BaselineFit, l: Loop) -> String {
     format!(
-        "at the same reading of {} the error differs by {} deg/s rms between rising and falling sweeps; by chance, \
-         residuals with the same rms and autocorrelation would make a difference of {} deg/s rms ({} places compared)",
+        "at the same reading of {} the error differs by {} deg/s rms between rising and falling sweeps ({} places compared). \
+         Noise with the rms and autocorrelation of the residuals would make {} deg/s rms",
         fit.thermometer,
         g(l.rms_dps),
-        g(l.noise_dps),
-        l.bins
+        l.bins,
+        g(l.noise_dps)
     )
 }
 
@@ -266,7 +266,7 @@ fn seen(fit: &BaselineFit, l: Loop) -> String {
 pub(super) fn unexplained_loop(fit: &BaselineFit) -> Option<Warning> {
     let l = fit.sweep_loop.filter(|l| l.significant)?;
     let said = format!(
-        "{}. No function of the thermometer can follow that, and none of the known effects makes it",
+        "{}. No function of the thermometer can follow such a difference, and none of the known effects makes it",
         seen(fit, l)
     );
     Some(Warning::on("heating_cooling_loop", &fit.thermometer, said))
@@ -281,7 +281,7 @@ fn loop_warning(c: &Checked<'_>) -> Option<Warning> {
             "heating_cooling_loop",
             &c.fit.thermometer,
             format!(
-                "{seen}. No function of the thermometer can follow that, but a lag, a gradient or a drift in time can. \
+                "{seen}. No function of the thermometer can follow such a difference, but a lag, a gradient or a drift in time can. \
                  `gyrogen close`, with the same record and design, looks for them"
             ),
         ))
@@ -290,9 +290,11 @@ fn loop_warning(c: &Checked<'_>) -> Option<Warning> {
             "loop_or_slow_noise",
             &c.fit.thermometer,
             format!(
-                "{seen}. That is more than a single reading's noise, but the residuals wander so slowly that this record \
-                 cannot tell a loop from noise. Try `gyrogen close`, with the same record and design; if it names no cause, record \
-                 a second cycle"
+                "{seen}. The difference is not significant all the same: with this autocorrelation the {} rows are worth {:.0} \
+                 independent ones. Try `gyrogen close`, with the same record and design. If it names no cause, record more \
+                 cycles of heating and cooling",
+                c.sample.t.len(),
+                l.effective_rows
             ),
         ))
     } else {

@@ -71,6 +71,8 @@ pub struct Loop {
     pub noise_dps: f64,
     /// How many bins were compared.
     pub bins: usize,
+    /// How many independent rows the record is worth, by the autocorrelation of what the fit and the loop leave.
+    pub effective_rows: f64,
     /// The test's statistic: an F (Wald statistic over its degrees of freedom), as a standard
     /// normal.
     pub z: f64,
@@ -97,6 +99,9 @@ impl Loop {
     }
 }
 
+/// Most terms of the loop that is tested.
+const MOST_TERMS: usize = 6;
+
 /// Far out, because the memory of the noise is itself an estimate.
 pub const LOOP_LIMIT: f64 = 4.0;
 
@@ -113,9 +118,10 @@ fn normal_of_f(f: f64, k: f64, v: f64) -> f64 {
 ///
 /// `sample` holds the rows, `residuals` are those of the fit of order `order`, `directions` come
 /// from [`directions`]. The figure is taken from bins, so it does not depend on the loop's
-/// shape. The test takes a loop that is a polynomial in the reading, of order 5 at most, added on
-/// the way up and taken off on the way down, beside the fitted one: what that leaves is the noise,
-/// its memory included. Noise that wanders over a whole sweep (rate random walk) cannot be told
+/// shape. The test takes a loop that is a polynomial in the reading, added on the way up and taken off
+/// on the way down, beside the fitted one: what that leaves is the noise, its memory included. Its
+/// order is the highest, 5 at most, that leaves the noise as many degrees of freedom as there are
+/// coefficients. Noise that wanders over a whole sweep (rate random walk) cannot be told
 /// from a loop by one pair of sweeps.
 pub fn measure_loop(
     sample: &Sample,
@@ -138,9 +144,54 @@ pub fn measure_loop(
     if compared.len() < 4 {
         return None;
     }
-    let freedom = (compared.len() / 2).min(6);
-    let shape = freedom - 1;
-    let terms = order.max(shape) + 1;
+    let mut freedom = (compared.len() / 2).min(MOST_TERMS);
+    let mut tested = test(sample, residuals, order, directions, freedom)?;
+    while freedom > 2 && !tested.is_judged_by_enough() {
+        freedom -= 1;
+        tested = test(sample, residuals, order, directions, freedom)?;
+    }
+    let (mut square, mut expected) = (0.0, 0.0);
+    for [(up, nu), (down, nd)] in &compared {
+        square += (up / *nu as f64 - down / *nd as f64).powi(2);
+        expected += tested.noise.variance_of_mean(*nu) + tested.noise.variance_of_mean(*nd);
+    }
+    let n = compared.len() as f64;
+    Some(Loop {
+        rms_dps: (square / n).sqrt(),
+        noise_dps: (expected / n).sqrt(),
+        bins: compared.len(),
+        effective_rows: tested.noise.effective_rows,
+        z: tested.z,
+        significant: tested.z > LOOP_LIMIT,
+    })
+}
+
+/// A loop of so many terms, fitted beside the polynomial.
+struct Tested {
+    /// Of what both leave.
+    noise: NoiseModel,
+    /// Coefficients of both.
+    coefficients: usize,
+    /// [`Loop::z`].
+    z: f64,
+}
+
+impl Tested {
+    /// Whether the noise keeps at least as many degrees of freedom as were fitted: with one or two left, no F is significant.
+    fn is_judged_by_enough(&self) -> bool {
+        self.noise.effective_rows >= 2.0 * self.coefficients as f64
+    }
+}
+
+/// The F test of a loop with `freedom` terms; the arguments else are those of [`measure_loop`].
+fn test(
+    sample: &Sample,
+    residuals: &[f64],
+    order: usize,
+    directions: &[i8],
+    freedom: usize,
+) -> Option<Tested> {
+    let terms = order.max(freedom - 1) + 1;
     let design = Rows {
         count: sample.x.len(),
         columns: terms + freedom,
@@ -158,29 +209,21 @@ pub fn measure_loop(
     for (fitted, r) in left.iter_mut().zip(residuals) {
         *fitted = r - *fitted;
     }
-    let model = NoiseModel::of_residuals(left, weights, terms + freedom);
-    let covariance = design.covariance(weights, &model);
+    let coefficients = terms + freedom;
+    let noise = NoiseModel::of_residuals(left, weights, coefficients);
+    let covariance = design.covariance(weights, &noise);
     let ours = covariance
         .view((terms, terms), (freedom, freedom))
         .into_owned();
     let ours_c = c.rows(terms, freedom).into_owned();
     let chi_square = ours_c.dot(&(ours.cholesky()?.solve(&ours_c)));
-    let (mut square, mut expected) = (0.0, 0.0);
-    for [(up, nu), (down, nd)] in &compared {
-        square += (up / *nu as f64 - down / *nd as f64).powi(2);
-        expected += model.variance_of_mean(*nu) + model.variance_of_mean(*nd);
-    }
-    let n = compared.len() as f64;
     let k = freedom as f64;
     // What is left to judge the noise by: rows that are independent, less the coefficients.
-    let rest = (model.effective_rows - (terms + freedom) as f64).max(1.0);
-    let z = normal_of_f(chi_square / k, k, rest);
-    Some(Loop {
-        rms_dps: (square / n).sqrt(),
-        noise_dps: (expected / n).sqrt(),
-        bins: compared.len(),
-        z,
-        significant: z > LOOP_LIMIT,
+    let rest = (noise.effective_rows - coefficients as f64).max(1.0);
+    Some(Tested {
+        noise,
+        coefficients,
+        z: normal_of_f(chi_square / k, k, rest),
     })
 }
 
@@ -215,6 +258,7 @@ mod tests {
             rms_dps,
             noise_dps: 0.1768,
             bins: 20,
+            effective_rows: 15.0,
             z: 0.0,
             significant,
         };
