@@ -12,6 +12,7 @@ use crate::design::Design;
 use crate::digest::sha256;
 use crate::output::name_of;
 use crate::record::Warning;
+use crate::record::thermal::ENOUGH_ROWS;
 use crate::text::number;
 use crate::thermal::BaselineFit;
 use crate::thermal::no_gain;
@@ -336,13 +337,14 @@ impl Outcome {
         Outcome { summary, parts }
     }
 
-    /// True if something is left that may have a cause beside the bias: not noise, and not words that overflow.
+    /// True if something is left that may have a cause beside the bias, and that a search can find: not noise, not words that
+    /// overflow, and not of a few rows.
     pub fn leaves_drift(&self) -> bool {
         let (fit, words) = (&self.summary.fit, &self.summary.word_lengths);
         let overflows = self.parts.certainty.saturates || words.overflow.is_some();
         let is_left = self.single_readings().is_some()
             || fit.heldout_rms_dps > NOISE_ALONE * fit.noise_floor_rms_dps;
-        is_left && !overflows
+        is_left && !overflows && self.parts.points.len() >= ENOUGH_ROWS
     }
 
     /// True if emitted code and model agree everywhere.

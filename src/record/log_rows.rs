@@ -3,7 +3,7 @@
 use super::averager::Averager;
 use super::corrections::Switched;
 use super::log_bytes::Damage;
-use super::thermal::{LEAST_ROWS, ThermalRecord};
+use super::thermal::{ENOUGH_ROWS, LEAST_ROWS, ThermalRecord};
 use super::undo::Undo;
 use super::warning::Warning;
 use super::{dead, error_values, frozen, plausibility, stopped};
@@ -81,7 +81,9 @@ pub(super) fn record(
                 rows.len(),
                 averager.period_us as f64 * 1e-6
             ),
-            "at least 10 are needed: log longer, or give a smaller `average_s` in [record]",
+            &format!(
+                "log longer, or give a smaller `average_s` in [record]: {ENOUGH_ROWS} rows or more"
+            ),
         ));
     }
     let accel = chosen(averager, &choice, "accel_g", &mut Vec::new());

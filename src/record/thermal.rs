@@ -18,6 +18,10 @@ use std::path::Path;
 /// Fewer rows with a rate than this are no record.
 pub const LEAST_ROWS: usize = 10;
 
+/// So many rows are enough for `run` and, as a rule, for `close`, which holds a stretch of them out: what is asked for where
+/// there are too few.
+pub const ENOUGH_ROWS: usize = 20;
+
 /// Reads a thermal record.
 ///
 /// # Errors
@@ -136,7 +140,7 @@ fn parse_text(
             .error(
                 1,
                 "the record has a header row and nothing after it".to_owned(),
-                format!("at least {LEAST_ROWS} rows are needed"),
+                format!("record {ENOUGH_ROWS} rows or more"),
             )
             .into());
     }
@@ -272,7 +276,7 @@ fn enough(record: &ThermalRecord, last: Line<'_>, warnings: &mut Vec<Warning>) -
             .error(
                 1,
                 format!("only {measured} rows have a time and a rate_out_dps"),
-                format!("at least {LEAST_ROWS} are needed; record longer, or average less"),
+                format!("record {ENOUGH_ROWS} rows or more, or average less"),
             )
             .into());
     }

@@ -49,7 +49,7 @@ mod whiten_tests;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Unusable {
     /// Fewer used rows than the model and its noise need.
-    #[error("{rows} usable rows are too few: at least {least} are needed")]
+    #[error("{rows} usable rows are too few")]
     TooFewRows {
         /// Rows that are used.
         rows: usize,

@@ -9,7 +9,7 @@ use crate::error::{InputError, Result};
 use crate::numeric::polynomial;
 use crate::record::columns::{self, THERMOMETERS};
 use crate::record::guesses::{guess, mapped};
-use crate::record::thermal::LEAST_ROWS;
+use crate::record::thermal::{ENOUGH_ROWS, LEAST_ROWS};
 use crate::record::{ThermalRecord, Warning};
 use crate::statistics::correlation::{NoiseModel, Rows};
 use crate::statistics::folds;
@@ -190,7 +190,7 @@ pub fn thermometer<'a>(
         return Err(refuse(
             format!("only {both} rows have both {name} and rate_out_dps"),
             format!(
-                "at least {LEAST_ROWS} are needed; `thermometer` in [record] names another column"
+                "record {ENOUGH_ROWS} such rows or more; `thermometer` in [record] names another column"
             ),
         ));
     }

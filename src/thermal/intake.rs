@@ -10,6 +10,7 @@ use super::repeated;
 use crate::design::{Design, Gyro, RecordMapping};
 use crate::error::{InputError, Result};
 use crate::record::columns::THERMOMETERS;
+use crate::record::thermal::ENOUGH_ROWS;
 use crate::record::{ThermalRecord, Warning, condensed};
 use crate::statistics::blocks::{Role, Split};
 use crate::statistics::stats;
@@ -73,13 +74,10 @@ fn nominal(gyro: &Gyro, thermometer: &str, readings: &[f64]) -> (f64, bool) {
     (middle, false)
 }
 
-/// Rows of which a stretch can be held out as a rule; with fewer it depends on how the temperature ran.
-const ENOUGH_ROWS: usize = 20;
-
 /// A record that cannot be fitted.
 pub fn refused(record: &ThermalRecord, why: String) -> crate::error::Error {
     let help = match record.len() < ENOUGH_ROWS {
-        true => format!("record longer, or average less; {ENOUGH_ROWS} rows are enough as a rule"),
+        true => format!("record {ENOUGH_ROWS} rows or more, or average less"),
         false => "record longer, or average less".to_owned(),
     };
     InputError::new(why)

@@ -468,7 +468,7 @@ fn arguments_that_are_nearly_right_are_shown_right() {
         (vec!["close", "--record", "r.CSV"], "did you mean r.csv?"),
         (
             vec!["close", "--record", "short.csv"],
-            "12 usable rows are too few: at least 15 are needed",
+            "12 usable rows are too few\n  help: record 20 rows or more, or average less",
         ),
         // What is wrong with the record comes before what is wrong with the folder.
         (
