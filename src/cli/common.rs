@@ -197,10 +197,10 @@ pub(super) fn languages(asked: Option<Language>) -> Result<Vec<Language>> {
 }
 
 /// Warnings that stand before the results, for what makes these mean something else: those of the file as it was read,
-/// `of_record`, and of a thermometer that is none. Then the others.
+/// `of_record`, of a thermometer that is none, and of a circuit that overflows. Then the others.
 pub(super) fn parted(all: &[Warning], of_record: &[Warning]) -> (Vec<Warning>, Vec<Warning>) {
-    const OF_THERMOMETER: [&str; 2] = ["no_thermometer", "thermometer_constant"];
-    let is_first = |w: &Warning| of_record.contains(w) || OF_THERMOMETER.contains(&w.code);
+    const FIRST: [&str; 3] = ["no_thermometer", "thermometer_constant", "cordic_width"];
+    let is_first = |w: &Warning| of_record.contains(w) || FIRST.contains(&w.code);
     all.iter().cloned().partition(is_first)
 }
 

@@ -65,10 +65,10 @@ pub fn run(
     let of_record = warnings.clone();
     say("fitting the bias polynomial");
     let calibration = calibration::calibrate(&mut design, &record, simulated.is_some())?;
-    Warning::add_of_fit(&mut warnings, calibration.warnings);
-    if let Some(run) = &simulated {
-        warnings.extend(run.warnings(&design));
-    }
+    let of_run = simulated
+        .as_ref()
+        .map_or(Vec::new(), |run| run.warnings(&design));
+    warnings = own_run::all_warnings(warnings, calibration.warnings, of_run);
     // Without the circuit in the firmware its loops matter to a simulated run alone.
     let input = design.compensation.as_ref().map(|c| &c.input);
     if simulated.is_some() || input.is_some_and(|i| i.is_of_chain()) {
