@@ -149,7 +149,9 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
             Effort::default(),
         )?;
         if arguments.format == OutputFormat::Text {
-            say!("rows: {}", record.rows_understood(&closed.closure.warnings));
+            let average_s = design.record.average_s;
+            let rows = record.rows_understood(&closed.closure.warnings, average_s);
+            say!("rows: {rows}");
         }
         super::warnings(&super::common::parted(&closed.closure.warnings, &of_record).0);
         watch.stage("emitting and verifying");

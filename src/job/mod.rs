@@ -90,7 +90,7 @@ pub fn run(
 
     say("running the record through float, fixed and emitted code");
     let understood = record_path.map(|_| {
-        let rows = record.rows_understood(&warnings);
+        let rows = record.rows_understood(&warnings, design.record.average_s);
         [record.understood(&design.record), rows]
     });
     let points = match &simulated {

@@ -48,8 +48,12 @@ fn what_was_read_is_told_in_the_contracts_order() {
         "time_s from t_ms, rate_out_dps from gx_dps, die_degc from temp (degC assumed), flow"
     );
     assert_eq!(
-        record.rows_understood(&warnings),
-        "20, one every 1.000 s, not averaged (`average_s` in [record] does)"
+        record.rows_understood(&warnings, None),
+        "20, one every 1.000 s, not averaged (to average, set `average_s` in [record])"
+    );
+    assert_eq!(
+        record.rows_understood(&warnings, Some(0.5)),
+        "20, one every 1.000 s, not averaged (`average_s` = 0.5 s joins no two of them)"
     );
     // The design states the unit.
     columns.units.insert("die_degc".into(), "degC".into());

@@ -158,8 +158,9 @@ impl ThermalRecord {
         said.collect::<Vec<_>>().join(", ")
     }
 
-    /// How many rows there are, how far apart, and whether they are means of the file's, as `warnings` of the same record say.
-    pub fn rows_understood(&self, warnings: &[Warning]) -> String {
+    /// How many rows there are, how far apart, and whether they are means of the file's, as `warnings` of the same record say;
+    /// `average_s` is what the design asks for.
+    pub fn rows_understood(&self, warnings: &[Warning], average_s: Option<f64>) -> String {
         let averaged: Vec<&str> = warnings
             .iter()
             .filter(|w| matches!(w.code, "rows_averaged" | "log_averaged"))
@@ -169,8 +170,12 @@ impl ThermalRecord {
             return averaged.join("; ");
         }
         let steps: Vec<f64> = self.time_s.windows(2).map(|w| w[1] - w[0]).collect();
+        let why = match average_s {
+            None => "to average, set `average_s` in [record]".to_owned(),
+            Some(s) => format!("`average_s` = {s} s joins no two of them"),
+        };
         format!(
-            "{}, one every {} s, not averaged (`average_s` in [record] does)",
+            "{}, one every {} s, not averaged ({why})",
             self.len(),
             number(stats::median(&steps), 4)
         )
