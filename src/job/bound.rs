@@ -179,17 +179,21 @@ fn refuse_coarse_words(design: &Design, fit: &BaselineFit, asked: BiasBound) -> 
                 "give `circuit.nco.phase_bits` at least {}, or a wider bound",
                 design.circuit.nco.phase_bits + more
             ),
+            CompensationInput::Channel(_) if !design.compensation_is_own => wider(half_step),
             CompensationInput::Channel(channel) => format!(
                 "give `compensation.input_format` at least {} fraction bits, or a wider bound",
                 channel.format.fraction_bits + more
             ),
         };
-        return Err(InputError::new(format!(
+        let said = format!(
             "compensation.bound_dps = {bound} cannot be kept: half a step of the thermometer's word moves the bias by \
-             {half_step} deg/s"
-        , half_step = number(half_step, 3)))
-        .help(help)
-        .into());
+             {half_step} deg/s",
+            half_step = number(half_step, 3)
+        );
+        return Err(design
+            .error_at("compensation.bound_dps", said)
+            .help(help)
+            .into());
     }
     // Bias and rate are each rounded once.
     let rounding = 2.0 * output_rounding_dps(c);
@@ -201,14 +205,30 @@ fn refuse_coarse_words(design: &Design, fit: &BaselineFit, asked: BiasBound) -> 
         .map(|k| format.fraction_bits + k)
         .find(|f| rounding / format.lsb() * (-f64::from(*f)).exp2() < bound)
         .unwrap_or(WIDEST_BITS);
-    Err(InputError::new(format!(
+    let said = format!(
         "compensation.bound_dps = {bound} cannot be kept: rounding bias and rate to {format} costs {rounding} deg/s, \
-         whatever the coefficients"
-    , rounding = number(rounding, 3)))
-    .help(format!(
-        "give `compensation.output` at least {needed} fraction bits, or a wider bound"
-    ))
-    .into())
+         whatever the coefficients",
+        rounding = number(rounding, 3)
+    );
+    let help = match design.compensation_is_own {
+        true => {
+            format!("give `compensation.output` at least {needed} fraction bits, or a wider bound")
+        }
+        // The bias itself needs room beside them.
+        false => wider(2.0 * rounding),
+    };
+    Err(design
+        .error_at("compensation.bound_dps", said)
+        .help(help)
+        .into())
+}
+
+/// The least bound that chosen formats keep: they are as fine as any that is chosen.
+fn wider(least_dps: f64) -> String {
+    format!(
+        "write `bound_dps = {}` or more: no finer words are chosen. For finer ones, give [compensation] formats of your own",
+        at_most(least_dps, 2)
+    )
 }
 
 /// What became of the polynomial.

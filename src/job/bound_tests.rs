@@ -216,12 +216,22 @@ fn what_cannot_be_kept_is_refused_with_what_would_do() {
     );
     let output = refusal(&|d| {
         d.compensation.as_mut().unwrap().output.format = Format::q(13, 6);
+        d.compensation_is_own = true;
     });
     assert!(
         output.contains("rounding bias and rate to Q13.6"),
         "{output}"
     );
     assert!(output.contains("at least 7 fraction bits"), "{output}");
+    // Formats that were chosen are nothing to change in a file.
+    let chosen = refusal(&|d| {
+        d.compensation.as_mut().unwrap().output.format = Format::q(13, 6);
+        d.compensation_is_own = false;
+    });
+    assert!(
+        chosen.contains("write `bound_dps = 0.032` or more"),
+        "{chosen}"
+    );
     let rounding = refusal(&|d| {
         d.bound.as_mut().unwrap().auto = true;
         d.compensation.as_mut().unwrap().output.rounding = Rounding::HalfEven;

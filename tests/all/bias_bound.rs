@@ -195,7 +195,9 @@ fn what_is_in_the_way_is_said() {
     assert!(talk.contains("`compensation.output` at least"), "{talk}");
     let talk = refused("[compensation]\nbound_dps = 1e-6\n", at);
     assert!(
-        talk.contains("thermometer's word") && talk.contains("angle_bits"),
+        talk.contains("bad.toml:2:13: error: compensation.bound_dps")
+            && talk.contains("thermometer's word")
+            && talk.contains("angle_bits"),
         "{talk}"
     );
     let talk = refused("[compensation]\nform = \"auto\"\n", at);
@@ -213,4 +215,30 @@ fn what_is_in_the_way_is_said() {
         talk.contains("[2] entries where [410] are needed"),
         "{talk}"
     );
+}
+
+/// The words of a record's thermometer are chosen, and end somewhere: the bound that is proposed then is kept.
+#[test]
+fn a_bound_below_every_chosen_word_is_refused_with_one_that_is_kept() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let rows = (0..60).map(|k| {
+        let degc = 20 + 2 * (30 - i32::abs(k - 30));
+        let noise = 0.002 * f64::from(k % 3);
+        format!("{},{:.4},{degc}\n", 10 * k, 0.01 * f64::from(degc) + noise)
+    });
+    let record = format!("time_s,rate_out_dps,die_degc\n{}", rows.collect::<String>());
+    std::fs::write(at.join("r.csv"), record).expect("a record");
+    let asked = |bound: &str| {
+        let design = format!("[compensation]\nbound_dps = {bound}\n");
+        std::fs::write(at.join("asked.toml"), design).expect("a design");
+        let arguments = ["run", "asked.toml", "--record", "r.csv", "--out", "out"];
+        let output = gyrogen(&arguments, at);
+        (output.status.code(), told(&output))
+    };
+    let (status, talk) = asked("1e-9");
+    assert_eq!(status, Some(2), "{talk}");
+    let proposed = talk.split("write `bound_dps = ").nth(1).expect(&talk);
+    let (status, talk) = asked(proposed.split('`').next().expect("a figure"));
+    assert_eq!(status, Some(0), "{talk}");
 }
