@@ -54,6 +54,15 @@ pub(super) struct Column<'a> {
 }
 
 impl Column<'_> {
+    /// How mdeg/s or deg/h is said in the design, of a rate whose values are too large for deg/s.
+    fn in_smaller_unit(&self) -> String {
+        let said = self.record.unit_in_design(self.name, "mdps");
+        match self.record.unit_in_file(self.name, "dph") {
+            Some(unit) => format!("{said}; if deg/h, with unit = \"{unit}\""),
+            None => said,
+        }
+    }
+
     pub(super) fn quantile(&self, p: f64) -> f64 {
         stats::quantile_sorted(&self.sorted, p)
     }
@@ -161,11 +170,11 @@ fn rate(c: &Column<'_>) -> Option<Warning> {
             name,
             format!(
                 "{beyond} values of {name} lie beyond +-20000 deg/s (range {:.1} to {:.1}), the first {place}, and no \
-                 gyro turns so fast. They look like mdeg/s or raw codes. If they are mdeg/s, say so: {}. Multiply raw codes by \
+                 gyro turns so fast. They look like mdeg/s, deg/h or raw codes. If they are mdeg/s, say so: {}. Multiply raw codes by \
                  the gyro's scale first",
                 c.min(),
                 c.max(),
-                c.record.unit_in_design(name, "mdps")
+                c.in_smaller_unit()
             ),
         )
     })
@@ -206,10 +215,10 @@ fn at_rest(c: &Column<'_>) -> Option<Warning> {
             "rate_in_millidegrees",
             format!(
                 "{} is about {middle:.1} deg/s with a noise of {noise_dps:.2} deg/s at rest, and no gyro has such. It looks \
-                 like mdeg/s or raw codes. If it is mdeg/s, say so: {}. Multiply raw codes by the gyro's scale first. If the \
+                 like mdeg/s, deg/h or raw codes. If it is mdeg/s, say so: {}. Multiply raw codes by the gyro's scale first. If the \
                  gyro was turning, give the rate in rate_dps",
                 c.name,
-                c.record.unit_in_design(c.name, "mdps")
+                c.in_smaller_unit()
             ),
         );
     }
@@ -281,7 +290,7 @@ fn counts(c: &Column<'_>, says_rate: bool) -> Option<Warning> {
             c.name,
             c.min(),
             c.max(),
-            c.record.unit_in_design(c.name, "mdps"),
+            c.in_smaller_unit(),
             match is_unstated {
                 true => "; if it is deg/s, unit = \"dps\"",
                 false => "",
