@@ -13,6 +13,11 @@ pub(super) fn with_advice(mut error: clap::Error) -> clap::Error {
     parser.build();
     let mut command = given_command().and_then(|name| parser.find_subcommand_mut(name));
     error.remove(ContextKind::Suggested);
+    if let Some(ContextValue::String(similar)) = error.get(ContextKind::SuggestedArg)
+        && !is_near(&argument, similar)
+    {
+        error.remove(ContextKind::SuggestedArg);
+    }
     if let Some(usage) = command.as_mut().map(|command| command.render_usage()) {
         // The parser's own shows what it believes that the misspelt option stands for as required.
         error.insert(ContextKind::Usage, ContextValue::StyledStr(usage));
@@ -22,6 +27,11 @@ pub(super) fn with_advice(mut error: clap::Error) -> clap::Error {
         none if none.is_empty() => error,
         tip => super::with_tip(error, &tip),
     }
+}
+
+/// Whether an option may be a misspelling of another one: the parser takes `--order` for `--force`.
+fn is_near(given: &str, similar: &str) -> bool {
+    crate::nearest::nearest(given, &[similar]).is_some()
 }
 
 /// The command on this process's command line: the first word that is no option.
@@ -78,6 +88,7 @@ fn advice(command: &clap::Command, argument: &str) -> String {
         ("run" | "close", "--bound") => {
             "the bound on the compensation's error stands in the design: bound_dps in [compensation]"
         }
+        ("run", "--order") => "the order of the fit stands in the design: `order = 3` in [fit]",
         ("simulate", "--samples") => "give how long the run is as --duration S, in seconds",
         (_, "-o") => return of_out(command),
         (_, number) if number.starts_with('-') && number.parse::<f64>().is_ok() => {
@@ -152,6 +163,9 @@ mod tests {
         assert_eq!(said("emit", "-o"), "did you mean --out DIR?");
         assert_eq!(said("emit", "--foo"), "");
         assert!(said("run", "--bound").contains("bound_dps in [compensation]"));
+        assert!(said("run", "--order").contains("`order = 3` in [fit]"));
+        assert!(!is_near("--order", "--force") && is_near("--recrod", "--record"));
+        assert!(is_near("--forc", "--force"));
         assert!(said("simulate", "--samples").contains("--duration S"));
         assert!(said("equiv", "-5").contains("the value of an option"));
         let emit = said("emit", "b.toml");
