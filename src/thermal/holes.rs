@@ -4,7 +4,7 @@
 //! cell of a thermometer is an error of the declared bias, and one of a channel that changes from row to row is no
 //! reading at all: an output beside it says nothing of any model.
 
-use crate::record::Warning;
+use crate::record::{ThermalRecord, Warning};
 use std::collections::BTreeMap;
 
 /// Error of a straight line between a reading's neighbours, rms over the channel's deviation, up to which it gives a
@@ -25,10 +25,11 @@ const APART: [&str; 4] = [
 /// Takes the output from rows in which the thermometer, or another channel that its neighbours do not give, was not
 /// measured.
 pub(super) fn take(
-    time_s: &[f64],
+    record: &ThermalRecord,
     columns: &mut BTreeMap<String, Vec<f64>>,
     thermometer: &str,
 ) -> Option<Warning> {
+    let time_s = &record.time_s;
     let mut lost = vec![false; time_s.len()];
     let mut names = Vec::new();
     for (name, values) in columns.iter() {
@@ -52,20 +53,21 @@ pub(super) fn take(
     }
     let names = names.join(", ");
     let output = columns.get_mut("rate_out_dps")?;
-    let mut count = 0;
-    for (value, _) in output
-        .iter_mut()
-        .zip(&lost)
-        .filter(|(v, l)| **l && !v.is_nan())
-    {
-        *value = f64::NAN;
-        count += 1;
+    let mut rows = Vec::new();
+    for (row, (value, is_lost)) in output.iter_mut().zip(&lost).enumerate() {
+        if *is_lost && !value.is_nan() {
+            *value = f64::NAN;
+            rows.push(row);
+        }
     }
-    (count > 0).then(|| {
+    (!rows.is_empty()).then(|| {
         let said = format!(
-            "{count} of {} rows lack a reading of {names} that its neighbours do not give; they take no part in any fit or \
-             figure",
-            time_s.len()
+            "{} of {} rows {} no reading of {names} ({}). None is interpolated, for its error would count as one of the gyro's: \
+             such a row takes no part in any fit or figure",
+            rows.len(),
+            time_s.len(),
+            if rows.len() == 1 { "has" } else { "have" },
+            record.places(&rows)
         );
         Warning::general("rows_with_holes", said)
     })
@@ -127,10 +129,22 @@ fn is_given(time_s: &[f64], values: &[f64]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::thermal::synthetic::record;
 
-    /// Which of 200 rows keep their output with holes in a column, and whether that is said.
+    /// Which of 200 rows lose their output with holes in a column, and whether that is said.
     fn kept(name: &str, value: impl Fn(usize) -> f64, holes: &[usize]) -> (Vec<usize>, bool) {
-        let time_s: Vec<f64> = (0..200).map(|k| 10.0 * k as f64).collect();
+        let (lost, said) = lost(name, value, holes);
+        (lost, said.is_some())
+    }
+
+    /// The same with what is said.
+    fn lost(
+        name: &str,
+        value: impl Fn(usize) -> f64,
+        holes: &[usize],
+    ) -> (Vec<usize>, Option<String>) {
+        let mut record = record("die_degc", &[0.0; 200], &[0.0; 200]);
+        record.time_s = (0..200).map(|k| 10.0 * k as f64).collect();
         let read = |k: usize| {
             if holes.contains(&k) {
                 f64::NAN
@@ -142,10 +156,31 @@ mod tests {
             ("rate_out_dps".to_owned(), vec![1.0; 200]),
             (name.to_owned(), (0..200).map(read).collect()),
         ]);
-        let warning = take(&time_s, &mut columns, "die_degc");
+        let warning = take(&record, &mut columns, "die_degc");
         let output = &columns["rate_out_dps"];
         let lost = (0..200).filter(|k| output[*k].is_nan()).collect();
-        (lost, warning.is_some_and(|w| w.code == "rows_with_holes"))
+        let said = warning.filter(|w| w.code == "rows_with_holes");
+        (lost, said.map(|w| w.message))
+    }
+
+    #[test]
+    fn rows_with_holes_are_told_with_their_lines() {
+        for (holes, part) in [
+            (
+                &[5][..],
+                "1 of 200 rows has no reading of die_degc (line 7). None is interpolated",
+            ),
+            (
+                &[5, 50],
+                "2 of 200 rows have no reading of die_degc (line 7, 52). None is",
+            ),
+        ] {
+            let (_, said) = lost("die_degc", |k| k as f64, holes);
+            assert!(
+                said.as_ref().is_some_and(|said| said.starts_with(part)),
+                "{said:?}"
+            );
+        }
     }
 
     #[test]

@@ -206,7 +206,7 @@ fn channels_of(
         columns.insert(NONE.to_owned(), vec![0.0; record.len()]);
         NONE.to_owned()
     });
-    warnings.extend(holes::take(&record.time_s, &mut columns, &name));
+    warnings.extend(holes::take(record, &mut columns, &name));
     let readings = columns.get(&name).map_or(&[][..], Vec::as_slice);
     let (nominal, known) = nominal(&design.gyro, &name, readings);
     let told_in_degc = ["die_degc", "chamber_degc"].map(|t| columns.contains_key(t));
