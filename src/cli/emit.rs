@@ -128,12 +128,17 @@ fn remarks(design: &Design, part: Part, asked: bool) -> Vec<String> {
         ),
         _ => {}
     }
-    let has_bias = compensates || part == Part::All;
     if part == Part::Chain && design.compensation.is_none() {
         remarks.push(lacks_compensation(&design.source.text));
     }
-    if let Some(said) = unfitted(design).filter(|_| has_bias) {
-        remarks.push(format!("warning: {said} to emit from"));
+    match unfitted(design) {
+        Some(said) if compensates => remarks.push(format!("warning: {said} to emit from")),
+        // A correction takes the rate before the compensation.
+        Some(said) if part == Part::All => remarks.push(format!(
+            "note: {said} to emit from. Only the chain's own rate (`row.rate`) uses these coefficients. The corrected rate is made of \
+             `sense_i`, before the compensation"
+        )),
+        _ => {}
     }
     remarks
 }

@@ -289,7 +289,16 @@ fn coefficients_that_no_record_gave_are_noted() {
         ];
         let output = gyrogen(&arguments, top.path());
         assert!(output.status.success(), "{}", all_of(&output));
-        let notes = all_of(&output).contains("not fitted to a record");
+        let said = all_of(&output);
+        let of_rate_alone =
+            said.contains("Only the chain's own rate (`row.rate`) uses these coefficients");
+        assert_eq!(of_rate_alone, part == "all", "{said}");
+        assert_eq!(
+            said.contains("warning: the coefficients"),
+            part == "chain",
+            "{said}"
+        );
+        let notes = said.contains("not fitted to a record");
         assert_eq!(notes, is_noted, "{part}: {}", all_of(&output));
     }
 }
