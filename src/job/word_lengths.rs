@@ -162,11 +162,12 @@ impl WordLengths {
         match &self.largest {
             Some(w) => {
                 text += &format!(
-                    ". The largest part is that of {} ({}): with {} instead, {} deg/s are left",
+                    ". The largest part is that of {} ({}). With {} the word lengths make {} deg/s rms instead of {}",
                     w.key,
                     w.from,
                     w.to,
-                    shown(w.left_rms_dps, 2)
+                    shown(w.left_rms_dps, 2),
+                    shown(self.rms_dps, 2)
                 );
             }
             None if !self.widened.is_empty() => {

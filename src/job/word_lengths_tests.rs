@@ -42,7 +42,8 @@ fn a_short_product_is_named_with_what_it_does() {
         sentence.starts_with("The fit limits the result: fit "),
         "{sentence}"
     );
-    assert!(sentence.contains("The largest part is that of circuit.demodulator.product (Q2.10)"));
+    let largest = "The largest part is that of circuit.demodulator.product (Q2.10). With Q2.18 the word lengths make ";
+    assert!(sentence.contains(largest) && sentence.contains(" deg/s rms instead of 0."));
     assert!(sentence.contains("deg/s at most (measured)"), "{sentence}");
     let clause = words.clause(fit);
     assert!(
