@@ -114,8 +114,8 @@ fn by_record(fit: &BaselineFit) -> String {
     let given = format!("order {SIMULATED_ORDER} as given");
     match fit.reason.strip_prefix(&given) {
         Some(rest) if !rest.is_empty() => format!(
-            "order {SIMULATED_ORDER}, as in Chen et al. (2004), for the simulated run{rest}, and `run --record` of this run's record takes \
-             that (fit.order = \"by_record\")"
+            "order {SIMULATED_ORDER} is prescribed for the simulated run (Chen et al. 2004){rest}. `run --record` of this run's record \
+             chooses by held-out error (fit.order = \"by_record\")"
         ),
         _ => fit.reason.clone(),
     }

@@ -111,13 +111,14 @@ pub fn choose(sample: &Sample, wanted: FitOrder, most: usize, blocks: &[Range<us
             .map_or(best_rms, |r| r.0.heldout_clean_rms_dps);
         let given = t.heldout_clean_rms_dps;
         let why = match smallest == best_order {
-            true => "which has the least".to_owned(),
+            true => String::new(),
             false => format!(
-                "the lowest within one standard error of the least ({best_rms:.4} deg/s rms by order {best_order})"
+                ". Order {best_order} has the least, {best_rms:.4} deg/s; order {smallest} is the lowest within one standard \
+                 error of it"
             ),
         };
         reason.push_str(&format!(
-            ". By held-out error it would be order {smallest}, {why}: {by_rule:.4} deg/s rms against {given:.4}"
+            ": held-out rms {given:.4} deg/s. Chosen by held-out error it would be order {smallest}: {by_rule:.4} deg/s{why}"
         ));
     }
     let heldout = chosen.map_or_else(HeldOut::nothing, |(_, h)| h.clone());

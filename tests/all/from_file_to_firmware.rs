@@ -310,12 +310,14 @@ fn a_simulated_run_says_why_its_own_record_gets_another_order() {
     let own = of(&["run", "--out", "own"]);
     let again = of(&["run", "--record", "own/record.csv", "--out", "again"]);
     assert!(
-        own.contains(": order 2,")
-            && own.contains("By held-out error it would be order 3, the lowest within one "),
+        own.contains(
+            ": order 2 is prescribed for the simulated run (Chen et al. 2004): held-out rms "
+        ) && own.contains("Chosen by held-out error it would be order 3: ")
+            && own.contains("; order 3 is the lowest within one standard error of it. "),
         "{own}"
     );
     assert!(
-        own.contains("`run --record` of this run's record takes that"),
+        own.contains("`run --record` of this run's record chooses by held-out error"),
         "{own}"
     );
     assert!(
