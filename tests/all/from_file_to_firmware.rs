@@ -105,6 +105,28 @@ fn a_record_of_each_kind_becomes_compiled_firmware() {
     }
 }
 
+/// A step that no polynomial follows is left in both; `close` refuses the shorter one.
+#[test]
+fn a_record_of_few_rows_is_not_sent_to_close() {
+    let top = tempfile::tempdir().expect("a folder");
+    for (rows, is_sent) in [(16, false), (24, true)] {
+        let mut csv = "time_s,rate_out_dps,die_degc\n".to_owned();
+        for k in 0..rows {
+            let (after, degc) = match 2 * k < rows {
+                true => (0.0, 20 + 2 * k),
+                false => (0.2, 20 + 2 * (rows - k)),
+            };
+            let rate = 0.5 + after + 0.001 * f64::from(k % 2);
+            writeln!(csv, "{},{rate:.3},{degc}", 10 * k).expect("a string");
+        }
+        fs::write(top.path().join("r.csv"), csv).expect("a record");
+        let arguments = ["run", "--record", "r.csv", "--out", "out", "--force"];
+        let (status, said, complaints) = gyrogen(top.path(), &arguments);
+        assert_eq!(status, Some(0), "{said}{complaints}");
+        assert_eq!((said + &complaints).contains("next: "), is_sent);
+    }
+}
+
 #[test]
 fn a_loop_of_heating_and_cooling_is_said_once() {
     let top = tempfile::tempdir().expect("a folder");
