@@ -97,6 +97,38 @@ fn a_thermal_lag_is_a_loop_over_one_cycle_two_and_three() {
     }
 }
 
+/// A random walk over two cycles is no loop. Where it looks like one, the warning says what there is too little of.
+#[test]
+fn slow_noise_that_looks_like_a_loop_is_told_as_undecided() {
+    let (mut told, mut loops) = (Vec::new(), 0);
+    for seed in 0..200 {
+        let (mut random, mut walk) = (Random::new(seed), 0.0);
+        let t: Vec<f64> = [triangle(201), triangle(201)].concat();
+        let e: Vec<f64> = t
+            .iter()
+            .map(|t| {
+                walk += 0.01 * random.normal();
+                bias(*t) + walk + 0.005 * random.normal()
+            })
+            .collect();
+        let record = record("die_degc", &t, &e);
+        let f = fit(&record, &RecordMapping::default(), &few(TWO)).unwrap();
+        loops += usize::from(f.sweep_loop.unwrap().significant);
+        let of_loop = f
+            .warnings
+            .into_iter()
+            .filter(|w| w.code == "loop_or_slow_noise");
+        told.extend(of_loop.map(|w| w.message));
+    }
+    assert!(loops <= 4 && !told.is_empty(), "{loops}, {}", told.len());
+    for said in told {
+        assert!(
+            said.contains("the 402 rows are worth ") && said.contains("record more cycles"),
+            "{said}"
+        );
+    }
+}
+
 #[test]
 fn each_shortcoming_has_its_warning() {
     let t = triangle(400);
