@@ -6,8 +6,10 @@ const SIDE: usize = 64;
 /// How often an error lay in each of 128 bins around 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Histogram {
-    /// Width of a bin, in the unit of the errors.
+    /// Width of a bin, in the unit of the errors: a power of two.
     width: f64,
+    /// One over the width.
+    per_width: f64,
     counts: [u64; 2 * SIDE],
 }
 
@@ -18,10 +20,11 @@ impl Default for Histogram {
 }
 
 impl Histogram {
-    /// Empty, from -`reach` to `reach`, which is more than 0.
+    /// Empty, from -`reach` to `reach`, which is a power of two.
     pub fn new(reach: f64) -> Self {
         Histogram {
             width: reach / SIDE as f64,
+            per_width: SIDE as f64 / reach,
             counts: [0; 2 * SIDE],
         }
     }
@@ -29,16 +32,18 @@ impl Histogram {
     /// Counts an error; what is no number is not counted.
     #[inline(always)]
     pub fn add(&mut self, error: f64) {
-        let mut place = (error / self.width).floor();
         // Written so that a NaN is beyond.
-        if !(place >= -(SIDE as f64) && place < SIDE as f64) {
+        let reach = self.width * SIDE as f64;
+        if !(error >= -reach && error < reach) {
             if !error.is_finite() {
                 return;
             }
             self.widen(error);
-            place = (error / self.width).floor();
         }
-        if let Some(count) = self.counts.get_mut((place + SIDE as f64) as usize) {
+        let place = error * self.per_width;
+        let toward_zero = place as i64;
+        let floor = toward_zero - i64::from(toward_zero as f64 > place);
+        if let Some(count) = self.counts.get_mut((floor + SIDE as i64) as usize) {
             *count += 1;
         }
     }
@@ -51,7 +56,8 @@ impl Histogram {
             for (pair, out) in self.counts.chunks(2).zip(joined.iter_mut().skip(SIDE / 2)) {
                 *out = pair.iter().sum();
             }
-            (self.counts, self.width) = (joined, 2.0 * self.width);
+            (self.counts, self.width, self.per_width) =
+                (joined, 2.0 * self.width, 0.5 * self.per_width);
         }
     }
 

@@ -279,10 +279,12 @@ impl<W: HasKernel, R: Lane, P: Watch> Arithmetic for Paired<'_, W, R, P> {
         let raw = self.fixed.residue_add(a.raw, b.raw, ring);
         let grid = Float.residue_add(a.grid, b.grid, ring);
         let (bound, phase_bound) = if is_turn(ring) {
-            let cap = steps(self.watch.phase_cap_turns(), TURN_STEP_EXPONENT);
             // Both are below 2^124: no sum wraps.
             let whole = a.bound + b.bound + a.phase_bound + b.phase_bound;
-            (0, whole.min(cap))
+            // Without a phase loop there is none, and no cap is asked for.
+            let cap =
+                |whole: u128| whole.min(steps(self.watch.phase_cap_turns(), TURN_STEP_EXPONENT));
+            (0, if whole > 0 { cap(whole) } else { 0 })
         } else {
             (
                 a.bound.wrapping_add(b.bound),
@@ -338,7 +340,10 @@ impl<W: HasKernel, R: Lane, P: Watch> Arithmetic for Paired<'_, W, R, P> {
         let rest_turns = rest.abs() * exp2i(-(table.phase_bits as i32));
         let real = Float.sine(phase.grid, table);
         let slope = table.amplitude * TAU;
-        let difference = phase.phase_bound as f64 * exp2i(-TURN_STEP_EXPONENT);
+        let difference = match phase.phase_bound {
+            0 => 0.0,
+            steps => steps as f64 * exp2i(-TURN_STEP_EXPONENT),
+        };
         let word = Pair {
             raw: self.fixed.sine(phase.raw, table),
             real,
