@@ -260,7 +260,7 @@ pub(super) fn comparison_table(compared: &[Compared]) -> comfy_table::Table {
             c.language.to_owned(),
             inputs,
             c.compared.to_string(),
-            c.mismatches.to_string(),
+            c.shown_mismatches(),
         ]);
     }
     super::terminal::numbers(&mut table, 2..);

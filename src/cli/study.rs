@@ -186,13 +186,17 @@ fn print(s: &Study) {
     say!("what the word lengths add to the gyro's own errors; costs in % of the given design's");
     super::terminal::show(&points(s));
     say!("*: on that target's front: nothing cheaper has so small a merit");
-    let held = if s.limits_from == "requirements" {
-        "every figure with a requirement is within it"
-    } else {
-        s.limits_from
-    };
     say!(
-        "merit: the largest part that a column is of its limit (`by`: which column). At most 1, by the estimates: {held}."
+        "limit: {}",
+        match s.limits_from {
+            "requirements" => "as required",
+            _ =>
+                "what the word lengths may add before a figure of the gyro and its words together is one percent worse than with the \
+                 given design",
+        }
+    );
+    say!(
+        "merit: the largest ratio of a column to its limit (`by`: which column), by the estimates; smaller is better"
     );
     let mut all = std::iter::once(&s.reference).chain(&s.front);
     if all.any(is_within_by_estimate_alone) {
@@ -201,7 +205,7 @@ fn print(s: &Study) {
             100.0 * s.confidence.joint
         );
     }
-    say!("angle random walk in deg/rth: 42.4 times the noise");
+    say!("angle random walk in deg/rth: noise * 60 / sqrt(2), as the noise is a one-sided density");
     if let Some(hz) = s.conditions.detuned_hz {
         say!(
             "spur: the largest line of the error's spectrum, at rest or with the oscillator off by {} Hz; `equiv` runs at the design's own frequency alone",

@@ -171,7 +171,8 @@ pub(super) fn answers(
             let worse = unlimited(work, &seen.good.get(l)?.verified.figures)?;
             let number = p.number;
             Some(format!(
-                "{target}: point {number} makes figures of the data sheet that have no limit more than one percent worse: {worse}"
+                "{target}: point {number} is worse than the given design in figures that you set no limit for: {worse}. Add limits for them to \
+                 what you require, such as `spur_dps<=0.1`"
             ))
         }));
         let reason = match point {

@@ -371,10 +371,24 @@ fn checksum(
 }
 
 impl Compared {
+    /// The mismatches in a table. A checksum that differs says of no word which it is.
+    pub fn shown_mismatches(&self) -> String {
+        match self.is_of_checksum() {
+            true => "checksum differs".to_owned(),
+            false => self.mismatches.to_string(),
+        }
+    }
+
+    fn is_of_checksum(&self) -> bool {
+        self.first
+            .as_deref()
+            .is_some_and(|first| first.contains("checksum"))
+    }
+
     /// A function that differs and where it does, in words.
     pub fn sentence(&self) -> String {
         let first = self.first.as_deref().unwrap_or("");
-        let at = match first.contains("checksum") {
+        let at = match self.is_of_checksum() {
             true => "",
             false => "first difference at ",
         };
