@@ -131,7 +131,7 @@ fn a_setpoint_that_no_magnitude_reaches_does_not_hold() {
         reason.contains("is 100000000, above the largest magnitude, 5931461 (proved)"),
         "{reason}"
     );
-    let magnitude = node(&c, "circuit.cordic magnitude");
+    let magnitude = node(&c, "circuit.cordic.gain_bits");
     assert_eq!(magnitude.proved[1], 5_931_461);
 }
 
