@@ -49,11 +49,11 @@ fn what_was_read_is_told_in_the_contracts_order() {
     );
     assert_eq!(
         record.rows_understood(&warnings, None),
-        "20, one every 1.000 s, not averaged (to average, set `average_s` in [record])"
+        "20 over 19 s, one every 1.000 s, not averaged (to average, set `average_s` in [record])"
     );
     assert_eq!(
         record.rows_understood(&warnings, Some(0.5)),
-        "20, one every 1.000 s, not averaged (`average_s` = 0.5 s joins no two of them)"
+        "20 over 19 s, one every 1.000 s, not averaged (`average_s` = 0.5 s joins no two of them)"
     );
     // The design states the unit.
     columns.units.insert("die_degc".into(), "degC".into());
@@ -64,6 +64,31 @@ fn what_was_read_is_told_in_the_contracts_order() {
             .contains("die_degc from temp, flow"),
         "{}",
         record.understood(&columns)
+    );
+}
+
+#[test]
+fn rows_in_groups_are_told_with_their_distances() {
+    let plain = RecordMapping::default();
+    let told = |time: &dyn Fn(usize) -> usize| {
+        let rows = (0..87).map(|k| format!("{},0.{k:03},{k}", time(k)));
+        let text = format!("{HEADER}\n{}\n", rows.collect::<Vec<_>>().join("\n"));
+        let (record, warnings) = try_parse(text.as_bytes(), &plain).unwrap();
+        record.rows_understood(&warnings, None)
+    };
+    let end = "not averaged (to average, set `average_s` in [record])";
+    // Three rows at each set point.
+    assert_eq!(
+        told(&|k| 900 + 1230 * (k / 3) + 10 * (k % 3)),
+        format!(
+            "87 over 9.57 h, in 29 groups: 10.00 s between the rows of a group, up to 1210 s between groups; {end}"
+        )
+    );
+    // A record that was interrupted for a while has no groups.
+    let interrupted = |k: usize| 10 * k + 200 * (k / 60);
+    assert_eq!(
+        told(&interrupted),
+        format!("87 over 17.7 min, one every 10.00 s, {end}")
     );
 }
 

@@ -5,9 +5,22 @@ use crate::design::RecordMapping;
 use crate::design::record_columns;
 use crate::design::units::{self, Unit};
 use crate::statistics::stats;
-use crate::text::number;
+use crate::text::{constant, number};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+
+/// A distance of rows that is longer than so many usual ones parts two groups (convention).
+const GAP: f64 = 5.0;
+
+/// "42 s", "50 min", "9.57 h".
+fn duration(s: f64) -> String {
+    let (value, unit) = match s {
+        s if s < 120.0 => (s, "s"),
+        s if s < 7200.0 => (s / 60.0, "min"),
+        s => (s / 3600.0, "h"),
+    };
+    format!("{} {unit}", constant(value, 3))
+}
 
 /// A thermal record, read and checked. All columns have [`ThermalRecord::len`] rows.
 #[derive(Debug, Clone, PartialEq)]
@@ -158,7 +171,7 @@ impl ThermalRecord {
         said.collect::<Vec<_>>().join(", ")
     }
 
-    /// How many rows there are, how far apart, and whether they are means of the file's, as `warnings` of the same record say;
+    /// How many rows there are, over what time and how far apart, and whether they are means of the file's, as `warnings` of the same record say;
     /// `average_s` is what the design asks for.
     pub fn rows_understood(&self, warnings: &[Warning], average_s: Option<f64>) -> String {
         let averaged: Vec<&str> = warnings
@@ -169,16 +182,30 @@ impl ThermalRecord {
         if !averaged.is_empty() {
             return averaged.join("; ");
         }
-        let steps: Vec<f64> = self.time_s.windows(2).map(|w| w[1] - w[0]).collect();
         let why = match average_s {
             None => "to average, set `average_s` in [record]".to_owned(),
             Some(s) => format!("`average_s` = {s} s joins no two of them"),
         };
-        format!(
-            "{}, one every {} s, not averaged ({why})",
-            self.len(),
-            number(stats::median(&steps), 4)
-        )
+        format!("{} {}not averaged ({why})", self.len(), self.spacing())
+    }
+
+    /// Over what time the rows are and how far apart, up to the comma or semicolon behind it.
+    fn spacing(&self) -> String {
+        let steps: Vec<f64> = self.time_s.windows(2).map(|w| w[1] - w[0]).collect();
+        let usual = stats::median(&steps);
+        let span: f64 = steps.iter().sum();
+        let gaps: Vec<f64> = steps.into_iter().filter(|s| *s > GAP * usual).collect();
+        let between = gaps.iter().fold(0.0, |m: f64, s| m.max(*s));
+        let (time, usual_s) = (duration(span), number(usual, 4));
+        // Else most of the time has rows, and a gap is no part of the plan.
+        match gaps.iter().sum::<f64>() > 0.5 * span {
+            true => format!(
+                "over {time}, in {} groups: {usual_s} s between the rows of a group, up to {} s between groups; ",
+                gaps.len() + 1,
+                number(between, 4)
+            ),
+            false => format!("over {time}, one every {usual_s} s, "),
+        }
     }
 
     /// How many rows of a column are measured; 0 if there is none of that name.
