@@ -170,6 +170,22 @@ pub fn lattice_step(values: &[f64]) -> Option<f64> {
     (on as f64 >= 0.98 * distinct.len() as f64).then_some(step)
 }
 
+/// Share of the distances of even levels that are whole numbers of their step: a few levels may be odd.
+const ON_GRID: f64 = 0.8;
+
+/// The step of ascending levels that lie evenly, but for a few: the lower quartile of their distances. `None` where they do not.
+pub fn even_step(levels: &[f64]) -> Option<f64> {
+    let mut gaps: Vec<f64> = levels.windows(2).map(|w| w[1] - w[0]).collect();
+    gaps.sort_by(f64::total_cmp);
+    let step = *gaps.get(gaps.len() / 4)?;
+    let whole = |g: &&f64| {
+        let steps = **g / step;
+        (steps - steps.round()).abs() < 0.05 && steps.round() >= 1.0
+    };
+    let on_grid = gaps.iter().filter(whole).count();
+    (step > 0.0 && on_grid as f64 >= ON_GRID * gaps.len() as f64).then_some(step)
+}
+
 /// How many different values were measured.
 pub fn distinct(values: &[f64]) -> usize {
     let mut v = sorted(values);

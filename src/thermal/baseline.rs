@@ -3,6 +3,7 @@
 
 use super::checks::{self, Checked};
 use super::order::{self, OrderTrial};
+use super::rate_steps::RateSteps;
 use super::sweep::{self, Loop};
 use crate::design::{FitOptions, FitOrder, RecordMapping};
 use crate::error::{InputError, Result};
@@ -53,8 +54,11 @@ pub struct BaselineFit {
     /// The largest held-out error.
     pub heldout_max_abs_dps: f64,
     /// White noise of the output, deg/s: [`stats::difference_noise`] of what the highest order that is tried by itself
-    /// leaves, whatever order was chosen: the floor is the record's. Noise with memory counts in part.
+    /// leaves, whatever order was chosen: the floor is the record's. Noise with memory counts in part. Not below the rounding to
+    /// [`BaselineFit::rate_steps`].
     pub noise_floor_rms_dps: f64,
+    /// The steps of the output, where they are too coarse for its noise.
+    pub rate_steps: Option<RateSteps>,
     /// Drift of the bias over the thermometer's range, deg/s, peak to peak: of the mean error
     /// signal in twenty bins of the thermometer with at least three clean rows (of all bins that
     /// have rows, if no two have three), so that noise hardly counts.
@@ -308,6 +312,10 @@ pub fn fit_with(
         .map(|(i, _)| *i)
         .collect();
     warnings.extend(outlier_warning(record, &outliers, rows.len()));
+    let rest = residuals_of_most(&sample);
+    let rate_steps = RateSteps::of(record, &rows, &rest);
+    let rounding = rate_steps.map_or(0.0, RateSteps::rounding_rms_dps);
+    warnings.extend(rate_steps.map(RateSteps::warning));
     // A long record is not copied where every row is usable.
     let spread_out = |values: Vec<f64>, missing: f64| -> Vec<f64> {
         if values.len() == record.len() {
@@ -337,7 +345,8 @@ pub fn fit_with(
         in_sample_rms_dps: stats::rms(&residuals),
         heldout_rms_dps: choice.heldout.rms_dps,
         heldout_max_abs_dps: choice.heldout.max_abs_dps,
-        noise_floor_rms_dps: noise_floor(&sample),
+        noise_floor_rms_dps: stats::difference_noise(&rest).max(rounding),
+        rate_steps,
         drift_before_pp_dps: drift,
         drift_before_pp_plain_dps: stats::extremes(&sample.e).map_or(0.0, |(a, b)| b - a),
         residuals: spread_out(residuals, f64::NAN),
@@ -453,11 +462,11 @@ fn most_order(sample: &Sample, wanted: FitOrder) -> usize {
     }
 }
 
-/// See [`BaselineFit::noise_floor_rms_dps`].
-fn noise_floor(sample: &Sample) -> f64 {
+/// What the highest order that is tried by itself leaves.
+fn residuals_of_most(sample: &Sample) -> Vec<f64> {
     let order = most_order(sample, FitOrder::Auto).min(order::HIGHEST_AUTO);
     let coefficients = sample.problem(order, |_| true).coefficients(order);
-    stats::difference_noise(&sample.residuals(&coefficients))
+    sample.residuals(&coefficients)
 }
 
 /// See [`BaselineFit::drift_before_pp_dps`].

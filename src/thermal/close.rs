@@ -9,6 +9,7 @@ use super::channels::Channels;
 use super::checks;
 use super::effects::{Candidate, user};
 use super::intake::{Intake, refused};
+use super::rate_steps::RateSteps;
 use super::search::{Effort, Found, Model, Search};
 use crate::correction::Correction;
 use crate::design::Design;
@@ -125,6 +126,8 @@ pub fn close(
     let mut warnings = taken.intake.warnings.clone();
     let fit = baseline::fit(record, &design.record, &design.fit).ok();
     Warning::add_of_fit(&mut warnings, fit.as_ref().and_then(course));
+    let steps = fit.as_ref().and_then(|f| f.rate_steps);
+    warnings.extend(steps.map(RateSteps::warning));
     warnings.extend(no_judges(&taken.intake.split));
     let whole = taken.intake.whole();
     let (closure, before, after, accidents, firmware) = {
@@ -147,6 +150,7 @@ pub fn close(
             before: &before,
             after: &after,
             rows: Rows::of(&search, &whole, &taken.intake.split, &accidents),
+            rounding_dps: steps.map_or(0.0, RateSteps::rounding_rms_dps),
         };
         let mut closure = told.closure().map_err(unusable)?;
         told.warn(&mut warnings);
@@ -232,6 +236,8 @@ struct Told<'a> {
     before: &'a Model,
     after: &'a Model,
     rows: Rows,
+    /// Of an output in steps that are too coarse for its noise, rms, deg/s; else 0.
+    rounding_dps: f64,
 }
 
 /// rms of the rows that are meant.
@@ -271,7 +277,7 @@ impl Told<'_> {
             command: String::new(),
             verdict: Verdict::of(steps.len(), left),
             unit: "deg/s",
-            noise_floor_rms: stats::difference_noise(&usual),
+            noise_floor_rms: stats::difference_noise(&usual).max(self.rounding_dps),
             before: self.errors(self.before),
             after: self.errors(self.after),
             firmware: FirmwareErrors::default(),

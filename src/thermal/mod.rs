@@ -26,6 +26,7 @@ pub mod order;
 pub mod quadrature;
 pub mod quantised;
 pub mod rails;
+pub mod rate_steps;
 pub mod repeated;
 pub mod residuals;
 pub mod search;

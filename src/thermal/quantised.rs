@@ -29,9 +29,6 @@ pub struct Course {
 const LEAST_LEVELS: usize = 8;
 const ROWS_A_LEVEL: usize = 3;
 
-/// Share of the distances of levels that are whole numbers of steps.
-const ON_GRID: f64 = 0.8;
-
 /// Rounding matters from this share of the output's noise on: below, it adds two percent of it or less.
 const MATTERS: f64 = 0.2;
 
@@ -116,20 +113,10 @@ fn step_of(readings: &[f64]) -> Option<f64> {
     if levels.len() < LEAST_LEVELS || levels.len() * ROWS_A_LEVEL > readings.len() {
         return None;
     }
-    let mut gaps: Vec<f64> = levels.windows(2).map(|w| w[1] - w[0]).collect();
-    gaps.sort_by(f64::total_cmp);
-    let step = gaps[gaps.len() / 4];
-    let whole = |g: &&f64| {
-        let steps = **g / step;
-        (steps - steps.round()).abs() < 0.05 && steps.round() >= 1.0
-    };
-    let on_grid = gaps.iter().filter(whole).count();
+    let step = stats::even_step(&levels)?;
     let as_one = readings.windows(2).map(|w| (w[1] - w[0]).abs());
     let as_one = as_one.filter(|d| (d - step).abs() < 0.05 * step).count();
-    if as_one as f64 > EVENLY * readings.len() as f64 {
-        return None;
-    }
-    (step > 0.0 && on_grid as f64 >= ON_GRID * gaps.len() as f64).then_some(step)
+    (as_one as f64 <= EVENLY * readings.len() as f64).then_some(step)
 }
 
 /// The course with the least sum of squared second differences within the cell of every reading, by alternating
