@@ -4,6 +4,7 @@ use super::super::baseline::{BaselineFit, fit};
 use super::super::close::close;
 use super::super::search::Effort;
 use super::super::synthetic::{Random, few, record, triangle};
+use super::step_of;
 use crate::design::{FitOrder, RecordMapping, reader};
 
 const ROWS: usize = 600;
@@ -101,7 +102,7 @@ fn steps_that_noise_dithers_are_not_told() {
 
 #[test]
 fn neither_a_constant_nor_a_table_without_noise_has_steps() {
-    assert!(!is_told(&fitted(&[0.3; ROWS])));
+    assert_eq!(step_of(vec![0.3; ROWS]), None);
     assert!(!is_told(&fitted(&output(0.0, 0))));
     // Set points: the output goes in even steps, as the bias does.
     let degc: Vec<f64> = (0..ROWS).map(|k| 10.0 * (k / 60) as f64).collect();
@@ -113,7 +114,7 @@ fn neither_a_constant_nor_a_table_without_noise_has_steps() {
     // One odd row of a constant is no level.
     let mut output = vec![0.3; ROWS];
     output[100] = 0.7;
-    assert!(!is_told(&fitted(&output)));
+    assert_eq!(step_of(output), None);
 }
 
 #[test]
