@@ -265,7 +265,10 @@ impl Outcome {
         let triples = points
             .iter()
             .map(|p| [p.thermometer, p.before_dps, p.fixed_dps]);
-        let no_gain = is_measured.then(|| no_gain::warning(&parts.fit.thermometer, triples));
+        let mut said = parts.warnings.iter();
+        let has_loop = said.any(|w| w.code == "heating_cooling_loop");
+        let no_gain =
+            is_measured.then(|| no_gain::warning(&parts.fit.thermometer, triples, has_loop));
         let compensation = parts.design.compensation.as_ref();
         let fit = &parts.fit;
         let summary = Summary {

@@ -153,10 +153,10 @@ pub fn close(
             rounding_dps: steps.map_or(0.0, RateSteps::rounding_rms_dps),
         };
         let mut closure = told.closure().map_err(unusable)?;
-        told.warn(&mut warnings);
-        if closure.verdict == Verdict::Unexplained {
-            warnings.extend(fit.as_ref().and_then(checks::unexplained_loop));
-        }
+        let is_unexplained = closure.verdict == Verdict::Unexplained;
+        let sweeps = fit.as_ref().filter(|_| is_unexplained);
+        let sweep_loop = sweeps.and_then(checks::unexplained_loop);
+        told.warn(sweep_loop, &mut warnings);
         let firmware = told.firmware(record, design, &mut warnings);
         closure.firmware = firmware
             .as_ref()

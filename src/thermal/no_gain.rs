@@ -10,6 +10,9 @@ pub const DRIFT_BINS: usize = 24;
 /// (convention).
 const NO_GAIN: f64 = 0.9;
 
+/// Share of the rates' range that a turn passes from one reading to the next when it begins, and a drift does not (convention).
+const TURN: f64 = 0.25;
+
 /// Greatest minus least of the means over bins of the thermometer; of pairs of its reading and a rate.
 pub fn drift_pp(readings: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
     let whole = || readings.clone().map(|r| r.0);
@@ -47,16 +50,22 @@ fn gains_nothing(readings: impl Iterator<Item = [f64; 3]> + Clone) -> bool {
     after.0 > NO_GAIN * before.0 && after.1 > NO_GAIN * before.1
 }
 
-/// What is said of a compensation that takes nothing off; of readings of the thermometer with the rate before the compensation and
-/// after it, deg/s, the applied rate subtracted.
+/// What is said of a compensation that takes nothing off; of readings in the order of time: the thermometer's, with the rate before
+/// the compensation and after it, deg/s, the applied rate subtracted. Where heating and cooling differ (`has_loop`), that is the reason
+/// and is told by itself, unless the gyro was turned, which makes them differ as well.
 pub fn warning(
     thermometer: &str,
     readings: impl Iterator<Item = [f64; 3]> + Clone,
+    has_loop: bool,
 ) -> Option<Warning> {
-    gains_nothing(readings.clone()).then(|| {
-        let rates = || readings.clone().map(|r| r[1]);
-        let low = rates().fold(f64::INFINITY, f64::min);
-        let high = rates().fold(f64::NEG_INFINITY, f64::max);
+    if !gains_nothing(readings.clone()) {
+        return None;
+    }
+    let rates: Vec<f64> = readings.map(|r| r[1]).collect();
+    let (low, high) = crate::statistics::stats::extremes(&rates)?;
+    let mut pairs = rates.windows(2);
+    let is_turned = pairs.any(|pair| (pair[1] - pair[0]).abs() > TURN * (high - low));
+    (!has_loop || is_turned).then(|| {
         let said = format!(
             "the compensation takes nothing of the drift off: the rate runs from {} to {} deg/s before it and varies as much after it. \
              Either it does not follow {thermometer}, or the gyro was turned. Cut the rows in which it turned, or give the applied \
@@ -83,6 +92,24 @@ mod tests {
 
     fn slope(k: u32) -> f64 {
         f64::from(k) / 10_000.0
+    }
+
+    /// Heating and cooling differ, and no function of the temperature takes anything of that off: rows are not to blame, unless the
+    /// rate jumps.
+    #[test]
+    fn a_loop_blames_no_rows_and_a_turn_does() {
+        let said = |turned_dps: f64, has_loop| {
+            let readings = (0..600).map(move |k| {
+                let (sin, cos) = (f64::from(k) * std::f64::consts::TAU / 300.0).sin_cos();
+                let turned = turned_dps * f64::from(u8::from((300..360).contains(&k)));
+                let rate = sin + 0.2 * cos + 0.05 * noise(k) + turned;
+                [25.0 + 20.0 * cos, rate, rate]
+            });
+            warning("die_degc", readings, has_loop).is_some()
+        };
+        assert!(said(0.0, false));
+        assert!(!said(0.0, true));
+        assert!(said(50.0, true));
     }
 
     #[test]

@@ -7,10 +7,11 @@ use crate::thermal::no_gain;
 use crate::thermal::search::LEVEL;
 
 impl Told<'_> {
-    /// All of it but what firmware has to say.
-    pub(super) fn warn(&self, warnings: &mut Vec<Warning>) {
+    /// All of it but what firmware has to say; `sweep_loop` is said of heating and cooling.
+    pub(super) fn warn(&self, sweep_loop: Option<Warning>, warnings: &mut Vec<Warning>) {
         warnings.extend(self.accidents().or_else(|| self.riddled()));
-        warnings.extend(self.no_gain());
+        warnings.extend(self.no_gain(sweep_loop.is_some()));
+        warnings.extend(sweep_loop);
         if !self.found.within_rounding.is_empty() {
             let each = self.found.within_rounding.iter();
             let names: Vec<String> = each
@@ -70,7 +71,7 @@ impl Told<'_> {
     }
 
     /// What is said where something is left, and as much varies as before. Noise alone is no drift.
-    fn no_gain(&self) -> Option<Warning> {
+    fn no_gain(&self, has_loop: bool) -> Option<Warning> {
         let left = self.after.residual(self.whole);
         let rows = self.whole.error_dps.iter().zip(&left).zip(&self.whole.u);
         let rows = rows.zip(&self.rows.accidents);
@@ -78,7 +79,7 @@ impl Told<'_> {
         let readings = usual.map(|(((before, after), u), _)| [*u, *before, *after]);
         let is_left = self.found.left.is_some();
         is_left
-            .then(|| no_gain::warning(&self.whole.thermometer, readings))
+            .then(|| no_gain::warning(&self.whole.thermometer, readings, has_loop))
             .flatten()
     }
 
