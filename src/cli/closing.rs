@@ -124,7 +124,7 @@ pub(super) fn print(
             c.unit_text()
         );
     } else if c.unit == "deg/s" {
-        say!("firmware cannot carry this: the warnings say why");
+        say!("no firmware was written: the warnings say why");
     }
     say!("{}", held_out(said));
     if let Some(compared) = compared {

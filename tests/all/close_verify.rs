@@ -104,7 +104,8 @@ fn without_firmware_there_is_nothing_to_compare_and_that_is_said() {
     assert!(
         talk.contains("does not see chamber_degc")
             && talk.contains("name it die_degc in [record.columns]")
-            && talk.contains("[not_compensable]"),
+            && talk.contains("[not_compensable]")
+            && said.contains("no firmware was written: the warnings say why"),
         "{talk}"
     );
     // What an earlier record left is not taken for this one's.

@@ -193,7 +193,7 @@ pub fn firmware(c: &Closure) -> String {
     let compensable = if c.firmware.compensable {
         "Firmware sees all that the declared model and the causes need."
     } else {
-        "Firmware cannot take all of this off: an effect or a channel is beyond its reach."
+        "No firmware was written: the warnings say why."
     };
     compensable.to_owned()
 }

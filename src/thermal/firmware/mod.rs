@@ -64,14 +64,15 @@ pub fn plan(
     })
 }
 
-/// Why firmware cannot carry a model: a reason for each term that it cannot, or for the thermometer.
+/// Why firmware cannot carry a model: a reason for each term that it cannot, or for the thermometer; and what to do.
 pub fn obstacles(c: &Channels, model: &Model, estimates: &[Estimate]) -> Vec<String> {
     let mut words = Words::new(c, &model.acting, model.fit.noise.white_rms_dps);
     let mut out = Vec::new();
-    if model.bias.coefficients_dps.len() > 1 && words.thermometer().is_none() {
+    let sees_bias = model.bias.coefficients_dps.len() <= 1 || words.thermometer().is_some();
+    if !sees_bias {
         let name = &c.thermometer;
         out.push(format!(
-            "firmware does not see {name}, which the declared bias is a function of. If {name} is the gyro's own thermometer, name it \
+            "firmware does not see {name}, which the polynomial is a function of. If {name} is the gyro's own thermometer, name it \
              die_degc in [record.columns]; else record phase_rad, freq_hz or die_degc beside it. Until then firmware carries no cause, \
              and a formula in [[effects]] changes nothing"
         ));
@@ -83,14 +84,25 @@ pub fn obstacles(c: &Channels, model: &Model, estimates: &[Estimate]) -> Vec<Str
         let own = term.candidate.obstacle(c, &term.point);
         out.push(own.unwrap_or_else(|| {
             let id = term.id();
-            match term.candidate.sheet().compensable {
-                false => format!("firmware cannot know what {id} adds to a reading"),
-                true => format!(
+            let channels = term.candidate.channels_at(c, &term.point);
+            let of_time = channels.iter().any(|name| name == "time_s");
+            match (term.candidate.sheet().compensable, of_time) {
+                (false, true) => format!(
+                    "{id} depends on absolute time, which firmware does not know. If its source can be removed, remove it and record \
+                     again"
+                ),
+                (false, false) => format!("firmware cannot know what {id} adds to a reading"),
+                (true, _) => format!(
                     "{id}, as this record has it, needs a column that firmware does not see, or no polynomial that its words \
                      hold comes near to it"
                 ),
             }
         }));
+    }
+    if let (true, Some(last)) = (sees_bias, out.last_mut()) {
+        last.push_str(
+            ". For firmware of the polynomial alone use `gyrogen run`, with the same record and design",
+        );
     }
     out
 }
