@@ -1,6 +1,6 @@
 //! What firmware carries of a closed record's model.
 
-use super::Told;
+use super::{Told, rms_of};
 use crate::correction::{Formats, Plan, Term};
 use crate::design::Design;
 use crate::record::{ThermalRecord, Warning};
@@ -11,6 +11,10 @@ use crate::thermal::firmware;
 
 /// An error that is so many times another one is more: that of firmware beside the model's, or the declared one's.
 const MORE: f64 = 1.02;
+
+/// Firmware that leaves more than so many times what a constant leaves is worse than that, and not by chance: in white noise and in a
+/// walk, with one to six sweeps of the temperature, a polynomial left more than 1.7 times as much in one of a thousand.
+const WORSE: f64 = 2.0;
 
 /// Codes of what `intake` takes out of a record's readings, and firmware does not.
 const TAKEN_OUT: [&str; 3] = [
@@ -97,9 +101,35 @@ impl Told<'_> {
                 return None;
             }
         }
+        if let Some(told) = chosen.heldout_rms.and_then(|rms| self.unlike_readings(rms)) {
+            warnings.push(told);
+            return None;
+        }
         let behind = self.behind(&carried, warnings);
         warnings.extend(behind);
         Some(carried)
+    }
+
+    /// What is said where firmware makes the rows that choose, of which it leaves `firmware_dps` rms, worse than a constant does. The
+    /// constant is the median of the fitted rows: their mean may be as far off as the polynomial.
+    fn unlike_readings(&self, firmware_dps: f64) -> Option<Warning> {
+        let read = &self.whole.error_dps;
+        let fitted = read.iter().zip(&self.rows.fitted);
+        let fitted: Vec<f64> = fitted.filter(|(_, row)| **row).map(|(e, _)| *e).collect();
+        let middle = stats::median(&fitted);
+        let about: Vec<f64> = read.iter().map(|e| e - middle).collect();
+        let read_dps = rms_of(&about, &self.rows.choosing);
+        // Readings that are all the same have no error of their own, and firmware has its rounding.
+        let noise_dps = self.after.fit.noise.white_rms_dps;
+        (firmware_dps > WORSE * read_dps.hypot(noise_dps)).then(|| {
+            let said = format!(
+                "no firmware is written: of the rows that models are chosen by it would leave {} deg/s rms, and a constant leaves {}. \
+                 What is in the fitted rows is not in these. Look for fitted rows in which the gyro was turned, and cut them",
+                number(firmware_dps, 3),
+                number(read_dps, 3)
+            );
+            Warning::general("firmware_useless", said)
+        })
     }
 
     /// What is said where firmware leaves more than the model does.

@@ -150,8 +150,9 @@ mod tests {
     use crate::design::reader;
     use crate::thermal::close::close;
     use crate::thermal::search::Effort;
-    use crate::thermal::synthetic::{Random, record};
+    use crate::thermal::synthetic::{Random, record, triangle};
     use crate::verdict::{Closure, Verdict};
+    use std::ops::Range;
 
     fn closed(degc: &[f64], output: &[f64]) -> Closure {
         let record = record("die_degc", degc, output);
@@ -160,26 +161,69 @@ mod tests {
         closed.unwrap().closure
     }
 
-    /// Codes of what is said of a gyro that was turned at `turned_dps` in a tenth of its rows, over two cycles of temperature.
-    fn said(turned_dps: f64) -> Vec<&'static str> {
+    /// A gyro over two cycles of temperature that was turned at 50 deg/s in some of its 600 rows.
+    fn turned(rows: Range<usize>) -> Closure {
         let mut random = Random::new(3);
         let phase = |k: u32| f64::from(k) / 300.0 * std::f64::consts::TAU;
         let degc: Vec<f64> = (0..600).map(|k| 25.0 + 20.0 * phase(k).sin()).collect();
-        let rows = degc.iter().enumerate();
-        let output: Vec<f64> = rows
+        let output: Vec<f64> = (0..)
+            .zip(&degc)
             .map(|(k, t)| {
-                let turned = f64::from(u8::from((300..359).contains(&k)));
-                0.1 + 0.01 * t + turned_dps * turned + 0.01 * random.normal()
+                let turned = f64::from(u8::from(rows.contains(&k)));
+                0.1 + 0.01 * t + 50.0 * turned + 0.01 * random.normal()
             })
             .collect();
-        let warnings = closed(&degc, &output).warnings;
-        warnings.iter().map(|w| w.code).collect()
+        closed(&degc, &output)
+    }
+
+    fn message<'a>(closure: &'a Closure, code: &str) -> Option<&'a str> {
+        let mut said = closure.warnings.iter();
+        said.find(|w| w.code == code).map(|w| w.message.as_str())
     }
 
     #[test]
     fn a_gyro_that_was_turned_is_told_as_run_tells_it() {
-        assert!(said(50.0).contains(&"no_gain"), "{:?}", said(50.0));
-        assert!(!said(0.0).contains(&"no_gain"), "{:?}", said(0.0));
+        for (rows, is_told) in [(300..359, true), (0..0, false)] {
+            let closure = turned(rows);
+            assert_eq!(
+                message(&closure, "no_gain").is_some(),
+                is_told,
+                "{:?}",
+                closure.warnings
+            );
+        }
+    }
+
+    /// The turn lies within rows that are fitted: the polynomial goes through it, and is far off where the gyro was at rest.
+    #[test]
+    fn no_firmware_is_written_that_is_worse_than_a_constant() {
+        let closure = turned(321..399);
+        assert!(!closure.firmware.compensable);
+        let told = message(&closure, "firmware_useless").unwrap();
+        assert!(told.contains("and a constant leaves 0."), "{told}");
+        let at_rest = turned(0..0);
+        assert!(at_rest.firmware.compensable && message(&at_rest, "firmware_useless").is_none());
+    }
+
+    #[test]
+    fn what_firmware_does_not_know_is_told_with_what_to_do() {
+        let mut random = Random::new(5);
+        let degc = triangle(300);
+        let output: Vec<f64> = (0..)
+            .zip(&degc)
+            .map(|(k, t)| {
+                let pickup = (f64::from(k) * std::f64::consts::TAU / 17.3).sin();
+                0.5 - 0.02 * t + 0.1 * pickup + 0.01 * random.normal()
+            })
+            .collect();
+        let closure = closed(&degc, &output);
+        let told = message(&closure, "not_compensable").unwrap();
+        for part in [
+            "periodic_pickup depends on absolute time",
+            "the polynomial alone use `gyrogen run`",
+        ] {
+            assert!(told.contains(part), "{told}");
+        }
     }
     /// A play of 8 K between the die and what the bias follows: no effect of the catalogue.
     #[test]
