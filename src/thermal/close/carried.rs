@@ -86,8 +86,8 @@ impl Told<'_> {
         {
             let said = format!(
                 "the steps' coefficients cancel each other, and rounded to firmware's words they do so no more: they leave {with} \
-                 deg/s rms of the rows that models are chosen by, the declared model alone {without}. No firmware is written. Do the \
-                 experiment that separates the steps (`evidence` names it)",
+                 deg/s rms of the rows that models are chosen by, the polynomial alone {without}. No firmware is written. Do the \
+                 experiment that separates the steps (the table Evidence in report.html names it)",
                 with = number(with, 3),
                 without = number(without, 3)
             );

@@ -52,7 +52,7 @@ impl Told<'_> {
                 "undecided",
                 format!(
                     "{} explain the record equally well. It does not say which of them it is. Do the experiment that separates them \
-                     (`evidence` names it)",
+                     (the table Evidence in report.html names it)",
                     self.found.undecided.join(", ")
                 ),
             ));
@@ -62,9 +62,9 @@ impl Told<'_> {
             warnings.push(Warning::general(
                 "goes_with_temperature",
                 format!(
-                    "the declared bias in temperature may be that of {}. In this record these go with the thermometer, and nothing \
-                     tells them apart. `evidence` says which experiment does",
-                    hidden.join(", ")
+                    "the dependence on temperature may come from {} as well: this record cannot tell. The table Evidence in report.html \
+                     names the experiment that can",
+                    hidden.join(" or ")
                 ),
             ));
         }
