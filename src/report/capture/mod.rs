@@ -25,6 +25,7 @@ pub fn html(closed: &Closed, name: &str) -> Result<String> {
     let view = View::new(closed);
     let own = Own {
         finding: words::finding(&closed.closure),
+        has_others: true,
         lead: words::lead(&closed.closure),
         steps: words::steps(&closed.closure),
         figures: figures::all(&view),

@@ -63,6 +63,8 @@ pub struct Own {
     pub lead: String,
     /// In order.
     pub steps: Vec<TakenStep>,
+    /// Whether there is a channel that is neither the thermometer nor time.
+    pub has_others: bool,
     /// Residuals and steps.
     pub figures: Vec<Figure>,
     /// After the figures.
@@ -153,6 +155,7 @@ pub fn html_beside(closed: &Closed, beside: &Beside<'_>, name: &str) -> Result<S
         finding: tables::finding(&view),
         lead,
         steps: tables::steps(closed),
+        has_others: closed.channels.columns.keys().any(|name| name != "time_s"),
         figures: figures::all(&view),
         emitted: beside.emitted.map(Comparison::of),
         diff: beside.diff.map(|diff| Changes {
@@ -184,7 +187,7 @@ pub fn page(c: &Closure, name: &str, own: Own) -> Result<String> {
         errors: tables::errors(c),
         evidence: tables::evidence(c),
         weighed: weighed::figure(c),
-        measure: weighed::measure_next(c),
+        measure: weighed::measure_next(c, own.has_others),
         counted: Warning::counted(&c.warnings),
         warnings: c
             .warnings

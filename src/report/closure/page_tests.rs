@@ -5,6 +5,7 @@ use crate::design::reader;
 use crate::thermal::close::close;
 use crate::thermal::search::Effort;
 use crate::thermal::synthetic::{Random, record, triangle};
+use crate::verdict::Structure;
 
 const EFFORT: Effort = Effort {
     rows: 400,
@@ -130,4 +131,17 @@ fn held_out_blocks_are_those_of_the_split() {
         let inside = blocks.iter().any(|(a, b)| a < t && t < b);
         assert_eq!(inside, held, "{t}");
     }
+}
+
+#[test]
+fn a_channel_is_to_be_changed_by_itself_only_beside_another() {
+    let mut closed = closed(0.0, 120);
+    closed.closure.residual_structure = Structure {
+        left: true,
+        strongest_channel: Some("die_degc".to_owned()),
+    };
+    let said = |closed: &Closed| html(closed, "r.csv").unwrap().contains("changed by itself");
+    assert!(said(&closed));
+    closed.channels.columns.clear();
+    assert!(!said(&closed));
 }

@@ -89,13 +89,14 @@ fn drawn(scored: &[(&Evidence, f64)], width: f64) -> Figure {
     )
 }
 
-/// What to measure next where structure is left: a sentence each.
-pub fn measure_next(c: &Closure) -> Vec<String> {
+/// What to measure next where structure is left: a sentence each. `has_others` is whether the record has a channel besides its
+/// thermometer and time: else these were changed by themselves already.
+pub fn measure_next(c: &Closure, has_others: bool) -> Vec<String> {
     if !c.residual_structure.left {
         return Vec::new();
     }
     let mut out = Vec::new();
-    if let Some(channel) = &c.residual_structure.strongest_channel {
+    if let (Some(channel), true) = (&c.residual_structure.strongest_channel, has_others) {
         out.push(format!(
             "Repeat the run with {channel} changed by itself, all else held: what is left shows most there."
         ));
