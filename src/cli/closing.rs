@@ -275,20 +275,18 @@ fn with_deviation(value: f64, std: f64) -> String {
 fn sentence(c: &Closure) -> String {
     let names: Vec<&str> = c.steps.iter().map(|s| s.effect.as_str()).collect();
     let channel = c.residual_structure.strongest_channel.as_deref();
-    let channel = channel.map_or(String::new(), |c| format!(", most of it in {c}"));
+    let channel = channel.map_or(String::new(), |c| format!("; it depends most on {c}"));
     match c.verdict {
         Verdict::Complete => "complete: nothing beyond noise is left".to_owned(),
         Verdict::Explained => format!("explained by {}", names.join(", ")),
         Verdict::PartlyExplained => {
             format!(
-                "partly explained by {}; structure is left{channel}",
+                "partly explained by {}; an error is left that is more than noise{channel}",
                 names.join(", ")
             )
         }
         Verdict::Unexplained => {
-            let what = format!(
-                "unexplained: something is left that none of the known effects makes{channel}"
-            );
+            let what = format!("unexplained: an error is left that no known effect makes{channel}");
             let only = match c.firmware.compensable {
                 true => " The firmware subtracts the polynomial alone.",
                 false => "",
@@ -382,7 +380,7 @@ mod tests {
     fn what_is_unexplained_says_what_firmware_does_and_what_helps() {
         let said = sentence(&closure("deg/s", 0));
         for part in [
-            "most of it in die_degc.",
+            "no known effect makes; it depends most on die_degc.",
             "subtracts the polynomial alone",
             "[[effects]]",
         ] {
