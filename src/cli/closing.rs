@@ -152,7 +152,7 @@ fn causes(c: &Closure) {
     covariates(c);
 }
 
-/// What the declared bias and each cause add to the output.
+/// What the polynomial and each cause add to the output.
 fn contributions(c: &Closure, said: &Said) {
     say!(
         "what is in rate_out_dps{}:",

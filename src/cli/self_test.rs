@@ -107,7 +107,7 @@ fn print(o: &Outcome) {
     super::terminal::show(&table);
     say!(
         "found: named, or listed as indistinguishable, of records with an effect that leaves so many times the noise \
-         of a row ({} deg/s) beyond the declared model",
+         of a row ({} deg/s) beyond the polynomial",
         significant(o.noise.white_rms_dps, 3)
     );
     let sizes = o.effects.iter().flat_map(|e| &e.by_size);

@@ -53,7 +53,7 @@ fn sources(closed: &Closed) -> Vec<(String, Vec<f64>)> {
     let c = &closed.channels;
     let residual = |model: &crate::thermal::search::Model| whole(&model.residual(c));
     let mut out = vec![(
-        "what the declared model leaves".to_owned(),
+        "what the polynomial leaves".to_owned(),
         residual(&closed.before),
     )];
     if !closed.after.terms.is_empty() {

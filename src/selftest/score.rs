@@ -43,7 +43,7 @@ pub(super) fn scores(
             let limit = statistics::detected_from(&counts);
             let mut remark = case.remark.clone();
             if remark.is_empty() && counts.iter().all(|c| c.1 == 0) {
-                remark = "the experiment does not show it beyond the declared model".to_owned();
+                remark = "the experiment does not show it beyond the polynomial".to_owned();
             }
             EffectScore {
                 effect: case.kind.id(),

@@ -200,7 +200,7 @@ fn channels_of(
             format!(". If this column is one, add to [record.columns] of the design: {line}")
         });
         let said = format!(
-            "the record has no thermometer: the declared bias is a constant, and effects of temperature cannot be seen{help}"
+            "the record has no thermometer: the polynomial is a constant, and effects of temperature cannot be seen{help}"
         );
         warnings.push(Warning::general("no_thermometer", said));
         columns.insert(NONE.to_owned(), vec![0.0; record.len()]);
@@ -268,7 +268,7 @@ fn channels_of(
 fn behind(thermometer: &str, course: &repeated::Course) -> Warning {
     let said = format!(
         "{thermometer} has a new reading every {:.1} rows and repeats it in between. What the repeated ones are behind by \
-         makes {} deg/s rms of the declared bias. It is taken out before and after (causes are sought along straight lines \
+         makes {} deg/s rms of the polynomial. It is taken out before and after (causes are sought along straight lines \
          between new readings), but the firmware's error contains it. Read the thermometer as often as the output",
         course.rows,
         number(course.artefact_rms_dps, 3)
@@ -288,8 +288,8 @@ fn rounding(design: &Design, thermometer: &str, course: &Course) -> Warning {
         _ => String::new(),
     };
     let said = format!(
-        "{thermometer} is read in steps of {}{of_circuit}: their rounding makes {} deg/s rms of the declared \
-         bias. It is taken out before and after (causes are sought along the course between the steps); the \
+        "{thermometer} is read in steps of {}{of_circuit}: their rounding makes {} deg/s rms of the \
+         polynomial. It is taken out before and after (causes are sought along the course between the steps); the \
          firmware's error contains it: read the thermometer with more bits",
         number(course.step, 3),
         number(course.artefact_rms_dps, 3)

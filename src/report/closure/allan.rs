@@ -126,9 +126,9 @@ fn drawn(view: &View, curves: &[(&str, Vec<(f64, f64)>)], period_s: f64, width: 
     );
     let mut svg = Svg::new(width);
     let words = |class: &str| match (class, view.has_steps()) {
-        ("before", _) => "declared model alone",
+        ("before", _) => "polynomial alone",
         (_, true) => "with the causes",
-        _ => "less the declared model",
+        _ => "less the polynomial",
     };
     svg.legend(
         data.iter()

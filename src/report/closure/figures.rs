@@ -45,9 +45,9 @@ pub(super) fn series<'a>(view: &'a View) -> Vec<(&'static str, &'static str, &'a
 
 fn legend(view: &View) -> Vec<(&'static str, Swatch, String)> {
     let words = |name: &str| match name {
-        "before" => "declared model alone".to_owned(),
+        "before" => "polynomial alone".to_owned(),
         "after" => "with the causes".to_owned(),
-        _ => "less the declared model".to_owned(),
+        _ => "less the polynomial".to_owned(),
     };
     let shown = series(view).into_iter();
     shown
@@ -186,7 +186,7 @@ fn step(view: &View, k: usize, contribution: &Contribution, width: f64) -> Optio
     let shown = y.interval;
     let left = y.room();
     let mut svg = Svg::new(width);
-    let words = "readings, less the declared model and the other causes".to_owned();
+    let words = "readings, less the polynomial and the other causes".to_owned();
     svg.legend([
         ("before dots", DOT, words),
         ("after", Swatch::Line, "fitted shape".to_owned()),
@@ -204,7 +204,7 @@ fn step(view: &View, k: usize, contribution: &Contribution, width: f64) -> Optio
     let title = format!("Cause {}: {} over {}", k + 1, step.effect, abscissa.name);
     let equation = term.candidate.equation(&view.closed.channels, &term.point);
     let caption = format!(
-        "{}: {}. The deviation counts coefficients and shape, estimated together with the declared model and all other \
+        "{}: {}. The deviation counts coefficients and shape, estimated together with the polynomial and all other \
          causes: it is wide where those could take its place.{}{constant} {CROWDED}",
         step.effect, equation, abscissa.remark
     );
@@ -212,7 +212,7 @@ fn step(view: &View, k: usize, contribution: &Contribution, width: f64) -> Optio
 }
 
 /// The contribution less its mean where it is far from 0 throughout, as a gain times a supply voltage is, and a sentence that
-/// says so: the declared model's constant takes the mean up.
+/// says so: the polynomial's constant takes the mean up.
 fn without_constant(contribution: &Contribution) -> (Contribution, String) {
     let mut out = contribution.clone();
     let (least, greatest) = range(&out.value_dps);

@@ -37,6 +37,8 @@ use view::View;
 struct Page {
     name: String,
     headline: String,
+    /// What the causes are found beside.
+    base: &'static str,
     /// Class and text of the verdict's flag.
     flag: [&'static str; 2],
     unit: &'static str,
@@ -61,10 +63,10 @@ pub struct Own {
     pub finding: String,
     /// Over the table of errors.
     pub lead: String,
-    /// In order.
-    pub steps: Vec<TakenStep>,
     /// Whether there is a channel that is neither the thermometer nor time.
     pub has_others: bool,
+    /// In order.
+    pub steps: Vec<TakenStep>,
     /// Residuals and steps.
     pub figures: Vec<Figure>,
     /// After the figures.
@@ -153,9 +155,9 @@ pub fn html_beside(closed: &Closed, beside: &Beside<'_>, name: &str) -> Result<S
     );
     let own = Own {
         finding: tables::finding(&view),
+        has_others: closed.channels.columns.keys().any(|name| name != "time_s"),
         lead,
         steps: tables::steps(closed),
-        has_others: closed.channels.columns.keys().any(|name| name != "time_s"),
         figures: figures::all(&view),
         emitted: beside.emitted.map(Comparison::of),
         diff: beside.diff.map(|diff| Changes {
@@ -177,6 +179,7 @@ pub fn page(c: &Closure, name: &str, own: Own) -> Result<String> {
     let page = Page {
         name: name.to_owned(),
         headline: tables::headline(c),
+        base: tables::base(c),
         flag: match c.verdict {
             Verdict::Complete => ["good", "complete"],
             Verdict::Explained => ["good", "explained"],

@@ -115,8 +115,10 @@ fn contributions_are_the_models_with_the_reported_deviations() {
 fn a_record_without_anything_left_is_shown_as_complete() {
     let closed = closed(0.0, 120);
     let page = html(&closed, "r.csv").unwrap();
-    assert!(page.contains("Complete: the declared model leaves"));
-    assert!(page.contains("No effect was added"));
+    assert!(page.contains("Complete: the polynomial leaves"));
+    assert!(page.contains("No effect was added to the polynomial."));
+    // What the user did not declare is not called so.
+    assert!(!page.contains("declared model"));
     assert!(!page.contains("Cause 1"));
     assert!(!page.contains("NaN"));
 }

@@ -87,6 +87,14 @@ fn named(step: &Step) -> String {
     format!("{} (or {rivals})", step.effect)
 }
 
+/// What the causes are found beside: a record is fitted by a polynomial, the carriers of a capture are declared.
+pub fn base(c: &Closure) -> &'static str {
+    match c.unit {
+        "lsb" => "declared model",
+        _ => "polynomial",
+    }
+}
+
 /// The verdict with its figures, in a sentence.
 pub fn headline(c: &Closure) -> String {
     let names: Vec<String> = c.steps.iter().map(named).collect();
@@ -96,7 +104,7 @@ pub fn headline(c: &Closure) -> String {
     } else {
         "rises"
     };
-    let unit = c.unit_text();
+    let (unit, base) = (c.unit_text(), base(c));
     let change = if before == after {
         format!("the held-out error stays at {after} {unit} rms")
     } else {
@@ -104,7 +112,7 @@ pub fn headline(c: &Closure) -> String {
     };
     match c.verdict {
         Verdict::Complete => format!(
-            "Complete: the declared model leaves {before} {unit} rms on held-out rows, and nothing in it beyond noise."
+            "Complete: the {base} leaves {before} {unit} rms on held-out rows, and nothing in it beyond noise."
         ),
         Verdict::Explained => format!("Explained by {}: {change}.", listed(&names, "and")),
         Verdict::PartlyExplained => format!(
@@ -112,7 +120,7 @@ pub fn headline(c: &Closure) -> String {
             listed(&names, "and")
         ),
         Verdict::Unexplained => format!(
-            "Unexplained: the declared model leaves {before} {unit} rms on held-out rows, with structure that no named effect \
+            "Unexplained: the {base} leaves {before} {unit} rms on held-out rows, with structure that no named effect \
              accounts for."
         ),
     }
@@ -172,7 +180,7 @@ pub fn errors(c: &Closure) -> Vec<[String; 5]> {
             share(e.heldout_rms),
         ]
     };
-    let mut out = vec![row("declared model alone", &c.before)];
+    let mut out = vec![row(&format!("{} alone", base(c)), &c.before)];
     if !c.steps.is_empty() {
         out.push(row("with the causes", &c.after));
     }
@@ -191,7 +199,7 @@ pub fn errors(c: &Closure) -> Vec<[String; 5]> {
 /// Whether firmware could do it.
 pub fn firmware(c: &Closure) -> String {
     let compensable = if c.firmware.compensable {
-        "Firmware sees all that the declared model and the causes need."
+        "Firmware sees all that the polynomial and the causes need."
     } else {
         "No firmware was written: the warnings say why."
     };

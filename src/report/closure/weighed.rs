@@ -21,10 +21,10 @@ pub fn figure(c: &Closure) -> Option<Figure> {
     // Stable: among equals the order is the search's own.
     scored.sort_by(|a, b| b.1.total_cmp(&a.1));
     scored.truncate(DRAWN);
-    (!scored.is_empty()).then(|| one(|width| drawn(&scored, width)))
+    (!scored.is_empty()).then(|| one(|width| drawn(&scored, super::tables::base(c), width)))
 }
 
-fn drawn(scored: &[(&Evidence, f64)], width: f64) -> Figure {
+fn drawn(scored: &[(&Evidence, f64)], base: &str, width: f64) -> Figure {
     let names: Vec<String> = scored.iter().map(|(e, _)| e.effect.clone()).collect();
     let ends = scored.iter().map(|s| s.1).chain([0.0]);
     let interval = Interval::of(ends);
@@ -83,9 +83,11 @@ fn drawn(scored: &[(&Evidence, f64)], width: f64) -> Figure {
     svg.add(&frame);
     svg.figure(
         "What was close, and what lost",
-        "Each candidate alone beside the declared model, before any cause is in. A larger gain means that the record is likelier \
-         with the candidate, by a factor of e (2.7) for each 1 of it; p is the chance that the best of all candidates does \
-         as well where there is nothing. The table says why one was not taken.",
+        format!(
+            "Each candidate alone beside the {base}, before any cause is in. A larger gain means that the record is likelier \
+             with the candidate, by a factor of e (2.7) for each 1 of it; p is the chance that the best of all candidates does \
+             as well where there is nothing. The table says why one was not taken."
+        ),
     )
 }
 

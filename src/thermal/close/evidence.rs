@@ -43,7 +43,7 @@ impl Told<'_> {
                     true => (Fate::Rejected, "no size of it does better than none"),
                     false => (
                         Fate::NotExcited,
-                        "what it does lies within the declared model in this record",
+                        "what it does lies within the polynomial in this record",
                     ),
                 };
                 out.push(unjudged(candidate, fate, remark.to_owned()));
@@ -86,7 +86,7 @@ impl Told<'_> {
         }
         if j.p_value > LEVEL && self.search.is_declared(j) {
             let remark = format!(
-                "goes with the temperature in this record: the declared bias has whatever it does; {experiment}"
+                "goes with the temperature in this record: the polynomial has whatever it does; {experiment}"
             );
             return (Fate::Confounded, remark);
         }

@@ -225,6 +225,7 @@ mod tests {
             assert!(told.contains(part), "{told}");
         }
     }
+
     /// A play of 8 K between the die and what the bias follows: no effect of the catalogue.
     #[test]
     fn a_backlash_that_no_effect_makes_is_told_of_heating_and_cooling() {
