@@ -68,8 +68,9 @@ pub fn plan(
 pub fn obstacles(c: &Channels, model: &Model, estimates: &[Estimate]) -> Vec<String> {
     let mut words = Words::new(c, &model.acting, model.fit.noise.white_rms_dps);
     let mut out = Vec::new();
-    let sees_bias = model.bias.coefficients_dps.len() <= 1 || words.thermometer().is_some();
-    if !sees_bias {
+    // Without it `run` has no firmware either.
+    let has_thermometer = words.thermometer().is_some();
+    if model.bias.coefficients_dps.len() > 1 && !has_thermometer {
         let name = &c.thermometer;
         out.push(format!(
             "firmware does not see {name}, which the polynomial is a function of. If {name} is the gyro's own thermometer, name it \
@@ -99,7 +100,7 @@ pub fn obstacles(c: &Channels, model: &Model, estimates: &[Estimate]) -> Vec<Str
             }
         }));
     }
-    if let (true, Some(last)) = (sees_bias, out.last_mut()) {
+    if let (true, Some(last)) = (has_thermometer, out.last_mut()) {
         last.push_str(
             ". For firmware of the polynomial alone use `gyrogen run`, with the same record and design",
         );
