@@ -148,6 +148,7 @@ impl Told<'_> {
 #[cfg(test)]
 mod tests {
     use crate::design::reader;
+    use crate::record::ThermalRecord;
     use crate::thermal::close::close;
     use crate::thermal::search::Effort;
     use crate::thermal::synthetic::{Random, record, triangle};
@@ -155,9 +156,12 @@ mod tests {
     use std::ops::Range;
 
     fn closed(degc: &[f64], output: &[f64]) -> Closure {
-        let record = record("die_degc", degc, output);
+        closure(&record("die_degc", degc, output))
+    }
+
+    fn closure(record: &ThermalRecord) -> Closure {
         let design = reader::parse("", None).unwrap();
-        let closed = close(&record, Vec::new(), &design, "test", Effort::default());
+        let closed = close(record, Vec::new(), &design, "test", Effort::default());
         closed.unwrap().closure
     }
 
@@ -216,14 +220,25 @@ mod tests {
                 0.5 - 0.02 * t + 0.1 * pickup + 0.01 * random.normal()
             })
             .collect();
-        let closure = closed(&degc, &output);
-        let told = message(&closure, "not_compensable").unwrap();
+        let with = closed(&degc, &output);
+        let told = message(&with, "not_compensable").unwrap();
         for part in [
             "periodic_pickup depends on absolute time",
             "the polynomial alone use `gyrogen run`",
         ] {
             assert!(told.contains(part), "{told}");
         }
+        // `run` refuses a record without a thermometer.
+        let still: Vec<f64> = output
+            .iter()
+            .zip(&degc)
+            .map(|(o, t)| o + 0.02 * t)
+            .collect();
+        let mut bare = record("die_degc", &degc, &still);
+        bare.columns.remove("die_degc");
+        let without = closure(&bare);
+        let told = message(&without, "not_compensable").unwrap();
+        assert!(!told.contains("gyrogen run"), "{told}");
     }
 
     /// A play of 8 K between the die and what the bias follows: no effect of the catalogue.
