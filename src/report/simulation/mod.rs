@@ -216,11 +216,11 @@ fn facts(outcome: &Outcome) -> Vec<[String; 2]> {
         })
     };
     add(
-        "power-on: amplitude within 1 % of its final value",
+        "power-on: amplitude settled, 1 %",
         time(s.startup.amplitude_s),
     );
     add(
-        "power-on: phase within 0.1 deg of its final value",
+        "power-on: phase settled, 0.1 deg",
         time(s.startup.phase_s),
     );
     if s.lock.is_some() {
