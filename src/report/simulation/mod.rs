@@ -219,10 +219,7 @@ fn facts(outcome: &Outcome) -> Vec<[String; 2]> {
         "power-on: amplitude settled, 1 %",
         time(s.startup.amplitude_s),
     );
-    add(
-        "power-on: phase settled, 0.1 deg",
-        time(s.startup.phase_s),
-    );
+    add("power-on: phase settled, 0.1 deg", time(s.startup.phase_s));
     if s.lock.is_some() {
         add("power-on: frequency within 10 ppm", time(s.startup.lock_s));
     }
