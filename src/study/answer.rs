@@ -171,8 +171,8 @@ pub(super) fn answers(
             let worse = unlimited(work, &seen.good.get(l)?.verified.figures)?;
             let number = p.number;
             Some(format!(
-                "{target}: point {number} is worse than the given design in figures that you set no limit for: {worse}. Add limits for them to \
-                 what you require, such as `spur_dps<=0.1`"
+                "{target}: point {number} makes figures that you set no limit for more than one percent worse than with the given design: \
+                 {worse}"
             ))
         }));
         let reason = match point {
@@ -212,12 +212,14 @@ fn unlimited(work: &Reporting, figures: &Figures) -> Option<String> {
     let worse = limits
         .zip(work.instrument.limits())
         .filter_map(|((name, limit), (_, usual))| {
+            let usual = usual?;
             let (own, given) = (figures.of(name)?.abs(), work.own.of(name)?.abs());
             let text = || {
-                let [own, given] = [own, given].map(|v| number(v, 3));
-                format!("{} {own} (given {given})", name.name())
+                let [own, given, usual] = [own, given, usual].map(|v| number(v, 3));
+                let name = name.name();
+                format!("{name} {own} (given {given}; limit it with `{name}<={usual}`)")
             };
-            (limit.is_none() && own > usual?).then(text)
+            (limit.is_none() && own > usual).then(text)
         });
     let worse: Vec<String> = worse.collect();
     (!worse.is_empty()).then(|| worse.join(", "))

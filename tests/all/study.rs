@@ -412,7 +412,9 @@ fn a_limit_on_the_bias_is_met_by_the_cheapest_design_that_is_shown_to_meet_it() 
     good(&done);
     let notes = json(&bytes(&out))["notes"].to_string();
     assert!(
-        notes.contains("more than one percent worse: ") && notes.contains("noise_dps_rthz 0.00"),
+        notes.contains("more than one percent worse than with the given design: ")
+            && notes.contains("noise_dps_rthz 0.00")
+            && notes.contains("limit it with `noise_dps_rthz<=0.000"),
         "{notes}"
     );
     assert!(!notes.contains("bias_dps"), "{notes}");
