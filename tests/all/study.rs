@@ -414,7 +414,7 @@ fn a_limit_on_the_bias_is_met_by_the_cheapest_design_that_is_shown_to_meet_it() 
     assert!(
         notes.contains("more than one percent worse than with the given design: ")
             && notes.contains("noise_dps_rthz 0.00")
-            && notes.contains("limit it with `noise_dps_rthz<=0.000"),
+            && notes.contains("limit it with `noise_dps_rthz<=0.00"),
         "{notes}"
     );
     assert!(!notes.contains("bias_dps"), "{notes}");
