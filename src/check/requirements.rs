@@ -218,8 +218,8 @@ fn mend(
             value = number(value, 3)
         ),
         (None, Some((word, length, value))) => format!(
-            "no word alone mends it, the most does `{}` of {length} {} ({value}); `gyrogen study --for \"{name}<={:e}\"` \
-             looks for a design",
+            "no word alone mends it, the most does `{}` of {length} {} ({value}); `gyrogen study DESIGN --for \"{name}<={:e}\"`, \
+             with this design's file, looks for one that does",
             word.key(),
             word.counts(),
             limit.value,

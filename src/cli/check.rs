@@ -223,7 +223,7 @@ fn roundings(nodes: &[NodeCheck]) {
     super::terminal::show(&table);
     say!(
         "own rounding: the error that the word's rounding makes by itself. rate: what that adds to the rate, rms and mean. \
-         A word that is not here does not round."
+         Sine table, CORDIC and the compensation's input are not in this table; the whole error of the rate, below, has them too."
     );
 }
 

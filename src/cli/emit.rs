@@ -160,7 +160,7 @@ fn lacks_compensation(text: &str) -> String {
 pub(super) fn lacks_correction(what: &str) -> String {
     format!(
         "warning: the design has a [correction], which the firmware written here ({what}) does not contain: \
-         `gyrogen emit --part correction` emits it"
+         `gyrogen emit --part correction`, with the same design and language, emits it"
     )
 }
 

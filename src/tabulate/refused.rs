@@ -82,7 +82,11 @@ fn in_the_way(function: &Function, codes: Codes, request: &Request, bound: f64) 
     let limits = limits(request).into_iter();
     let mut tried = limits.filter_map(|(name, without)| Some((name, found(&without)?)));
     if let Some((name, then)) = tried.next() {
-        return format!("`{name}` is in the way: without it, {then}");
+        // The polynomial is also the form of a request that names none.
+        return match name.starts_with("--form") {
+            true => format!("give `--form auto`: {then}"),
+            false => format!("`{name}` is in the way: without it, {then}"),
+        };
     }
     let finer = |more: u32| {
         let output = Format {
