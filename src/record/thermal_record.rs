@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// A distance of rows that is longer than so many usual ones parts two groups (convention).
-const GAP: f64 = 5.0;
+const GAP_STEPS: f64 = 5.0;
 
 /// "42 s", "50 min", "9.57 h".
 fn duration(s: f64) -> String {
@@ -194,7 +194,10 @@ impl ThermalRecord {
         let steps: Vec<f64> = self.time_s.windows(2).map(|w| w[1] - w[0]).collect();
         let usual = stats::median(&steps);
         let span: f64 = steps.iter().sum();
-        let gaps: Vec<f64> = steps.into_iter().filter(|s| *s > GAP * usual).collect();
+        let gaps: Vec<f64> = steps
+            .into_iter()
+            .filter(|s| *s > GAP_STEPS * usual)
+            .collect();
         let between = gaps.iter().fold(0.0, |m: f64, s| m.max(*s));
         let (time, usual_s) = (duration(span), number(usual, 4));
         // Else most of the time has rows, and a gap is no part of the plan.

@@ -170,8 +170,8 @@ pub fn lattice_step(values: &[f64]) -> Option<f64> {
     (on as f64 >= 0.98 * distinct.len() as f64).then_some(step)
 }
 
-/// Share of the distances of even levels that are whole numbers of their step: a few levels may be odd.
-const ON_GRID: f64 = 0.8;
+/// Share of the distances of even levels that are whole numbers of their step: a few levels may be odd (convention).
+const ON_GRID_SHARE: f64 = 0.8;
 
 /// The step of ascending levels that lie evenly, but for a few: the lower quartile of their distances. `None` where they do not.
 pub fn even_step(levels: &[f64]) -> Option<f64> {
@@ -183,7 +183,7 @@ pub fn even_step(levels: &[f64]) -> Option<f64> {
         (steps - steps.round()).abs() < 0.05 && steps.round() >= 1.0
     };
     let on_grid = gaps.iter().filter(whole).count();
-    (step > 0.0 && on_grid as f64 >= ON_GRID * gaps.len() as f64).then_some(step)
+    (step > 0.0 && on_grid as f64 >= ON_GRID_SHARE * gaps.len() as f64).then_some(step)
 }
 
 /// How many different values were measured.

@@ -11,7 +11,7 @@ pub const DRIFT_BINS: usize = 24;
 const NO_GAIN: f64 = 0.9;
 
 /// Share of the rates' range that a turn passes from one reading to the next when it begins, and a drift does not (convention).
-const TURN: f64 = 0.25;
+const TURN_SHARE: f64 = 0.25;
 
 /// Greatest minus least of the means over bins of the thermometer; of pairs of its reading and a rate.
 pub fn drift_pp(readings: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
@@ -64,7 +64,7 @@ pub fn warning(
     let rates: Vec<f64> = readings.map(|r| r[1]).collect();
     let (low, high) = crate::statistics::stats::extremes(&rates)?;
     let mut pairs = rates.windows(2);
-    let is_turned = pairs.any(|pair| (pair[1] - pair[0]).abs() > TURN * (high - low));
+    let is_turned = pairs.any(|pair| (pair[1] - pair[0]).abs() > TURN_SHARE * (high - low));
     (!has_loop || is_turned).then(|| {
         let said = format!(
             "the compensation takes nothing of the drift off: the rate runs from {} to {} deg/s before it and varies as much after it. \

@@ -8,20 +8,21 @@ use crate::record::{ThermalRecord, Warning};
 use crate::statistics::stats;
 use crate::text::{constant, number};
 
-/// Values are the same up to this part of the largest: the last digit of single precision.
-const SAME: f64 = 3e-7;
+/// Values are the same up to this part of the largest: five times the rounding of single precision, 2^-24.
+const SAME_SHARE: f64 = 3e-7;
 
-/// The levels that hold so many of the rows show the step: odd rows are among the others.
-const USUAL_ROWS: f64 = 0.9;
+/// The levels that hold so many of the rows show the step: odd rows are among the others (convention).
+const USUAL_ROWS_SHARE: f64 = 0.9;
 
-/// Fewest rows for each level, on average.
+/// Fewest rows for each level, on average (convention).
 const ROWS_A_LEVEL: usize = 2;
 
-/// From this noise on, in steps and with what rounding adds to it, rounding is white.
-const DITHERS: f64 = 0.5;
+/// From this noise on, in steps and with what rounding adds to it, rounding is white: noise of 0.41 steps and the rounding's 0.29. What is
+/// left of the rounding's course, exp(-2 pi^2 0.41^2) / pi, is 1 % of a step (derived; Widrow and Kollar).
+const DITHERS_STEPS: f64 = 0.5;
 
-/// Residuals of less than this part of the rounding are of a course that goes in even steps by itself.
-const LEAST_SEEN: f64 = 0.25;
+/// Residuals of less than this part of the rounding are of a course that goes in even steps by itself (convention).
+const LEAST_SEEN_SHARE: f64 = 0.25;
 
 /// The steps of a rate.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,8 +45,9 @@ impl RateSteps {
             .collect();
         let step_dps = step_of(output)?;
         let steps = RateSteps { step_dps };
-        let is_dithered = stats::difference_noise(residuals_dps) >= DITHERS * step_dps;
-        let is_seen = stats::robust_std(residuals_dps) > LEAST_SEEN * steps.rounding_rms_dps();
+        let is_dithered = stats::difference_noise(residuals_dps) >= DITHERS_STEPS * step_dps;
+        let is_seen =
+            stats::robust_std(residuals_dps) > LEAST_SEEN_SHARE * steps.rounding_rms_dps();
         (is_seen && !is_dithered).then_some(steps)
     }
 
@@ -73,7 +75,7 @@ impl RateSteps {
 fn step_of(mut values: Vec<f64>) -> Option<f64> {
     values.retain(|v| !v.is_nan());
     values.sort_unstable_by(f64::total_cmp);
-    let same = SAME * values.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+    let same = SAME_SHARE * values.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
     let mut levels: Vec<(f64, usize)> = Vec::new();
     for v in &values {
         match levels.last_mut() {
@@ -87,7 +89,7 @@ fn step_of(mut values: Vec<f64>) -> Option<f64> {
     levels.sort_by_key(|(_, rows)| std::cmp::Reverse(*rows));
     let mut rows = 0;
     let usual = levels.iter().take_while(|(_, held)| {
-        let is_usual = (rows as f64) < USUAL_ROWS * values.len() as f64;
+        let is_usual = (rows as f64) < USUAL_ROWS_SHARE * values.len() as f64;
         rows += held;
         is_usual
     });

@@ -99,7 +99,7 @@ impl Loop {
     }
 }
 
-/// Most terms of the loop that is tested.
+/// Most terms of the loop that is tested (convention).
 const MOST_TERMS: usize = 6;
 
 /// Far out, because the memory of the noise is itself an estimate.
