@@ -121,7 +121,7 @@ fn by_blocks(
         seconds += start.elapsed().as_secs_f64();
         for (rows, sum) in rows.iter_mut().zip(&mut sums) {
             if let Rows::Integer(words) = rows {
-                let add = |sum, word: &i128| common::with_word(sum, *word as u32);
+                let add = |sum, word: &i64| common::with_word(sum, *word as u32);
                 *sum = words.iter().fold(*sum, add);
                 words.clear();
             }

@@ -15,9 +15,6 @@ use std::time::Instant;
 mod common;
 use common::{Contestant, RUNS};
 
-/// Samples that are processed at a time, as `gyrogen replay` does.
-const BLOCK: usize = 1 << 16;
-
 enum Run {
     Here(Instructions),
     Program(PathBuf, &'static str),
@@ -29,6 +26,9 @@ fn main() {
     let text = include_str!("opponents/chain.toml");
     let design = reader::parse(text, None).expect("the benchmark's design");
     let (drive, sense) = common::capture(samples);
+    // As the opponents have them.
+    let [drive, sense] =
+        [drive, sense].map(|codes| codes.iter().map(|c| *c as i16).collect::<Vec<i16>>());
     let folder = tempfile::tempdir().expect("a folder for the programs");
     let cases = [
         ("coherent tuning word", common::COHERENT_WORD, 0),
@@ -82,19 +82,16 @@ fn contestants(folder: &Path, dropped: u32) -> Vec<Contestant<Run>> {
     all
 }
 
-fn here(design: &Design, with: Instructions, drive: &[i32], sense: &[i32]) -> (f64, u64) {
+fn here(design: &Design, with: Instructions, drive: &[i16], sense: &[i16]) -> (f64, u64) {
     // Memory that has been written to, as the opponents have it.
     let mut rows = Rows::Integer(vec![1; drive.len() / 64 * 8]);
     let mut seconds = f64::INFINITY;
     for _ in 0..RUNS {
         let mut engine = engine_with(design, ArithmeticKind::Fixed, with);
-        if let Rows::Integer(words) = &mut rows {
-            words.clear();
-        }
+        rows.clear();
         let start = Instant::now();
-        for (d, s) in drive.chunks(BLOCK).zip(sense.chunks(BLOCK)) {
-            engine.process(d, s, &mut rows).expect("no cast stops");
-        }
+        let done = engine.process_16_bits(drive, sense, &mut rows);
+        done.expect("no cast stops");
         seconds = seconds.min(start.elapsed().as_secs_f64());
     }
     let mut checksum = common::NO_WORDS;

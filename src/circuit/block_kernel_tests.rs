@@ -2,7 +2,7 @@
 
 use crate::circuit::block_kernel::{BlockKernel, Instructions};
 use crate::circuit::chain::Chain;
-use crate::circuit::engine::{ArithmeticKind, engine_with, lane_bits};
+use crate::circuit::engine::{ArithmeticKind, engine, engine_with, lane_bits};
 use crate::design::template::default_design;
 use crate::design::{Design, LoopGain, PhaseLoop, limits};
 use crate::numeric::format::{Format, Overflow, Quantizer, Rounding};
@@ -163,4 +163,27 @@ fn every_instruction_set_gives_the_bits_of_the_blocks() {
         three > 40 && with_kernel * 3 > three,
         "{with_kernel} of {three}"
     );
+}
+
+#[test]
+fn codes_of_16_bits_give_the_rows_of_the_same_codes_widened() {
+    let design = default_design();
+    let mut draw = Draw(0);
+    for count in [0, 1, 2047, 2048, 2049, 3 * 2048 + 17] {
+        let [drive, sense] = [(); 2].map(|()| codes(&mut draw, design.circuit.adc.format, count));
+        let narrow = |codes: &[i32]| codes.iter().map(|c| *c as i16).collect::<Vec<i16>>();
+        let mut both = [(); 2].map(|()| engine(&design, ArithmeticKind::Fixed));
+        let mut rows = both.each_ref().map(|engine| engine.no_rows());
+        let [wide, of_16_bits] = &mut both;
+        let [due, found] = &mut rows;
+        // The second round starts where the first left the state.
+        for _ in 0..2 {
+            wide.process(&drive, &sense, due).expect("saturates");
+            of_16_bits
+                .process_16_bits(&narrow(&drive), &narrow(&sense), found)
+                .expect("saturates");
+        }
+        assert_eq!(found, due, "{count} codes");
+        assert_eq!(due.raw().map(|r| r.is_empty()), Some(count < 32));
+    }
 }

@@ -118,17 +118,37 @@ impl<W: HasKernel, R: Lane, const IDLE: bool> Ends for Fixed<W, R, IDLE> {
         self.overflowed()
     }
     fn no_rows() -> Rows {
-        Rows::Integer(Vec::new())
+        if W::BITS <= 64 {
+            Rows::Integer(Vec::new())
+        } else {
+            Rows::Wide(Vec::new())
+        }
     }
     fn put(row: &Row<W>, tuning: Option<R>, phase_bits: u32, _scale: &FloatScale, rows: &mut Rows) {
-        let Rows::Integer(rows) = rows else { return };
-        rows.extend(row.channels.iter().map(|w| w.wide()));
-        rows.extend([row.phase.wide(), row.magnitude.wide()]);
-        rows.extend(row.compensation.map(|[_, rate]| rate.wide()));
-        rows.extend(tuning.map(|t| t.wide() & ((1 << phase_bits) - 1)));
-        rows.extend(row.gain.map(|g| g.wide()));
-        rows.extend(row.in_range.map(|w| w.wide()));
+        let tuning = tuning.map(|t| t.wide() & ((1 << phase_bits) - 1));
+        match rows {
+            Rows::Integer(rows) if W::BITS <= 64 => append(row, tuning, rows, |word| word as i64),
+            Rows::Wide(rows) => append(row, tuning, rows, |word| word),
+            _ => {}
+        }
     }
+}
+
+/// Appends a row of raw words.
+#[inline(always)]
+fn append<W: Lane, T>(
+    row: &Row<W>,
+    tuning: Option<i128>,
+    rows: &mut Vec<T>,
+    of: impl Fn(i128) -> T,
+) {
+    let word = |w: W| of(w.wide());
+    rows.extend(row.channels.map(word));
+    rows.extend([row.phase, row.magnitude].map(word));
+    rows.extend(row.compensation.map(|[_, rate]| word(rate)));
+    rows.extend(tuning.map(&of));
+    rows.extend(row.gain.map(word));
+    rows.extend(row.in_range.map(word));
 }
 
 impl Ends for Float {

@@ -7,6 +7,7 @@ use super::chain::{Chain, FastState, Held, SlowState};
 use super::ends::{Ends, FloatScale, quantised};
 use super::float_kernel::FloatKernel;
 use super::row_batch::{RowBatch, Stages};
+pub use super::rows::{Rows, columns};
 use crate::design::Design;
 use crate::numeric::arithmetic::{Arithmetic, Block};
 use crate::numeric::fixed::{Fixed, Overflowed};
@@ -22,14 +23,8 @@ pub enum ArithmeticKind {
     Float,
 }
 
-/// Decimated samples, row after row, in the columns of [`columns`].
-#[derive(Debug, Clone, PartialEq)]
-pub enum Rows {
-    /// Raw integers.
-    Integer(Vec<i128>),
-    /// Real values: 1, turns, deg/s, Hz.
-    Real(Vec<f64>),
-}
+/// Codes of 16 bits that are widened at a time: 16 KiB, which stay in the first-level cache (convention).
+const WIDENED_CODES: usize = 1 << 11;
 
 /// A chain with its state. Feeding it in pieces of any size gives the same rows.
 pub trait Engine {
@@ -43,6 +38,29 @@ pub trait Engine {
         sense: &[i32],
         rows: &mut Rows,
     ) -> Result<(), Box<Overflowed>>;
+    /// The same for codes of at most 16 bits as they stand in memory or in a file: of half the memory, which is what
+    /// the speed over long arrays depends on.
+    ///
+    /// # Errors
+    /// As [`Engine::process`].
+    fn process_16_bits(
+        &mut self,
+        drive: &[i16],
+        sense: &[i16],
+        rows: &mut Rows,
+    ) -> Result<(), Box<Overflowed>> {
+        let mut wide = [[0i32; WIDENED_CODES]; 2];
+        for (d, s) in drive.chunks(WIDENED_CODES).zip(sense.chunks(WIDENED_CODES)) {
+            for (to, from) in wide.iter_mut().zip([d, s]) {
+                for (to, from) in to.iter_mut().zip(from) {
+                    *to = i32::from(*from);
+                }
+            }
+            let [drive, sense] = &wide;
+            self.process(&drive[..d.len()], &sense[..s.len()], rows)?;
+        }
+        Ok(())
+    }
     /// The same for ADC inputs in LSB. The bit-accurate engine quantises them as an ideal ADC does
     /// (nearest, ties up, saturating); the one without quantisation takes them as they are, and a whole
     /// period at once by `float_kernel`, which rounds elsewhere than its samples one by one.
@@ -93,37 +111,6 @@ pub struct Excitation {
     pub step: u64,
     /// Drive gain, 0 to 1; `None` without an amplitude loop.
     pub gain: Option<f64>,
-}
-
-/// The columns of a row after `index`, in the contract's order.
-pub fn columns(design: &Design) -> Vec<&'static str> {
-    let mut columns = super::CHANNELS.to_vec();
-    columns.extend(["phase", "magnitude"]);
-    if has_rate(design) {
-        columns.push("rate");
-    }
-    if design.circuit.phase_loop.is_some() {
-        columns.push("tuning_word");
-    }
-    if design.circuit.amplitude_loop.is_some() {
-        columns.push("gain");
-    }
-    if has_rate(design) && is_flagged(design) {
-        columns.push("in_range");
-    }
-    columns
-}
-
-fn has_rate(design: &Design) -> bool {
-    design
-        .compensation
-        .as_ref()
-        .is_some_and(|c| c.input.is_of_chain())
-}
-
-fn is_flagged(design: &Design) -> bool {
-    let compensation = design.compensation.as_ref();
-    compensation.is_some_and(|c| c.flagged_range().is_some())
 }
 
 /// The engine of a design, with the fastest instructions that the processor has.
@@ -212,11 +199,14 @@ fn with_stages<const N: usize>(
     let kernel = narrow
         .then(|| BlockKernel::new(&chain, instructions))
         .flatten();
-    let batch = (narrow && bits.slow <= 64)
+    // A tuning word is an unsigned number: of 64 bits it needs one more.
+    let tunes_64_bits = chain.phase_loop.is_some() && chain.nco.ring.bits > 63;
+    let slow_is_narrow = bits.slow <= 64 && !tunes_64_bits;
+    let batch = (narrow && slow_is_narrow)
         .then(|| RowBatch::new(&mut chain, instructions))
         .flatten();
     let parts = (chain, float_scale, (kernel, batch));
-    match (narrow, idle, bits.slow <= 64) {
+    match (narrow, idle, slow_is_narrow) {
         (true, true, true) => fixed::<Fixed<i64, i64, true>, Fixed<i64, i64>, N>(parts),
         (true, true, false) => fixed::<Fixed<i64, i64, true>, Fixed<i128, i64>, N>(parts),
         (true, false, true) => fixed::<Fixed<i64, i64>, Fixed<i64, i64>, N>(parts),

@@ -33,6 +33,7 @@ pub mod nco;
 pub mod phase_loop;
 mod row_batch;
 mod row_blocks;
+mod rows;
 mod sample_lanes;
 #[cfg(target_arch = "x86_64")]
 mod sample_lanes_x86;

@@ -39,7 +39,7 @@ pub trait Stages {
     /// The CORDIC: appends phase and magnitude.
     fn rotate(&self, decimated: &[Decimated], to: &mut Vec<Polar>);
     /// The compensation: appends the rows, in the contract's columns.
-    fn put(&self, decimated: &[Decimated], polar: &[Polar], rows: &mut Vec<i128>);
+    fn put(&self, decimated: &[Decimated], polar: &[Polar], rows: &mut Vec<i64>);
 }
 
 /// The slow rate of a chain, with sums that wait for their rows.
@@ -89,7 +89,7 @@ impl<const N: usize> RowBatch<N> {
     }
 
     /// Takes the sums of one row. Appends the rows that wait once they are many.
-    pub fn push(&mut self, sums: Front, rows: &mut Vec<i128>) {
+    pub fn push(&mut self, sums: Front, rows: &mut Vec<i64>) {
         if let Some(to) = self.sums.get_mut(self.count) {
             *to = sums;
         }
@@ -100,7 +100,7 @@ impl<const N: usize> RowBatch<N> {
     }
 
     /// Appends the rows that wait.
-    pub fn put_waiting(&mut self, rows: &mut Vec<i128>) {
+    pub fn put_waiting(&mut self, rows: &mut Vec<i64>) {
         if self.count > 0 {
             let sums = self.sums.get(..self.count).unwrap_or(&self.sums);
             let (cic, combs) = (&self.cic, &mut self.combs);
@@ -123,7 +123,7 @@ impl<const N: usize> Stages for RowBatch<N> {
         within(self.instructions, Rotating(&self.tail, decimated, to));
     }
 
-    fn put(&self, decimated: &[Decimated], polar: &[Polar], rows: &mut Vec<i128>) {
+    fn put(&self, decimated: &[Decimated], polar: &[Polar], rows: &mut Vec<i64>) {
         let putting = Putting(&self.tail, decimated, polar, rows);
         within(self.instructions, putting);
     }
@@ -137,7 +137,7 @@ impl Tail {
     }
 
     #[inline(always)]
-    fn rows(&self, decimated: &Decimated, [phase, magnitude]: &Polar, rows: &mut Vec<i128>) {
+    fn rows(&self, decimated: &Decimated, [phase, magnitude]: &Polar, rows: &mut Vec<i64>) {
         let [drive_i, drive_q, sense_i, sense_q] = &decimated.channels;
         let blocks = (self.compensation.as_ref(), self.in_range.as_ref());
         let (compensation, in_range) = compensated(&Batch::<WIDTH>, blocks, *sense_i, [*phase]);
@@ -154,11 +154,11 @@ impl Tail {
 
 /// Appends the first `count` rows of these columns.
 #[inline(always)]
-fn put<const C: usize>(columns: [&Words; C], count: usize, rows: &mut Vec<i128>) {
+fn put<const C: usize>(columns: [&Words; C], count: usize, rows: &mut Vec<i64>) {
     let mut all = [[0; C]; WIDTH];
     for (k, row) in all.iter_mut().enumerate() {
         for (to, column) in row.iter_mut().zip(columns) {
-            *to = i128::from(column[k]);
+            *to = column[k];
         }
     }
     rows.extend_from_slice(all[..count.min(WIDTH)].as_flattened());
@@ -210,7 +210,7 @@ impl<const N: usize> NullaryFnOnce for Combing<'_, N> {
 }
 
 /// Both later stages of some rows.
-struct Whole<'a>(&'a Tail, &'a Decimated, &'a mut Vec<i128>);
+struct Whole<'a>(&'a Tail, &'a Decimated, &'a mut Vec<i64>);
 
 impl NullaryFnOnce for Whole<'_> {
     type Output = ();
@@ -238,7 +238,7 @@ impl NullaryFnOnce for Rotating<'_> {
 }
 
 /// [`Stages::put`].
-struct Putting<'a>(&'a Tail, &'a [Decimated], &'a [Polar], &'a mut Vec<i128>);
+struct Putting<'a>(&'a Tail, &'a [Decimated], &'a [Polar], &'a mut Vec<i64>);
 
 impl NullaryFnOnce for Putting<'_> {
     type Output = ();

@@ -278,10 +278,8 @@ fn rate(samples: u64, time: Duration) -> f64 {
 /// Writes and clears the rows; gives the next row's index.
 fn write(rows: &mut Rows, columns: usize, mut index: u64, writer: &mut RowWriter) -> Result<u64> {
     match rows {
-        Rows::Integer(words) => {
-            index = writer.write_numbered_integers(index, words, columns)?;
-            words.clear();
-        }
+        Rows::Integer(words) => index = writer.write_numbered_integers(index, words, columns)?,
+        Rows::Wide(words) => index = writer.write_numbered_integers(index, words, columns)?,
         Rows::Real(values) => {
             let mut line = Vec::with_capacity(columns + 1);
             for row in values.chunks_exact(columns) {
@@ -291,9 +289,9 @@ fn write(rows: &mut Rows, columns: usize, mut index: u64, writer: &mut RowWriter
                 writer.write_floats(&line)?;
                 index += 1;
             }
-            values.clear();
         }
     }
+    rows.clear();
     Ok(index)
 }
 

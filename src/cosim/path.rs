@@ -98,17 +98,11 @@ impl Units {
     /// The row in physical units; `drive` is what its samples were taken under.
     fn row(&self, rows: &Rows, drive: Drive) -> RealRow {
         let mut row = [0.0; 9];
+        let at = row.iter_mut().take(self.columns);
         match rows {
-            Rows::Integer(words) => {
-                for (to, from) in row.iter_mut().zip(words.iter().take(self.columns)) {
-                    *to = real(*from);
-                }
-            }
-            Rows::Real(values) => {
-                for (to, from) in row.iter_mut().zip(values.iter().take(self.columns)) {
-                    *to = *from;
-                }
-            }
+            Rows::Integer(words) => at.zip(words).for_each(|(to, word)| *to = *word as f64),
+            Rows::Wide(words) => at.zip(words).for_each(|(to, word)| *to = *word as f64),
+            Rows::Real(values) => at.zip(values).for_each(|(to, value)| *to = *value),
         }
         let [a, b, c, d, ..] = row;
         RealRow {
@@ -119,23 +113,6 @@ impl Units {
             freq_hz: drive.step as i64 as f64 * pow2(-64) * self.sample_rate_hz,
             gain: drive.gain,
         }
-    }
-}
-
-/// The nearest f64 of a word, most of which have at most 64 bits. The others are apart, as a compiler takes the
-/// conversion of 128 bits, a call, for both.
-#[inline]
-fn real(word: i128) -> f64 {
-    #[cold]
-    #[inline(never)]
-    fn wide(word: i128) -> f64 {
-        word as f64
-    }
-    let low = word as i64;
-    if i128::from(low) == word {
-        low as f64
-    } else {
-        wide(word)
     }
 }
 
@@ -278,7 +255,7 @@ impl Path {
             noise.fill(self.sample, self.noise.each_mut().map(|n| &mut n[..]));
         }
         self.sample += self.drive_lsb.len() as u64;
-        clear(&mut self.rows);
+        self.rows.clear();
         let [drive_adc, sense_adc] = &self.converters;
         let [drive_noise, sense_noise] = &self.noise;
         match self.kind {
@@ -298,7 +275,7 @@ impl Path {
         .map_err(stopped)?;
         self.last_drive = drive;
         if !self.others.is_empty() {
-            self.other_rows.iter_mut().for_each(clear);
+            self.other_rows.iter_mut().for_each(Rows::clear);
             let mut result = Ok(());
             let front = [self.engine.front()];
             self.others
@@ -315,13 +292,6 @@ impl Path {
     /// The codes of the last period, drive and sense (bit-accurate path only).
     pub fn codes(&self) -> [&[i32]; 2] {
         [&self.codes[0], &self.codes[1]]
-    }
-}
-
-fn clear(rows: &mut Rows) {
-    match rows {
-        Rows::Integer(words) => words.clear(),
-        Rows::Real(values) => values.clear(),
     }
 }
 

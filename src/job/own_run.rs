@@ -204,6 +204,10 @@ impl OwnRun {
                 .chunks_exact(columns)
                 .map(|r| row(r[SENSE_I] as f64 * lsb, r[column] as f64 * integer))
                 .collect(),
+            Rows::Wide(words) => words
+                .chunks_exact(columns)
+                .map(|r| row(r[SENSE_I] as f64 * lsb, r[column] as f64 * integer))
+                .collect(),
             Rows::Real(values) => values
                 .chunks_exact(columns)
                 .map(|r| row(r[SENSE_I], r[column] * real))
@@ -291,7 +295,8 @@ impl OwnRun {
             .process(&self.stream.drive, &self.stream.sense, &mut rows)
             .map_err(|o| Error::Check(o.to_string()))?;
         let fixed: Vec<i64> = match rows {
-            Rows::Integer(words) => words.iter().map(|w| *w as i64).collect(),
+            Rows::Integer(words) => words,
+            Rows::Wide(words) => words.iter().map(|w| *w as i64).collect(),
             Rows::Real(_) => Vec::new(),
         };
         Ok(self.mean_column(&fixed, columns, rate, lsb))

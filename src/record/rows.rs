@@ -106,7 +106,7 @@ impl RowWriter {
     pub fn write_numbered_integers(
         &mut self,
         first: u64,
-        rows: &[i128],
+        rows: &[impl Copy + Into<i128>],
         columns: usize,
     ) -> Result<u64> {
         let mut index = first;
@@ -117,13 +117,14 @@ impl RowWriter {
                 self.buffer.reserve(8 * row.len() + 8);
                 self.buffer.extend_from_slice(&index.to_le_bytes());
                 for &word in row {
-                    self.buffer.extend_from_slice(&(word as i64).to_le_bytes());
+                    self.buffer
+                        .extend_from_slice(&(word.into() as i64).to_le_bytes());
                 }
                 self.end_row()?;
             } else {
                 line.clear();
                 line.push(i128::from(index));
-                line.extend_from_slice(row);
+                line.extend(row.iter().map(|&word| word.into()));
                 self.write_integers(&line)?;
             }
             index += 1;

@@ -78,7 +78,7 @@ fn the_circuit_reads_the_tone_and_what_is_added() {
         let full_scale = -design.circuit.adc.format.min_raw() as f64;
         for [i, q] in tones(20, 0.5 * full_scale) {
             let mut engine = engine(&design, ArithmeticKind::Fixed);
-            let mut rows = Rows::Integer(Vec::new());
+            let mut rows = engine.no_rows();
             // The phase advances before each sample.
             let sense: Vec<f64> = (1..=8 * 32)
                 .map(|n| {
@@ -89,9 +89,7 @@ fn the_circuit_reads_the_tone_and_what_is_added() {
             engine
                 .process_inputs(&vec![0.0; sense.len()], &sense, &mut rows)
                 .unwrap();
-            let Rows::Integer(rows) = rows else {
-                panic!("integers")
-            };
+            let rows = rows.raw().expect("integers");
             let last = &rows[rows.len() - columns(&design).len()..];
             let added = rounding.added([i, q]);
             for (k, tone) in [i, q].into_iter().enumerate() {
