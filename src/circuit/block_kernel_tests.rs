@@ -167,7 +167,7 @@ fn every_instruction_set_gives_the_bits_of_the_blocks() {
 
 #[test]
 fn codes_of_16_bits_give_the_rows_of_the_same_codes_widened() {
-    let design = default_design();
+    let design = default_design().expect("the embedded design");
     let mut draw = Draw(0);
     for count in [0, 1, 2047, 2048, 2049, 3 * 2048 + 17] {
         let [drive, sense] = [(); 2].map(|()| codes(&mut draw, design.circuit.adc.format, count));

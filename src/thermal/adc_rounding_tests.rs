@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::circuit::CHANNELS;
-use crate::circuit::engine::{ArithmeticKind, Rows, columns, engine};
+use crate::circuit::engine::{ArithmeticKind, columns, engine};
 use crate::circuit::scale::amplitude_lsb_per_magnitude;
 use crate::design::reader;
 use crate::numeric::format::Format;

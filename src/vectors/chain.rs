@@ -170,7 +170,7 @@ fn visit<const I: usize, const O: usize, B: Block<Wide, I, O>>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::circuit::engine::{ArithmeticKind, Rows};
+    use crate::circuit::engine::ArithmeticKind;
     use crate::vectors::stimulus;
 
     /// The default, and the default with everything closed and coarse.
