@@ -181,9 +181,11 @@ fn syntax(doc: &Doc, e: &toml::de::Error) -> Error {
     let offset = e.span().map_or(0, |span| span.start);
     let bracket = ["unclosed", "between array elements"];
     let open = bracket.iter().any(|word| said.contains(word));
-    let help = Some(doc.text)
-        .filter(|_| !said.contains("string"))
-        .and_then(|text| odd_quotes(text, offset))
+    let help = open_header(doc.text, offset)
+        .or_else(|| {
+            let text = Some(doc.text).filter(|_| !said.contains("string"))?;
+            odd_quotes(text, offset)
+        })
         .or_else(|| open.then(|| open_bracket(doc.text, offset)).flatten())
         .or_else(|| of_value(doc.text, offset))
         .unwrap_or(help.to_owned());
@@ -208,18 +210,48 @@ fn odd_quotes(text: &str, offset: usize) -> Option<String> {
     })
 }
 
+/// What to do about a table's header that is not closed in the line of a mistake.
+fn open_header(text: &str, offset: usize) -> Option<String> {
+    let start = text.get(..offset)?.rfind('\n').map_or(0, |p| p + 1);
+    let line = text.get(start..)?.lines().next()?;
+    let written = line.split('#').next()?.trim();
+    let name = written.trim_matches(['[', ']']).trim();
+    let is_name = |part: &str| {
+        let part = part.trim();
+        let is_bare = |c: char| c.is_ascii_alphanumeric() || "_-".contains(c);
+        part.starts_with(|c: char| c.is_ascii_alphabetic()) && part.chars().all(is_bare)
+    };
+    let is_array = name == "effects";
+    let header = if is_array {
+        format!("[[{name}]]")
+    } else {
+        format!("[{name}]")
+    };
+    let is_header = written.starts_with('[') && name.split('.').all(is_name) && written != header;
+    // Between the brackets of an array's value such a line is an element.
+    (is_header && unclosed(text.get(..start)?).is_none())
+        .then(|| format!("write the table's header in this line as `{header}`"))
+}
+
+/// The last `key = [` or `key = {` of a text whose value the text does not close: where its `=` is, and what closes it.
+/// Brackets in texts and comments count as brackets: what is given is a remedy, no judgement.
+fn unclosed(before: &str) -> Option<(usize, char)> {
+    before.rmatch_indices('=').find_map(|(at, _)| {
+        let value = before[at + 1..].trim_start();
+        let (open, close) = match value.chars().next()? {
+            '[' => ('[', ']'),
+            '{' => ('{', '}'),
+            _ => return None,
+        };
+        let is_open = value.matches(open).count() > value.matches(close).count();
+        is_open.then_some((at, close))
+    })
+}
+
 /// What to do about a value in brackets that is open at a mistake.
 fn open_bracket(text: &str, offset: usize) -> Option<String> {
     let before = text.get(..offset)?;
-    let (equals, close) = before.rmatch_indices('=').find_map(|(at, _)| {
-        let value = before[at + 1..].trim_start();
-        let close = match value.chars().next()? {
-            '[' => ']',
-            '{' => '}',
-            _ => return None,
-        };
-        Some((at, close))
-    })?;
+    let (equals, close) = unclosed(before)?;
     let line = before[..equals].matches('\n').count() + 1;
     let key = before[..equals].lines().last().unwrap_or("").trim();
     Some(match text[offset..].trim().is_empty() {

@@ -21,6 +21,9 @@ const BROKEN: &[Case] = &[
     ("[record]", "[record]\ncolumns.time_s = { column = \"t_ms, unit = \"¦ms\" }", "not TOML", "is a quote missing before the comma in this line?"),
     ("[record]", "[record]\ncolumns.time_s = ¦t_ms\"", "not TOML", "is a quote missing in this line?"),
     ("seed = 20040024", "seed = 2¦,5 # 3\" tube", "not TOML", "as a point: `seed = 2.5`"),
+    ("[circuit.cordic]", "[circuit.cordic¦", "not TOML", "header in this line as `[circuit.cordic]`"),
+    ("[circuit.cordic]", "[[circuit.cordic]¦", "not TOML", "header in this line as `[circuit.cordic]`"),
+    ("coefficients_raw = [114923930, 800391448, 1415954326]", "coefficients_raw = [114923930\n¦800391448, 1415954326]", "not TOML", "value of `coefficients_raw` that line"),
     // Unknown keys and tables.
     ("sample_rate_hz = ", "¦sample_rate_khz = ", "unknown key `sample_rate_khz` in `[circuit]`", "`sample_rate_hz`? Its value is in Hz: multiply by 1e3"),
     ("tuning_word = ", "¦tunning_word = ", "unknown key `tunning_word`", "did you mean `tuning_word`?"),
