@@ -9,7 +9,7 @@ use crate::emit::views::Language;
 use crate::equivalence::job::{self, Request, Stimulus};
 use crate::equivalence::outcome::{Equivalence, NodeReport};
 use crate::equivalence::shrink;
-use crate::error::{Error, Result};
+use crate::error::{Error, InputError, Result};
 use crate::output::name_of;
 use crate::record::capture::CaptureReader;
 use crate::text::{away_from_zero_decimals, constant, number};
@@ -75,6 +75,9 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         job::COUNTEREXAMPLE,
         timing::NAME,
     ];
+    if let Some(samples) = arguments.samples {
+        enough(&design, samples, None)?;
+    }
     let look = || match &arguments.capture {
         Some(path) => CaptureReader::open(path, design.circuit.adc.format).map(drop),
         None => Ok(()),
@@ -103,6 +106,10 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     };
     watch.stage("comparing");
     let (result, counterexample) = job::equivalence(&design, stimulus, request)?;
+    // What fails, does so in however few samples: a shrunk counterexample is a capture too.
+    if result.holds {
+        enough(&design, drive.len() as u64, arguments.capture.as_deref())?;
+    }
     watch.stage("writing");
     let json = super::json(&result);
     results.write("equiv.json", json.as_bytes())?;
@@ -148,6 +155,32 @@ fn codes(design: &Design, arguments: &Arguments) -> Result<(Vec<i32>, Vec<i32>, 
         ),
     };
     Ok((codes.0, codes.1, origin))
+}
+
+/// Refuses fewer samples than make one row to compare; `capture` has them, or else `--samples` asks for them.
+fn enough(design: &Design, samples: u64, capture: Option<&Path>) -> Result<()> {
+    let least = job::least_samples(design);
+    if samples >= least {
+        return Ok(());
+    }
+    let d = &design.circuit.decimator;
+    let why = format!(
+        "a row takes {} samples (circuit.decimator.ratio), and the first row of a full decimator is row {}",
+        d.ratio,
+        least / u64::from(d.ratio)
+    );
+    Err(match capture {
+        Some(path) => InputError::new(format!(
+            "the capture has {samples} ADC samples, and {least} are the least that can be compared: {why}"
+        ))
+        .in_file(path)
+        .help("capture longer: the figures are certain from some thousand rows on"),
+        None => InputError::new(format!(
+            "`--samples` is {samples}, and {least} are the least that can be compared: {why}"
+        ))
+        .help(format!("give `--samples {least}` or more")),
+    }
+    .into())
 }
 
 /// The first codes of a capture.

@@ -240,6 +240,7 @@ pub(super) const KEYS: &[(&str, &[(&str, &str)])] = &[
             ("axis", "\"x\""),
             ("instance", "0"),
             ("average_s", "10.0"),
+            ("ignore", "[\"gyro_x\", \"gyro_y\"]"),
         ],
     ),
     (

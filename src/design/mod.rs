@@ -2,7 +2,7 @@
 //!
 //! [`schema`] is what the rest of the program sees; [`reader`] turns a file into it, with the
 //! place of every mistake (`table` keeps the places, `keys` knows every key, `suggest` what was
-//! meant, `circuit_tables`, `device_tables` and [`bound`] read the tables); [`effects`] are those of the simulated
+//! meant, `circuit_tables`, `device_tables`, `record_table` and [`bound`] read the tables); [`effects`] are those of the simulated
 //! gyro, by name, [`user_effects`] those that the user suspects in a record; [`limits`] refuses formats whose exact intermediates the engine cannot hold; [`template`] holds the embedded default and what `gyrogen init` writes.
 
 pub mod bound;
@@ -22,6 +22,7 @@ mod ranges;
 pub mod reader;
 pub mod record_columns;
 mod record_mapping;
+mod record_table;
 pub mod schema;
 mod study_tables;
 pub(crate) mod suggest;

@@ -2,8 +2,8 @@
 
 use super::table::{Doc, Table};
 use super::{
-    bound, circuit_tables, correction_table, device_tables, limits, study_tables, template,
-    user_effects,
+    bound, circuit_tables, correction_table, device_tables, limits, record_table, study_tables,
+    template, user_effects,
 };
 use crate::base_name::name_of;
 use crate::design::schema::*;
@@ -99,7 +99,7 @@ fn build(text: &str, file: Option<&Path>, base: Option<&Design>) -> Result<Desig
             &section("thermal_run")?,
             base.map(|b| &b.thermal_run),
         )?,
-        record: device_tables::record(&section("record")?, base.map(|b| &b.record))?,
+        record: record_table::record(&section("record")?, base.map(|b| &b.record))?,
         fit: device_tables::fit(&section("fit")?, base.map(|b| &b.fit))?,
         study: study_tables::study(&section("study")?)?,
         requirements: study_tables::requirements(&section("requirements")?)?,

@@ -20,6 +20,12 @@ pub struct RecordMapping {
     pub row_period_at: Option<Position>,
     /// Where `thermometer` stands, if a design states it.
     pub thermometer_at: Option<Position>,
+    /// Where `average_s` stands, if a design states it.
+    pub average_at: Option<Position>,
+    /// Where `instance` stands, if a design states it.
+    pub instance_at: Option<Position>,
+    /// `ignore`: columns that are left out, by their names in the file, and where the design names each.
+    pub ignore: BTreeMap<String, Position>,
     /// `row_period_s`: the clock of a record without `time_s`, s per row.
     pub row_period_s: Option<f64>,
     /// `thermometer`: the column of the bias model; default: the first of phase_rad, freq_hz,

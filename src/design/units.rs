@@ -268,9 +268,12 @@ pub fn parse(text: &str) -> Option<Unit> {
 
 /// The spellings of the units that a column can have, for messages.
 pub fn accepted(column: &str) -> String {
-    let of = unit_of(column);
-    let names: Vec<&str> = UNITS.iter().filter(|u| u.2 == of).map(|u| u.1).collect();
-    names.join(", ")
+    names_of(unit_of(column)).join(", ")
+}
+
+/// The units of the quantity whose unit of the contract is `of`, that one first.
+pub fn names_of(of: &str) -> Vec<&'static str> {
+    UNITS.iter().filter(|u| u.2 == of).map(|u| u.1).collect()
 }
 
 /// The unit that one of `seen` is, where `seen` was found in values that were converted from `taken`. `None`: none that is known.

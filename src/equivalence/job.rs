@@ -28,6 +28,13 @@ pub struct Stimulus<'a> {
     pub origin: &'a str,
 }
 
+/// The fewest ADC samples that a comparison says something of: with them the decimator, which starts empty, gives its first row
+/// of nothing but samples.
+pub fn least_samples(design: &Design) -> u64 {
+    let d = &design.circuit.decimator;
+    u64::from(d.ratio) * u64::from(d.stages) * u64::from(d.differential_delay)
+}
+
 /// How much of it, and how.
 #[derive(Debug, Clone, Copy)]
 pub struct Request<'a> {

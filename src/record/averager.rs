@@ -137,6 +137,23 @@ pub(super) struct Averager {
 }
 
 impl Averager {
+    /// From the first to the last sample of a channel, s, as evenly spaced samples have it; `rows` are those with any.
+    pub(super) fn span_s(&self, channel: usize, rows: &[u64]) -> f64 {
+        let period_us = self.period_us as f64;
+        let at = |number: &u64| -> Option<(f64, f64)> {
+            let sum = self.rows.get(number)?.get(channel)?;
+            Some((*number as f64 * period_us, sum.time / f64::from(sum.count)))
+        };
+        let (Some((first_us, mean_us)), Some(last)) = (rows.first().and_then(at), rows.last())
+        else {
+            return 0.0;
+        };
+        let end_us = (self.now_us as f64).min((*last + 1) as f64 * period_us);
+        // Even samples lie on both sides of their mean alike: that says where in its row the log began.
+        let began_us = (2.0 * mean_us - period_us.min(end_us - first_us)).max(0.0);
+        (end_us - first_us - began_us) * 1e-6
+    }
+
     /// For the design's `average_s`.
     pub(super) fn new(mapping: &RecordMapping) -> Self {
         let period = mapping.average_s.unwrap_or(AVERAGE_S) * 1e6;

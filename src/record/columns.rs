@@ -2,6 +2,7 @@
 
 use super::cells::{self, Cell};
 use super::guesses::{self, suggestion};
+use super::ignored;
 use super::warning::Warning;
 use crate::design::RecordMapping;
 pub use crate::design::record_columns::{KNOWN, THERMOMETERS, is_known, unit_of};
@@ -85,6 +86,9 @@ pub(super) fn resolve(line: Line<'_>, mapping: &RecordMapping) -> Result<Roles> 
                 .into());
         }
     }
+    ignored::check(mapping, line.path, &names)?;
+    let is_kept = |name: &&&str| !mapping.ignore.contains_key(**name);
+    let kept: Vec<&str> = names.iter().filter(is_kept).copied().collect();
     let mut columns: Vec<(String, Vec<String>)> = names
         .iter()
         .map(|n| ((*n).to_owned(), Vec::new()))
@@ -98,7 +102,7 @@ pub(super) fn resolve(line: Line<'_>, mapping: &RecordMapping) -> Result<Roles> 
     refuse_swapped(line, mapping, &names)?;
     let mut warnings = Vec::new();
     for (name, roles) in &mut columns {
-        if !roles.is_empty() || name.is_empty() {
+        if !roles.is_empty() || name.is_empty() || mapping.ignore.contains_key(name) {
             continue;
         }
         if let Some(other) = mapping.columns.get(name.as_str()) {
@@ -114,10 +118,11 @@ pub(super) fn resolve(line: Line<'_>, mapping: &RecordMapping) -> Result<Roles> 
             roles.push(name.clone());
         }
     }
-    in_other_units(&mut columns, &names, mapping);
+    in_other_units(&mut columns, &kept, mapping);
     warnings.extend(twice(&columns, mapping));
     let units = converted(line, &columns, mapping)?;
     warnings.extend(told(&units, &columns));
+    warnings.extend(assumed(&columns, mapping));
     let roles = Roles {
         columns,
         units,
@@ -130,7 +135,7 @@ pub(super) fn resolve(line: Line<'_>, mapping: &RecordMapping) -> Result<Roles> 
                 .error(
                     1,
                     format!("the record has no column {role}, which is required"),
-                    suggestion(role, &names),
+                    suggestion(role, &kept),
                 )
                 .into());
         }
@@ -384,6 +389,31 @@ fn told(units: &[(String, Unit)], columns: &[(String, Vec<String>)]) -> Option<W
     });
     let each: Vec<String> = each.collect();
     (!each.is_empty()).then(|| Warning::general("units_converted", each.join("; ")))
+}
+
+/// What is said of columns whose unit neither their names nor the design say.
+fn assumed(columns: &[(String, Vec<String>)], mapping: &RecordMapping) -> Option<Warning> {
+    let mut each = Vec::new();
+    let mut lines = Vec::new();
+    for (name, roles) in columns {
+        for role in roles.iter().filter(|r| is_known(r)) {
+            if !mapping.units.contains_key(role) && guesses::is_without_unit(role, name) {
+                each.push(format!("\"{name}\" in {}", unit_of(role)));
+                lines.push(guesses::mapped(role, name));
+            }
+        }
+    }
+    (!each.is_empty()).then(|| {
+        Warning::general(
+            "unit_assumed",
+            format!(
+                "units are assumed, since neither the columns' names nor the design say them: {}. Say in [record.columns] which they \
+                 are: {}",
+                each.join(", "),
+                lines.join(", ")
+            ),
+        )
+    })
 }
 
 /// The header's cells, refused where the line cannot be a header.

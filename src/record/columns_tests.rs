@@ -49,10 +49,10 @@ fn one_message_asks_for_all_that_is_missing() {
     let e = resolve(at("time,temp,gyro_z,note"), &RecordMapping::default()).unwrap_err();
     let text = e.to_string();
     for line in [
-        "time_s = \"time\"",
-        "rate_out_dps = \"gyro_z\"",
-        "die_degc = \"temp\"",
-        "time_s = { column = \"time\", unit = ",
+        "time_s = { column = \"time\", unit = \"s\" } # a guess: or ms, us, ns, min, h",
+        "rate_out_dps = { column = \"gyro_z\", unit = \"deg/s\" } # a guess: or mdeg/s, rad/s, mrad/s, urad/s, deg/h, rpm",
+        "die_degc = { column = \"temp\", unit = \"degC\" } # a guess: or degF, K, mdegC, cdegC",
+        "is not in the column's name: check it",
     ] {
         assert!(text.contains(line), "{line}: {text}");
     }
@@ -61,6 +61,17 @@ fn one_message_asks_for_all_that_is_missing() {
     let text = e.to_string();
     assert!(
         !text.contains("time_s =") && !text.contains("die_degc ="),
+        "{text}"
+    );
+    // A name that says its unit leaves nothing to guess.
+    let e = resolve(
+        at("time_s,gyro_z_rad_s,die_degc"),
+        &RecordMapping::default(),
+    )
+    .unwrap_err();
+    let text = e.to_string();
+    assert!(
+        text.contains("unit = \"rad/s\" }") && !text.contains("a guess"),
         "{text}"
     );
 }
@@ -72,7 +83,10 @@ fn a_choice_is_told_as_one() {
         error.to_string()
     };
     let text = said("time_s,GyroTemp,GyroX,GyroY,GyroZ,die_degc");
-    assert!(text.contains("rate_out_dps = \"GyroX\""), "{text}");
+    assert!(
+        text.contains("rate_out_dps = { column = \"GyroX\", unit = \"deg/s\" }"),
+        "{text}"
+    );
     let others = "GyroX, GyroY and GyroZ would do as rate_out_dps; take the axis you want";
     assert!(text.contains(others), "{text}");
     assert!(!said("time_s,gyro_z,die_degc").contains("would do"));
@@ -126,6 +140,69 @@ fn a_unit_against_the_columns_name_is_refused_with_both_remedies() {
     let mut mapping = mapped_to("x");
     mapping.units.insert("rate_out_dps".into(), "deg/s".into());
     assert!(resolve(at("time_s,x"), &mapping).is_ok());
+}
+
+#[test]
+fn a_unit_that_nobody_says_is_warned_of() {
+    let said = |mapping: &RecordMapping| {
+        let roles = resolve(at("time_s,gyro_z,die_degc,agc"), mapping).unwrap();
+        let found = roles
+            .warnings
+            .into_iter()
+            .find(|w| w.code == "unit_assumed");
+        found.map(|w| (w.label(), w.message))
+    };
+    let mut mapping = mapped_to("gyro_z");
+    let (label, message) = said(&mapping).expect("a warning");
+    assert_eq!(label, "warning");
+    assert!(
+        message.contains("\"gyro_z\" in deg/s")
+            && message.ends_with("rate_out_dps = { column = \"gyro_z\", unit = \"deg/s\" }"),
+        "{message}"
+    );
+    // A relative gain has no unit; the contract's names say theirs.
+    assert!(!message.contains("agc") && !message.contains("die_degc"));
+    mapping.units.insert("rate_out_dps".into(), "deg/s".into());
+    assert_eq!(said(&mapping), None);
+}
+
+#[test]
+fn columns_are_left_out_by_their_names_in_the_file() {
+    let read = |ignore: &str| {
+        let text = format!(
+            "[record]\nignore = [{ignore}]\n[record.columns]\nrate_out_dps = \"gyro_z_dps\"\n"
+        );
+        crate::design::reader::parse(&text, Some(Path::new("hub.toml")))
+    };
+    let header = "time_s,time_ms,gyro_x_dps,gyro_y_dps,gyro_z_dps,die_degc";
+    let design = read("\"gyro_x_dps\", \"die_degc\", \"time_ms\"").unwrap();
+    let roles = resolve(at(header), &design.record).unwrap();
+    let kept: Vec<&str> = roles
+        .columns
+        .iter()
+        .filter(|(_, roles)| !roles.is_empty())
+        .map(|(name, _)| name.as_str())
+        .collect();
+    assert_eq!(kept, ["time_s", "gyro_y_dps", "gyro_z_dps"]);
+    assert!(roles.warnings.is_empty(), "{:?}", roles.warnings);
+    for (ignore, said) in [
+        ("\"gyro_y_dps\", \"gyro_w_dps\"", "did you mean \"gyro_"),
+        (
+            "\"time_s\"",
+            "leaves out time_s of the record r.csv, which is required",
+        ),
+    ] {
+        let design = read(ignore).unwrap();
+        let error = resolve(at(header), &design.record).unwrap_err().to_string();
+        assert!(error.starts_with("hub.toml:2:"), "{error}");
+        assert!(error.contains(said), "{said}: {error}");
+    }
+    // Read and left out at once.
+    let error = read("\"gyro_z_dps\"").unwrap_err().to_string();
+    assert!(
+        error.starts_with("hub.toml:4:") && error.contains("which `ignore` leaves out"),
+        "{error}"
+    );
 }
 
 /// A mapping of the rate to a column.

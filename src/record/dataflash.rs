@@ -121,7 +121,7 @@ pub(super) fn read<R: Read>(
     }
     let nothing = ("no IMU message", reader.damage);
     let (mut choice, chosen) =
-        log_gyros::choose(&reader.averager, &sources, mapping.instance, path, nothing)?;
+        log_gyros::choose(&reader.averager, &sources, mapping, path, nothing)?;
     let source = log_gyros::source_of_rate(&reader.averager, &sources, &choice, chosen);
     if let Some(source) = source {
         let of = corrections::Chosen {

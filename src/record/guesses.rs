@@ -1,6 +1,6 @@
 //! Which columns of a file are likely meant, as names of columns go; and what of a design would say so.
 
-use super::columns::{THERMOMETERS, is_known, unit_of};
+use super::columns::{THERMOMETERS, unit_of};
 use crate::design::units;
 
 /// Ends of names that say that a column holds an ADC's or a register's codes.
@@ -76,15 +76,38 @@ pub(super) fn listed(names: &[&str]) -> String {
     text
 }
 
-/// The line of a design that maps `role` to a column, with the unit where the column's name states another than the
-/// contract's.
+/// Stands for a column of which nothing is known.
+const PLACEHOLDER: &str = "NAME_IN_THE_FILE";
+
+/// True where the column's name does not say the unit that the quantity has.
+pub(super) fn is_without_unit(role: &str, column: &str) -> bool {
+    column != PLACEHOLDER && unit_of(role) != "1" && units::stated(column, role).is_none()
+}
+
+/// The line of a design that maps `role` to a column, with the unit where the column's name does not state the contract's:
+/// the one that it states, or the contract's, which is a guess then.
 pub fn mapped(role: &str, column: &str) -> String {
+    let with = |unit: &str| format!("{role} = {{ column = \"{column}\", unit = \"{unit}\" }}");
     match units::stated(column, role) {
-        Some(unit) if unit.of == unit_of(role) && !unit.is_own() => format!(
-            "{role} = {{ column = \"{column}\", unit = \"{}\" }}",
-            unit.name
-        ),
+        Some(unit) if unit.of == unit_of(role) && !unit.is_own() => with(unit.name),
+        None if is_without_unit(role, column) => with(unit_of(role)),
         _ => format!("{role} = \"{column}\""),
+    }
+}
+
+/// [`mapped`], with a remark where the unit is a guess: which others can be written.
+pub fn mapped_with_remark(role: &str, column: &str) -> String {
+    let line = mapped(role, column);
+    if !is_without_unit(role, column) {
+        return line;
+    }
+    let others: Vec<&str> = units::names_of(unit_of(role))
+        .into_iter()
+        .filter(|name| *name != unit_of(role))
+        .collect();
+    match others.is_empty() {
+        true => line,
+        false => format!("{line} # a guess: or {}", others.join(", ")),
     }
 }
 
@@ -97,9 +120,9 @@ pub(super) fn suggestion(role: &str, names: &[&str]) -> String {
             .iter()
             .any(|n| *n == role || units::meant(n) == Some(role))
     };
-    let mut lines = vec![mapped(
+    let mut lines = vec![mapped_with_remark(
         role,
-        guess(role, &named).unwrap_or("NAME_IN_THE_FILE"),
+        guess(role, &named).unwrap_or(PLACEHOLDER),
     )];
     // What would be asked for next, where a column looks like it.
     let others = ["time_s", "rate_out_dps", "die_degc"];
@@ -108,7 +131,7 @@ pub(super) fn suggestion(role: &str, names: &[&str]) -> String {
         .filter(|other| *other != role && !has(other));
     let others =
         others.filter(|other| *other != "die_degc" || !THERMOMETERS.iter().any(|t| has(t)));
-    lines.extend(others.filter_map(|o| Some(mapped(o, guess(o, &named)?))));
+    lines.extend(others.filter_map(|o| Some(mapped_with_remark(o, guess(o, &named)?))));
     text.push_str(&format!(
         "\n  say in the design which one it is. These lines are a whole design file, say gyro.toml: `gyrogen run gyro.toml --record \
          ...` and `gyrogen close gyro.toml --record ...` take it:\n    [record.columns]\n    {}",
@@ -124,15 +147,10 @@ pub(super) fn suggestion(role: &str, names: &[&str]) -> String {
             first.join(", ")
         ));
     }
-    if let Some(unitless) = guess(role, &named)
-        && is_known(role)
-        && units::stated(unitless, role).is_none()
-    {
-        text.push_str(&format!(
-            "\n  or, where it is not in {}, with its unit: {role} = {{ column = \"{unitless}\", unit = \"...\" }} ({})",
-            unit_of(role),
-            units::accepted(role)
-        ));
+    if lines.iter().any(|line| line.contains(" # a guess")) {
+        text.push_str(
+            "\n  a unit with \"a guess\" behind it is not in the column's name: check it, and write the one that the file has",
+        );
     }
     if role == "time_s" {
         text.push_str(

@@ -8,6 +8,7 @@ use super::corrections::Found;
 use super::log_bytes::Damage;
 use super::log_rows::{self, Choice};
 use super::warning::Warning;
+use crate::design::RecordMapping;
 use crate::error::{InputError, Result};
 use crate::statistics::stats;
 use std::collections::BTreeMap;
@@ -76,7 +77,7 @@ struct Gyro {
 pub(super) fn choose(
     averager: &Averager,
     sources: &[Source],
-    asked: Option<u32>,
+    mapping: &RecordMapping,
     path: &Path,
     (nothing, damage): (&str, Damage),
 ) -> Result<(Choice, Chosen)> {
@@ -85,7 +86,7 @@ pub(super) fn choose(
         .iter()
         .map(|gyro| line(averager, sources, gyro))
         .collect();
-    let wanted = match asked {
+    let wanted = match mapping.instance {
         Some(asked) => gyros.iter().find(|g| u32::from(g.number) == asked),
         None => gyros.iter().find(|g| has_samples(averager, g)),
     };
@@ -94,7 +95,7 @@ pub(super) fn choose(
             averager,
             sources,
             &listed,
-            asked,
+            mapping,
             path,
             (nothing, damage),
         ));
@@ -114,7 +115,7 @@ pub(super) fn choose(
         ],
         ..Choice::default()
     };
-    if gyros.len() > 1 && asked.is_none() {
+    if gyros.len() > 1 && mapping.instance.is_none() {
         choice.warnings.push(Warning::general(
             "gyros_in_log",
             format!(
@@ -293,7 +294,7 @@ fn not_there(
     averager: &Averager,
     sources: &[Source],
     listed: &[String],
-    asked: Option<u32>,
+    mapping: &RecordMapping,
     path: &Path,
     (nothing, damage): (&str, Damage),
 ) -> crate::error::Error {
@@ -318,12 +319,17 @@ fn not_there(
     let noticed = noticed
         .first()
         .map_or(String::new(), |w| format!("; {}", w.message));
-    InputError::new(format!(
-        "the log has no samples of gyro {}: {found}{there}{noticed}",
-        asked.unwrap_or(0)
-    ))
-    .in_file(path)
-    .help(
+    let said = format!(
+        "has no samples of gyro {}: {found}{there}{noticed}",
+        mapping.instance.unwrap_or(0)
+    );
+    let error = match &mapping.instance_at {
+        Some(place) => {
+            InputError::new(format!("the log {} {said}", path.display())).at_position(place)
+        }
+        None => InputError::new(format!("the log {said}")).in_file(path),
+    };
+    error.help(
         "choose another `instance` in [record], or log the gyro (PX4: sensor_gyro or sensor_gyro_fifo; ArduPilot: IMU)",
     )
     .into()

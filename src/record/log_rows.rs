@@ -1,12 +1,12 @@
 //! The rows of a log as a thermal record: which are whole, which belong to one stretch, what is told of the others.
 
-use super::averager::Averager;
+use super::averager::{AVERAGE_S, Averager};
 use super::corrections::Switched;
 use super::log_bytes::Damage;
 use super::thermal::{ENOUGH_ROWS, LEAST_ROWS, ThermalRecord};
 use super::undo::Undo;
 use super::warning::Warning;
-use super::{dead, error_values, frozen, plausibility, stopped};
+use super::{dead, error_values, frozen, ignored, plausibility, shorten, stopped};
 use crate::design::RecordMapping;
 use crate::error::{Error, InputError, Result};
 use crate::statistics::stats;
@@ -72,6 +72,16 @@ pub(super) fn record(
     let heat = heat.filter(|c| averager.rows_of(*c).next().is_some());
     let rows = one_stretch(averager, rate, &choice, &mut warnings);
     let rows = whole_rows(averager, rate, heat, rows, &mut warnings);
+    let span_s = averager.span_s(rate, &rows);
+    if rows.len() < LEAST_ROWS
+        && let Some(average_s) = mapping.average_s
+        && span_s >= LEAST_ROWS as f64 * AVERAGE_S
+    {
+        // The samples are averaged as they are read: how many another length leaves follows from the log's.
+        let of = |other_s: f64| (span_s / other_s) as usize;
+        let used = (average_s, rows.len());
+        return Err(shorten::too_long(mapping, path, used, span_s, of).into());
+    }
     if rows.len() < LEAST_ROWS {
         return Err(refused(
             path,
@@ -87,12 +97,18 @@ pub(super) fn record(
         ));
     }
     let accel = chosen(averager, &choice, "accel_g", &mut Vec::new());
-    let columns = [
+    let mut columns = vec![
         ("rate_out_dps", Some(rate)),
         ("die_degc", heat),
         ("accel_g", accel),
         ("supply_v", supply),
     ];
+    let names: Vec<&str> = columns
+        .iter()
+        .filter_map(|(name, channel)| channel.and(Some(*name)))
+        .collect();
+    ignored::check(mapping, path, &names)?;
+    columns.retain(|(name, _)| !mapping.ignore.contains_key(*name));
     let mut record = made(averager, path, &columns, &rows);
     let sums = rows.iter().filter_map(|r| averager.rows.get(r)?.get(rate));
     let samples: u64 = sums.map(|s| u64::from(s.count)).sum();

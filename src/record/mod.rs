@@ -33,6 +33,7 @@ mod dead;
 mod error_values;
 mod frozen;
 pub mod guesses;
+mod ignored;
 mod lines;
 mod log_bytes;
 mod log_clock;

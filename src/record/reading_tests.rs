@@ -45,7 +45,8 @@ fn what_was_read_is_told_in_the_contracts_order() {
     let (record, warnings) = try_parse(text.as_bytes(), &columns).unwrap();
     assert_eq!(
         record.understood(&columns),
-        "time_s from t_ms, rate_out_dps from gx_dps, die_degc from temp (degC assumed), flow"
+        "time_s from t_ms, rate_out_dps from gx_dps, die_degc from temp (degC assumed), flow \
+         (to leave a column out: ignore = [\"flow\"] in [record])"
     );
     assert_eq!(
         record.rows_understood(&warnings, None),
@@ -64,6 +65,12 @@ fn what_was_read_is_told_in_the_contracts_order() {
             .contains("die_degc from temp, flow"),
         "{}",
         record.understood(&columns)
+    );
+    columns.ignore.insert("flow".into(), Default::default());
+    let (record, _) = try_parse(text.as_bytes(), &columns).unwrap();
+    assert_eq!(
+        record.understood(&columns),
+        "time_s from t_ms, rate_out_dps from gx_dps, die_degc from temp; left out: flow"
     );
 }
 
@@ -248,7 +255,10 @@ fn a_column_that_is_a_time_by_its_unit_is_proposed_with_it() {
             "uptime_us,gyro_deg_sec,die_degc",
             "time_s = { column = \"uptime_us\", unit = \"us\" }",
         ),
-        ("t,rate_out_dps,die_degc", "time_s = \"t\""),
+        (
+            "t,rate_out_dps,die_degc",
+            "time_s = { column = \"t\", unit = \"s\" } # a guess",
+        ),
         ("k,rate_out_dps,t_c", "time_s = \"NAME_IN_THE_FILE\""),
     ] {
         assert!(said(header).contains(line), "{line}: {}", said(header));

@@ -181,7 +181,7 @@ fn parse_text(
     error_values::take(&mut record, &mut warnings);
     stopped::take(&mut record, &mut warnings);
     clock::merge_repeated(&mut record, &mut warnings);
-    shorten::rows(&mut record, mapping.average_s, &mut warnings);
+    shorten::rows(&mut record, mapping, &mut warnings)?;
     enough(&record, last, &mut warnings)?;
     dead::refuse(&record, path, record.lines.first().copied())?;
     temperature::refuse(&record, header, &roles, mapping)?;

@@ -168,7 +168,18 @@ impl ThermalRecord {
             Some(file) => format!("{name} from {file}"),
             None => name.to_owned(),
         });
-        said.collect::<Vec<_>>().join(", ")
+        let mut text = said.collect::<Vec<_>>().join(", ");
+        if !mapping.ignore.is_empty() {
+            let names: Vec<&str> = mapping.ignore.keys().map(String::as_str).collect();
+            text.push_str(&format!("; left out: {}", names.join(", ")));
+        }
+        let mut others = self.columns.keys();
+        if let Some(other) = others.find(|name| !record_columns::is_known(name)) {
+            text.push_str(&format!(
+                " (to leave a column out: ignore = [\"{other}\"] in [record])"
+            ));
+        }
+        text
     }
 
     /// How many rows there are, over what time and how far apart, and whether they are means of the file's, as `warnings` of the same record say;

@@ -92,8 +92,7 @@ pub(super) fn read<R: Read>(
     let order = |s: &Source| reader.fields.iter().position(|f| f.topic == s.topic);
     sources.sort_by_key(|s| (order(s), s.instance));
     let nothing = ("no gyro topic", reader.damage);
-    let (mut choice, chosen) =
-        log_gyros::choose(&averager, &sources, mapping.instance, path, nothing)?;
+    let (mut choice, chosen) = log_gyros::choose(&averager, &sources, mapping, path, nothing)?;
     let source = log_gyros::source_of_rate(&averager, &sources, &choice, chosen);
     if let Some(source) = source {
         let of = corrections::Chosen {

@@ -183,7 +183,8 @@ fn the_length_of_a_row_is_the_designs() {
     };
     let said = refusal(&sound().0, &mapping);
     assert!(
-        said.contains("only 5 rows of 4 s") && said.contains("average_s"),
+        said.contains("average_s = 4 s leaves 5 rows of the record")
+            && said.contains("average_s = 0.99 leaves 20 rows"),
         "{said}"
     );
 }

@@ -9,7 +9,7 @@ use crate::design::{FitOptions, FitOrder, RecordMapping};
 use crate::error::{InputError, Result};
 use crate::numeric::polynomial;
 use crate::record::columns::{self, THERMOMETERS};
-use crate::record::guesses::{guess, mapped};
+use crate::record::guesses::{guess, mapped, mapped_with_remark};
 use crate::record::thermal::{ENOUGH_ROWS, LEAST_ROWS};
 use crate::record::{ThermalRecord, Warning};
 use crate::statistics::correlation::{NoiseModel, Rows};
@@ -222,7 +222,10 @@ fn without_thermometer(record: &ThermalRecord, has: &[&str]) -> String {
     };
     format!(
         "the file has: {columns}\n  {said}{}\n  a record without a thermometer: `gyrogen close --record` does without",
-        line_of_thermometer(has).unwrap_or_else(|| mapped("die_degc", "NAME_IN_THE_FILE"))
+        mapped_with_remark(
+            "die_degc",
+            guess("die_degc", has).unwrap_or("NAME_IN_THE_FILE")
+        )
     )
 }
 

@@ -197,6 +197,34 @@ fn a_setpoint_out_of_reach_is_warned_of_and_its_loop_is_not_praised() {
 }
 
 #[test]
+fn too_few_samples_for_a_row_are_refused_with_the_fewest_that_do() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("out");
+    // Periods of 32 samples, a decimator of three stages.
+    for samples in ["5", "95"] {
+        let output = equiv(&["--samples", samples], &out);
+        let talk = told(&output);
+        assert_eq!(output.status.code(), Some(2), "{talk}");
+        assert!(talk.contains("give `--samples 96` or more"), "{talk}");
+        assert!(!out.exists());
+    }
+    let output = equiv(&["--samples", "96"], &out);
+    assert_eq!(output.status.code(), Some(0), "{}", told(&output));
+    let capture = folder.path().join("c.csv");
+    std::fs::write(&capture, "drive_code,sense_code\n1,2\n3,4\n").expect("written");
+    let short = folder.path().join("short");
+    let name = capture.to_str().expect("UTF-8");
+    let output = equiv(&["--capture", name], &short);
+    let talk = told(&output);
+    assert_eq!(output.status.code(), Some(2), "{talk}");
+    assert!(
+        talk.contains("the capture has 2 ADC samples, and 96 are the least"),
+        "{talk}"
+    );
+    assert!(!short.join("equiv.json").exists());
+}
+
+#[test]
 fn two_designs_are_compared_word_by_word() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str, text: &str| {

@@ -74,9 +74,9 @@ fn a_record_of_each_kind_becomes_compiled_firmware() {
             assert_eq!(status, Some(2), "{said}{complaints}");
             for key in [
                 "[record.columns]",
-                "time_s = \"time\"",
-                "rate_out_dps = \"gyro_z\"",
-                "die_degc = \"temp\"",
+                "time_s = { column = \"time\", unit = \"s\" } # a guess: or ms, ",
+                "rate_out_dps = { column = \"gyro_z\", unit = \"deg/s\" } # a guess: or mdeg/s, ",
+                "die_degc = { column = \"temp\", unit = \"degC\" } # a guess: or degF, K, ",
                 "gyrogen run gyro.toml --record",
             ] {
                 assert!(complaints.contains(key), "{key}: {complaints}");
