@@ -237,6 +237,11 @@ fn what_the_design_says_wrongly_is_shown_in_the_design() {
     mapping.row_period_s = Some(1.005);
     let (_, warnings) = try_parse(text.as_bytes(), &mapping).unwrap();
     assert_eq!(warnings[0].code, "record_keys_unused");
+    let design = "[record]\ninstance = 1\n[record.columns]\nrate_out_dps = \"gyro_dps\"\n";
+    let design = crate::design::reader::parse(design, None).unwrap();
+    let (_, warnings) = try_parse(text.as_bytes(), &design.record).unwrap();
+    let told = warnings.iter().find(|w| w.code == "record_keys_unused");
+    assert!(told.is_some_and(|w| w.message.starts_with("`instance`")));
 }
 
 #[test]

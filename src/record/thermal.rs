@@ -148,6 +148,12 @@ fn parse_text(
     let (values, mut warnings) = thermal_rows::usable(values, first, &roles)?;
     warnings.splice(0..0, roles.warnings.iter().cloned());
     warnings.extend(thermal_rows::cut_cell(source, &rows, &roles));
+    if mapping.instance_at.is_some() {
+        warnings.push(Warning::general(
+            "record_keys_unused",
+            "`instance` in [record] chooses a gyro of an autopilot's log; this record is none, and it was not used",
+        ));
+    }
     let mut record = ThermalRecord {
         source: path.to_path_buf(),
         time_s: Vec::new(),

@@ -182,7 +182,7 @@ pub fn run(
 /// As there.
 pub fn look(record: &ThermalRecord, design: &Design, effort: Effort) -> Result<Seen> {
     let taken = Taken::of(record, design, Vec::new())?;
-    let unusable = |e: crate::statistics::Unusable| refused(record, e.to_string());
+    let unusable = |e: crate::statistics::Unusable| refused(record, &design.record, e.to_string());
     let search = taken.search(effort);
     let found = search.run().map_err(unusable)?;
     let model = search.model(&found.terms).map_err(unusable)?;

@@ -71,7 +71,7 @@ pub struct Named {
 pub fn names(record: &ThermalRecord, design: &Design, effort: Effort) -> Result<Vec<Named>> {
     let taken = Taken::of(record, design, Vec::new())?;
     let found = taken.search(effort).run();
-    let found = found.map_err(|e| refused(record, e.to_string()))?;
+    let found = found.map_err(|e| refused(record, &design.record, e.to_string()))?;
     let named = |term: super::search::Term| Named {
         effect: term.id(),
         rivals: term.rivals,
@@ -122,7 +122,7 @@ pub fn close(
 ) -> Result<Closed> {
     let taken = Taken::of(record, design, warnings)?;
     let record: &ThermalRecord = &taken.intake.record;
-    let refuse = |why: String| refused(record, why);
+    let refuse = |why: String| refused(record, &design.record, why);
     let mut warnings = taken.intake.warnings.clone();
     let fit = baseline::fit(record, &design.record, &design.fit).ok();
     Warning::add_of_fit(&mut warnings, fit.as_ref().and_then(course));

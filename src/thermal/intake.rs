@@ -74,9 +74,32 @@ fn nominal(gyro: &Gyro, thermometer: &str, readings: &[f64]) -> (f64, bool) {
     (middle, false)
 }
 
-/// A record that cannot be fitted.
-pub fn refused(record: &ThermalRecord, why: String) -> crate::error::Error {
-    let help = match record.len() < ENOUGH_ROWS {
+/// A record that cannot be fitted; in the design, where an `average_s` of it leaves few rows.
+pub fn refused(
+    record: &ThermalRecord,
+    mapping: &RecordMapping,
+    why: String,
+) -> crate::error::Error {
+    let few = record.len() < ENOUGH_ROWS;
+    if let (true, Some(average_s), Some(place)) =
+        (few, joined(record, mapping), &mapping.average_at)
+    {
+        let span = record.time_s.first().zip(record.time_s.last());
+        let span_s = span.map_or(0.0, |(first, last)| last - first) + average_s;
+        return InputError::new(format!(
+            "{why}. average_s = {average_s} s leaves {} rows of the record {}, which is about {} s long",
+            record.len(),
+            record.source.display(),
+            number(span_s, 3)
+        ))
+        .at_position(place)
+        .help(format!(
+            "average_s = {} or less leaves {ENOUGH_ROWS} rows or more; or record longer",
+            number((span_s - average_s) / ENOUGH_ROWS as f64, 2)
+        ))
+        .into();
+    }
+    let help = match few {
         true => format!("record {ENOUGH_ROWS} rows or more, or average less"),
         false => "record longer, or average less".to_owned(),
     };
@@ -84,6 +107,15 @@ pub fn refused(record: &ThermalRecord, why: String) -> crate::error::Error {
         .in_file(&record.source)
         .help(help)
         .into()
+}
+
+/// The design's `average_s`, if it joined rows of the file.
+fn joined(record: &ThermalRecord, mapping: &RecordMapping) -> Option<f64> {
+    let lines = record.lines.first().zip(record.lines.last());
+    let lines = lines.map_or(0, |(first, last)| last - first);
+    // A row stands for two lines or more. A log has no lines.
+    let is_joined = record.is_of_log() || lines + 2 >= 2 * record.len();
+    mapping.average_s.filter(|_| is_joined)
 }
 
 /// The record without readings of a thermometer that are glitches, with what is said of them; `None`: it has none. One such
@@ -224,10 +256,16 @@ fn channels_of(
     let degc = |reading: f64| degc_of(&design.gyro, &name, nominal, reading);
     let seen = |columns: &BTreeMap<String, Vec<f64>>| {
         let made = Channels::new(&record.time_s, columns, &name, degc);
-        made.map_err(|missing| refused(record, format!("column {missing} holds no measured value")))
+        made.map_err(|missing| {
+            refused(
+                record,
+                &design.record,
+                format!("column {missing} holds no measured value"),
+            )
+        })
     };
     let split = seen(&columns)?.split();
-    let split = split.map_err(|e| refused(record, e.to_string()))?;
+    let split = split.map_err(|e| refused(record, &design.record, e.to_string()))?;
     let (mut whole, split) = hide_judges(&mut columns, split);
     let mut channels = seen(&columns)?;
     let step_u = quantised::step_u(&channels);

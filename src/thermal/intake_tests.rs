@@ -2,10 +2,11 @@
 
 use super::channels::Channels;
 use super::close::close;
-use super::intake::Intake;
+use super::intake::{Intake, refused};
 use super::search::Effort;
 use super::synthetic::{Random, record, triangle};
 use crate::design::{Design, reader};
+use crate::record::ThermalRecord;
 
 fn design() -> Design {
     reader::parse("", None).unwrap()
@@ -92,6 +93,29 @@ fn one_reading_of_the_thermometer_that_is_a_glitch_names_nothing() {
         let mut said = closed.closure.warnings.iter();
         assert!(said.any(|w| w.code == "thermometer_glitch"));
     }
+}
+
+#[test]
+fn rows_that_an_average_leaves_too_few_of_are_told_in_the_design() {
+    let degc: Vec<f64> = (0..12).map(|k| 4.0 * f64::from(k)).collect();
+    let mut record = record("die_degc", &degc, &degc);
+    let text = "[record]\naverage_s = 160\n";
+    let design = crate::design::reader::parse(text, Some(std::path::Path::new("d.toml"))).unwrap();
+    let said =
+        |record: &ThermalRecord| refused(record, &design.record, "few".to_owned()).to_string();
+    // Rows as they are in the file are nothing that the average made.
+    record.lines = (2..14).collect();
+    assert!(
+        !said(&record).contains("average_s = 160"),
+        "{}",
+        said(&record)
+    );
+    record.lines = (0..12).map(|k| 2 + 16 * k).collect();
+    let told = said(&record);
+    assert!(
+        told.starts_with("d.toml:2:13: error: few. average_s = 160 s leaves 12 rows"),
+        "{told}"
+    );
 }
 
 #[test]
