@@ -1,6 +1,6 @@
 //! Which columns of a file are likely meant, as names of columns go; and what of a design would say so.
 
-use super::columns::{THERMOMETERS, unit_of};
+use crate::design::record_columns::{THERMOMETERS, unit_of};
 use crate::design::units;
 
 /// Ends of names that say that a column holds an ADC's or a register's codes.

@@ -1,7 +1,8 @@
 //! Columns of a record that the design leaves out (`ignore` in `[record]`).
 
-use super::columns::unit_of;
+use super::guesses::listed;
 use crate::design::RecordMapping;
+use crate::design::record_columns::unit_of;
 use crate::error::{InputError, Result};
 use crate::nearest::nearest;
 use std::path::Path;
@@ -37,7 +38,7 @@ pub(super) fn check(mapping: &RecordMapping, record: &Path, names: &[&str]) -> R
             "the record {record} has no column \"{name}\", which `ignore` leaves out"
         ))
         .at_position(place)
-        .help(format!("{meant}{}", super::guesses::listed(names)))
+        .help(format!("{meant}{}", listed(names)))
         .into());
     }
     Ok(())
