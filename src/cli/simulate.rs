@@ -313,7 +313,9 @@ pub(super) fn show_loops(found: &[Hunting]) {
     }
     super::terminal::numbers(&mut table, 1..);
     super::terminal::show(&table);
-    say!("{}", hunting::caption(found));
+    for definition in hunting::definitions(found) {
+        say!("{definition}");
+    }
 }
 
 /// Decimals that show a tolerance.

@@ -76,8 +76,8 @@ impl Hunting {
     }
 }
 
-/// What the columns of a table of loops hold, and what is compared with what.
-pub fn caption(found: &[Hunting]) -> String {
+/// What the words of a table of loops mean, and what is compared with what: a definition each.
+pub fn definitions(found: &[Hunting]) -> Vec<String> {
     let mut means: Vec<String> = Vec::new();
     for h in found.iter().filter(|h| !h.stands_at_limit) {
         let mean = format!(
@@ -90,18 +90,22 @@ pub fn caption(found: &[Hunting]) -> String {
             means.push(mean);
         }
     }
-    let mut text = format!(
-        "The loops run without noise at the first, the middle and the last temperature on the way up of [thermal_run]. pp: the largest \
-         less the smallest value in {ROWS} rows. An output is in the unit beside the loop's name. An error is the setpoint's \
-         difference from the magnitude or the phase, in LSB of that word. Circuit: the bit-accurate loop with ADC and NCO. Model: the same \
-         loop without these two, so that its error may be the smaller one. Limit: the model's error plus the most that ADC and NCO \
-         can add; the circuit's error must stay below it."
-    );
+    let mut said = vec![
+        "degC: the first, the middle and the last temperature on the way up of [thermal_run]. The loops run without noise.".to_owned(),
+        format!("pp (peak to peak): the largest less the smallest value in {ROWS} rows."),
+        "output: of the loop, in the unit beside its name.".to_owned(),
+        "error: the difference of the magnitude or the phase from its setpoint, in LSB of that word.".to_owned(),
+        "circuit: the bit-accurate loop with ADC and NCO.".to_owned(),
+        "model: the same loop without ADC and NCO.".to_owned(),
+        "limit: the model's error plus the most that ADC and NCO can add. The circuit's error must stay below it.".to_owned(),
+    ];
     if !means.is_empty() {
-        text += &format!(
-            " By theory the loops have no dead band: they correct every error, however small. Mean error = change of the integrator / \
-             number of rows: in {ROWS} rows {}. It goes to 0 in a longer run.",
+        said.push(format!(
+            "mean error: change of the integrator / number of rows. In {ROWS} rows {}. It goes to 0 in a longer run.",
             means.join(", ")
+        ));
+        said.push(
+            "dead band: none by theory. The loops correct every error, however small.".to_owned(),
         );
     }
     let stand = found.iter().filter(|h| h.stands_at_limit);
@@ -109,12 +113,12 @@ pub fn caption(found: &[Hunting]) -> String {
         .map(|h| format!("{} at {} degC", h.name, h.chamber_degc))
         .collect();
     if !stand.is_empty() {
-        text += &format!(
-            " The output stands at its limit in all rows ({}): there the loop corrects no error, and the mean error does not go to 0.",
+        said.push(format!(
+            "The output stands at its limit in all rows ({}). There the loop corrects no error, and the mean error does not go to 0.",
             stand.join(", ")
-        );
+        ));
     }
-    text
+    said
 }
 
 /// Both loops at the run's start, middle and top.
@@ -373,11 +377,26 @@ mod tests {
     #[test]
     fn a_loop_that_stands_at_its_limit_is_not_said_to_correct_its_error() {
         let mut design = default_design().expect("the default");
-        let working = caption(&hunting(&design).expect("a run"));
+        let working = definitions(&hunting(&design).expect("a run"));
+        // A definition is a line of its own, begun by the word that it explains.
+        for word in [
+            "pp ",
+            "output",
+            "error",
+            "circuit",
+            "model",
+            "limit",
+            "mean error",
+        ] {
+            let of_word = working.iter().filter(|l| l.starts_with(word));
+            assert_eq!(of_word.count(), 1, "{word}: {working:?}");
+        }
+        let working = working.join(" ");
         assert!(
             working.contains(
-                "in 8192 rows a change by one gain LSB is a mean error of 0.500 LSB (amplitude_loop). It goes to 0 in a longer run."
-            ) && !working.contains("limit in all rows"),
+                "In 8192 rows a change by one gain LSB is a mean error of 0.500 LSB (amplitude_loop). It goes to 0 in a longer run."
+            ) && working.contains("dead band: none")
+                && !working.contains("limit in all rows"),
             "{working}"
         );
         if let Some(l) = &mut design.circuit.amplitude_loop {
@@ -385,9 +404,9 @@ mod tests {
         }
         let found = hunting(&design).expect("a run");
         assert!(found.iter().all(|h| h.stands_at_limit), "{found:?}");
-        let said = caption(&found);
+        let said = definitions(&found).join(" ");
         assert!(
-            said.contains("(amplitude_loop at 0 degC, ") && !said.contains("no dead band"),
+            said.contains("(amplitude_loop at 0 degC, ") && !said.contains("dead band"),
             "{said}"
         );
     }

@@ -180,7 +180,7 @@ fn a_setpoint_out_of_reach_is_warned_of_and_its_loop_is_not_praised() {
     let said = String::from_utf8(output.stdout).expect("UTF-8");
     assert!(
         said.contains("The output stands at its limit in all rows")
-            && !said.contains("no dead band")
+            && !said.contains("dead band: none")
             && said.contains("note: nodes flagged [open_loop_integral]: their errors add up"),
         "{said}"
     );

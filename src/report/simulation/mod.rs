@@ -27,7 +27,7 @@ struct Page {
     /// most), mean.
     loops: Vec<[String; 8]>,
     /// What these columns hold.
-    loops_caption: String,
+    loops_words: Vec<String>,
     /// What the facts are of.
     facts_are: &'static str,
     /// Name, value.
@@ -78,7 +78,7 @@ pub fn html(outcome: &Outcome) -> Result<String> {
             .collect(),
         figures: figures::all(outcome),
         loops: loops(outcome),
-        loops_caption: hunting::caption(&outcome.summary.loops),
+        loops_words: hunting::definitions(&outcome.summary.loops),
         facts_are: match (s.fit.is_some(), s.lock.is_some()) {
             (true, true) => "Fit, lock and power-on",
             (true, false) => "Fit and power-on",
