@@ -9,7 +9,7 @@ use crate::error::{Error, InputError, Result};
 use crate::nodes::repair::{self, Repair};
 use crate::tabulate::choice;
 use crate::tabulate::describe;
-use crate::text::{at_most, number};
+use crate::text::{at_most, constant, number};
 use serde::Serialize;
 
 /// Words that are all run; of more, as many evenly spread.
@@ -412,16 +412,25 @@ pub fn sentences_with(design: &Design, bounds: &Bounds, of_run: Option<OfRun>) -
     }
     if let Some(outside) = &bounds.outside {
         lines.push(format!(
-            "Outside the calibrated inputs {}. Nothing was measured there; the continued polynomial is up to {} deg/s away.",
+            "Outside the calibrated inputs {}. Nothing was measured there. If the bias went on as the polynomial does, the firmware \
+             would be off by at most {} deg/s, over all inputs that its word can hold ({}).",
             match outside.contract {
                 "clamp" => "the bias keeps its value at the nearer end (clamp)".to_owned(),
                 "hold_slope" => "the bias goes on with the nearer end's slope (hold_slope)".to_owned(),
                 other => format!("the contract is {other}"),
             },
-            at_most(outside.worst_dps, 3)
+            at_most(outside.worst_dps, 3),
+            every_reading(&Evaluation::new(&design.circuit, c))
         ));
     }
     lines
+}
+
+/// What the first and the last word that can come in stand for.
+fn every_reading(evaluation: &Evaluation) -> String {
+    let (first, last) = evaluation.words();
+    let [(low, unit), (high, _)] = [first, last].map(|word| evaluation.reading(word));
+    format!("{} .. {} {unit}", constant(low, 5), constant(high, 5))
 }
 
 /// What running it showed, in a sentence.

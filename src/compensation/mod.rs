@@ -8,12 +8,13 @@ pub mod coefficients;
 mod tests;
 
 use crate::circuit::compensation::Bias;
-use crate::design::{Circuit, Compensation};
+use crate::design::{Circuit, Compensation, CompensationInput, record_columns};
 use crate::numeric::arithmetic::Block;
 use crate::numeric::fixed::Fixed;
 use crate::numeric::format::{Rounding, pow2};
 use crate::numeric::trace::Trace;
 use crate::numeric::trace::ir::Program;
+use std::f64::consts::TAU;
 
 /// A compensation's polynomial as it is evaluated in firmware.
 #[derive(Debug, Clone)]
@@ -83,6 +84,26 @@ impl<'a> Evaluation<'a> {
     /// First and last word that can come in.
     pub fn words(&self) -> (i128, i128) {
         (self.bias.input_range.low, self.bias.input_range.high)
+    }
+
+    /// What an input word stands for, with its unit: rad of the phase, Hz of the tuning word, a channel's own unit.
+    pub fn reading(&self, word: i128) -> (f64, &'static str) {
+        let word = word as f64;
+        match &self.compensation.input {
+            CompensationInput::Phase => {
+                let turn = pow2(self.circuit.cordic.angle_bits as i32);
+                (TAU * word / turn, "rad")
+            }
+            CompensationInput::TuningWord(_) => {
+                let nco = &self.circuit.nco;
+                let step_hz = self.circuit.sample_rate_hz * pow2(-(nco.phase_bits as i32));
+                ((nco.tuning_word as f64 + word) * step_hz, "Hz")
+            }
+            CompensationInput::Channel(channel) => (
+                word * channel.format.lsb(),
+                record_columns::unit_of(&channel.column),
+            ),
+        }
     }
 
     /// What the Horner steps' roundings can add for variables up to `p_max`, deg/s: each step's is multiplied by

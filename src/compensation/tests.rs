@@ -110,8 +110,13 @@ fn the_search_never_does_worse_than_rounding() {
 fn beyond_the_range_the_slope_is_held_and_the_worst_is_stated() {
     for seed in 0..40 {
         let mut design = random(seed);
-        let clamped = bounds(&design).unwrap().unwrap().outside.unwrap();
+        let found = bounds(&design).unwrap().unwrap();
+        let told = sentences(&design, &found).join(" ");
+        let clamped = found.outside.unwrap();
         assert_eq!(clamped.contract, "clamp");
+        // A figure of every input says so: another, of a tenth of the range beyond it, is told elsewhere.
+        let farthest = "over all inputs that its word can hold (-3.1416 .. 3.1415 rad)";
+        assert!(told.contains(farthest), "{told}");
         let c = design.compensation.as_mut().unwrap();
         c.outside = Outside::Flag;
         let found = bounds(&design).unwrap().unwrap();

@@ -237,8 +237,8 @@ fn extrapolation(c: &Checked<'_>) -> Option<Warning> {
             "extrapolation",
             &fit.thermometer,
             format!(
-                "nothing was measured beyond {} .. {} {unit}, and the polynomial cannot stand in for it: at {} {unit} it is {} deg/s from \
-                 its value at the nearer end, with a standard deviation of {} deg/s",
+                "nothing was measured beyond {} .. {} {unit}, and the polynomial is no guide there. A tenth of this range beyond its end, at \
+                 {} {unit}, the polynomial is {} deg/s from its value at the end, with a standard deviation of {} deg/s",
                 constant(low, 5),
                 constant(high, 5),
                 constant(t, 5),

@@ -1,4 +1,4 @@
-//! The polynomial's order: as asked for, or the lowest whose held-out error is within one standard error of the least.
+//! The polynomial's order: as asked for, or the smallest whose held-out error is within one standard error of the least.
 
 use crate::design::FitOrder;
 use crate::statistics::folds;
@@ -90,15 +90,16 @@ pub fn choose(sample: &Sample, wanted: FitOrder, most: usize, blocks: &[Range<us
         ),
         FitOrder::Auto | FitOrder::ByRecord if smallest == best_order => (
             best_order,
-            format!("order {best_order} has the least held-out error, {best_rms:.4} deg/s rms"),
+            format!("order {best_order} has the smallest held-out rms, {best_rms:.4} deg/s"),
         ),
-        FitOrder::Auto | FitOrder::ByRecord => (
-            smallest,
+        FitOrder::Auto | FitOrder::ByRecord => (smallest, {
+            let own = results.get(smallest);
+            let own = own.map_or(best_rms, |r| r.0.heldout_clean_rms_dps);
             format!(
-                "order {smallest}, the lowest whose held-out error is at most {limit:.4} deg/s rms: that is one standard error \
-                 above the least, {best_rms:.4} by order {best_order}"
-            ),
-        ),
+                "order {smallest}, held-out rms {own:.4} deg/s{}",
+                why_smallest(smallest, (best_order, best_rms), limit)
+            )
+        }),
     };
     let chosen = results.get(order).or(results.last());
     if matches!(wanted, FitOrder::Fixed(_))
@@ -112,13 +113,10 @@ pub fn choose(sample: &Sample, wanted: FitOrder, most: usize, blocks: &[Range<us
         let given = t.heldout_clean_rms_dps;
         let why = match smallest == best_order {
             true => String::new(),
-            false => format!(
-                ". Order {best_order} has the least, {best_rms:.4} deg/s; order {smallest} is the lowest within one standard \
-                 error of it"
-            ),
+            false => why_smallest(smallest, (best_order, best_rms), limit),
         };
         reason.push_str(&format!(
-            ": held-out rms {given:.4} deg/s. Chosen by held-out error it would be order {smallest}: {by_rule:.4} deg/s{why}"
+            ": held-out rms {given:.4} deg/s. By held-out error it would be order {smallest}, held-out rms {by_rule:.4} deg/s{why}"
         ));
     }
     let heldout = chosen.map_or_else(HeldOut::nothing, |(_, h)| h.clone());
@@ -128,6 +126,15 @@ pub fn choose(sample: &Sample, wanted: FitOrder, most: usize, blocks: &[Range<us
         heldout,
         reason,
     }
+}
+
+/// Why `order` is taken although another, `best`, has the smallest held-out rms, deg/s: its own is within `limit`, deg/s.
+fn why_smallest(order: usize, best: (usize, f64), limit: f64) -> String {
+    let (best_order, best_rms) = best;
+    format!(
+        ". Order {best_order} has the smallest held-out rms, {best_rms:.4} deg/s. Order {order} is the smallest order that exceeds \
+         it by at most one standard error (up to {limit:.4} deg/s)"
+    )
 }
 
 fn mean(v: &[f64]) -> f64 {
@@ -142,4 +149,19 @@ fn standard_error(v: &[f64]) -> f64 {
     let m = mean(v);
     let variance = v.iter().map(|x| (x - m).powi(2)).sum::<f64>() / (v.len() - 1) as f64;
     (variance / v.len() as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Which order is the smallest, and which has the smallest error, cannot be mistaken for each other.
+    #[test]
+    fn the_order_and_the_error_are_told_apart() {
+        assert_eq!(
+            why_smallest(3, (5, 1.7723), 2.05),
+            ". Order 5 has the smallest held-out rms, 1.7723 deg/s. Order 3 is the smallest order that exceeds it by at most one \
+             standard error (up to 2.0500 deg/s)"
+        );
+    }
 }

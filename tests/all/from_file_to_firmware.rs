@@ -334,8 +334,8 @@ fn a_simulated_run_says_why_its_own_record_gets_another_order() {
     assert!(
         own.contains(
             ": order 2 is prescribed for the simulated run (Chen et al. 2004): held-out rms "
-        ) && own.contains("Chosen by held-out error it would be order 3: ")
-            && own.contains("; order 3 is the lowest within one standard error of it. "),
+        ) && own.contains("By held-out error it would be order 3, held-out rms ")
+            && own.contains(" Order 3 is the smallest order that exceeds it by at most one standard error (up to "),
         "{own}"
     );
     assert!(
@@ -343,7 +343,7 @@ fn a_simulated_run_says_why_its_own_record_gets_another_order() {
         "{own}"
     );
     assert!(
-        again.contains(": order 3, the lowest ")
+        again.contains(": order 3, held-out rms ")
             // The reader of a measured record has no simulated one.
             && !again.contains("simulated"),
         "{again}"
