@@ -12,7 +12,7 @@ use crate::design::{Design, Limit, LimitName, limits};
 use crate::error::Result;
 use crate::study::answer::cost_of;
 use crate::study::bandwidth::bandwidth_hz;
-use crate::study::certainty::{Bounds, Confidence, largest};
+use crate::study::certainty::{Bounds, Confidence, JOINT, largest};
 use crate::study::figures::Figures;
 use crate::study::job::cycles_of_a_processor;
 use crate::study::retune::with_lengths;
@@ -51,28 +51,57 @@ impl Requirement {
             .target
             .as_ref()
             .map_or(String::new(), |t| format!(" on {t}"));
-        let sign = if self.at_least { ">=" } else { "<=" };
         let within = if self.at_least {
             self.obtained >= self.limit
         } else {
             self.obtained.abs() <= self.limit
         };
-        let found = match self.bounds {
-            Some([low, high]) if within => {
-                format!(
-                    "{} was found, and it may be anything from {low} to {high}: not shown",
-                    number(self.obtained, 3),
-                    low = number(low, 3),
-                    high = number(high, 3)
-                )
-            }
-            _ => format!("it is {}", number(self.obtained, 5)),
+        let found = match self.most() {
+            Some(most) if within => format!(
+                "is not shown to be met: {} was computed, but with {:.0} % confidence its magnitude is only known to be at most {}",
+                number(self.obtained, 3),
+                100.0 * JOINT,
+                number(most, 3)
+            ),
+            _ => format!("is not met: it is {}", number(self.obtained, 5)),
         };
         let mend = self.mend.as_deref().unwrap_or_default();
         Some(format!(
-            "requirement {}{target} {sign} {:e} is not met: {found}; {mend}",
-            self.name, self.limit
+            "requirement {}{target} {} {:e} {found}. What would mend it: {mend}",
+            self.limited(),
+            self.sign(),
+            self.limit
         ))
+    }
+
+    /// What is limited: the figure, or its magnitude where it has a sign.
+    pub fn limited(&self) -> String {
+        let signed = [LimitName::Bias, LimitName::ScaleFactor];
+        match signed.iter().any(|name| name.name() == self.name) {
+            true => format!("|{}|", self.name),
+            false => self.name.to_owned(),
+        }
+    }
+
+    /// `<=` or `>=`.
+    pub fn sign(&self) -> &'static str {
+        if self.at_least { ">=" } else { "<=" }
+    }
+
+    /// The largest magnitude that the figure may have, with the check's confidence; `None` of what is known without a run.
+    pub fn most(&self) -> Option<f64> {
+        self.bounds.map(largest)
+    }
+
+    /// How far what is judged, [`most`](Self::most) or the figure itself, is inside of the limit, in parts of it; below 0: outside.
+    pub fn margin(&self) -> f64 {
+        let judged = self.most().unwrap_or(self.obtained);
+        let inside = if self.at_least {
+            judged - self.limit
+        } else {
+            self.limit - judged
+        };
+        inside / self.limit.max(f64::MIN_POSITIVE)
     }
 }
 
@@ -166,7 +195,7 @@ fn costs(design: &Design, limit: &Limit) -> Vec<Requirement> {
                 let tried = steps
                     .iter()
                     .filter_map(|(w, l, d)| Some((*w, *l, value(d)?)));
-                mend(tried, obtained, limit, "less", |v| v <= limit.value)
+                mend(tried, obtained, limit, "", |v| v <= limit.value)
             }),
         })
     };
@@ -191,12 +220,12 @@ fn changed(design: &Design, to: &dyn Fn(u32, u32) -> Option<u32>) -> Vec<(Word, 
     out
 }
 
-/// The first change that is enough, or the one that does most.
+/// The first change that is enough, or the one that does most. `most` stands before a value that is an upper bound.
 fn mend(
     tried: impl Iterator<Item = (Word, u32, f64)>,
     obtained: f64,
     limit: &Limit,
-    what: &str,
+    most: &str,
     enough: impl Fn(f64) -> bool,
 ) -> String {
     let mut best: Option<(Word, u32, f64)> = None;
@@ -212,21 +241,22 @@ fn mend(
     let name = limit.name.name();
     match (first, best) {
         (Some((word, length, value)), _) => format!(
-            "`{}` of {length} {} makes it {value}",
+            "`{}` of {length} {} makes it {most}{value}",
             word.key(),
             word.counts(),
             value = number(value, 3)
         ),
         (None, Some((word, length, value))) => format!(
-            "no word alone mends it, the most does `{}` of {length} {} ({value}); `gyrogen study DESIGN --for \"{name}<={:e}\"`, \
-             with this design's file, looks for one that does",
+            "no single word length is enough. Of all changes of one word by up to {STEPS} bits `{}` of {length} {} helps most: it makes \
+             it {most}{value}. `gyrogen study DESIGN --for \"{name}<={:e}\"` tries several words together (DESIGN: the design's file)",
             word.key(),
             word.counts(),
             limit.value,
             value = number(value, 3)
         ),
         (None, None) => format!(
-            "no word makes it {what} by up to {STEPS} bits; raise the limit, or `gyrogen study` shows what there is"
+            "no single word length that is changed by up to {STEPS} bits improves it. Raise the limit, or see with `gyrogen study DESIGN` \
+             what several words do together (DESIGN: the design's file)"
         ),
     }
 }
@@ -259,7 +289,7 @@ impl Added<'_> {
                 let tried = self.tried.get_or_init(|| self.longer()).iter();
                 let most = |b: &Bounds| b.of(limit.name).map(largest);
                 let tried = tried.filter_map(|(w, l, b)| Some((*w, *l, most(b)?)));
-                mend(tried, largest(interval), limit, "better", |v| {
+                mend(tried, largest(interval), limit, "at most ", |v| {
                     v <= limit.value
                 })
             }),

@@ -297,10 +297,31 @@ fn a_figure_that_only_seems_to_be_within_its_limit_does_not_meet_it() {
     let between = required(&limit(0.5 * (found.obtained + high)));
     let r = requirement(&between, "noise_dps_rthz");
     assert!(
-        !r.met && r.failure().unwrap().contains("not shown"),
+        !r.met && r.failure().unwrap().contains("is not shown to be met: "),
         "{r:?}"
     );
+    assert!(r.obtained < r.limit && r.margin() < 0.0, "{r:?}");
     assert!(requirement(&required(&limit(1.001 * high)), "noise_dps_rthz").met);
+}
+
+#[test]
+fn a_limit_on_what_has_a_sign_is_said_to_be_on_its_magnitude() {
+    let c = required("bias_dps = 1e-9\nnoise_dps_rthz = 1.0\nbandwidth_hz = 100.0\n");
+    let bias = requirement(&c, "bias_dps");
+    assert_eq!(bias.limited(), "|bias_dps|");
+    let why = bias.failure().unwrap();
+    assert!(
+        why.starts_with("requirement |bias_dps| <= 1e-9 is not met: it is ")
+            && why.contains("What would mend it: no single word length is enough. "),
+        "{why}"
+    );
+    let noise = requirement(&c, "noise_dps_rthz");
+    assert_eq!(noise.limited(), "noise_dps_rthz");
+    // Of the bound where there is one, and of the least that is asked from below.
+    let most = noise.bounds.unwrap()[1];
+    assert!((noise.margin() - (1.0 - most)).abs() < 1e-12, "{noise:?}");
+    let bandwidth = requirement(&c, "bandwidth_hz");
+    assert!((bandwidth.margin() - (bandwidth.obtained / 100.0 - 1.0)).abs() < 1e-12);
 }
 
 #[test]

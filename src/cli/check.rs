@@ -5,10 +5,11 @@ use super::stages::Stages;
 use super::terminal::OutputFormat;
 use crate::check::outcome::{Check, NodeCheck, Overflows};
 use crate::check::remarks::Remark;
+use crate::check::requirements::Requirement;
 use crate::check::{self, SAMPLES};
 use crate::error::{Error, Result};
 use crate::numeric::trace::ir::Interval;
-use crate::text::{counted, number};
+use crate::text::{constant, counted, number};
 use crate::timing;
 use std::path::PathBuf;
 
@@ -68,7 +69,14 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
 }
 
 fn print(check: &Check) {
-    for reason in &check.reasons {
+    // What is required has a table of its own, with what would mend it.
+    let of_requirements: Vec<String> = check
+        .requirements
+        .iter()
+        .filter_map(Requirement::failure)
+        .collect();
+    let others = check.reasons.iter();
+    for reason in others.filter(|reason| !of_requirements.contains(reason)) {
         say!("{reason}");
     }
     // In two tables: one of all columns is too wide for a terminal.
@@ -274,41 +282,67 @@ fn named(name: &str) -> (&str, &'static str) {
     (name, what)
 }
 
+/// What is required: a table, what its columns are, and what would mend each row that fails.
 fn requirements(check: &Check) {
     if check.requirements.is_empty() {
         return;
     }
-    let mut table =
-        super::terminal::table(&["required", "on", "limit", "obtained", "between", "met"]);
+    let percent = check.confidence.map(|c| 100.0 * c.joint);
+    let at_most = match percent {
+        Some(percent) => format!("at most\nwith {percent:.0} %"),
+        None => "at most".to_owned(),
+    };
+    let mut table = super::terminal::table(&[
+        "required", "limit", "on", "computed", &at_most, "margin", "result",
+    ]);
     for r in &check.requirements {
-        let sign = if r.at_least { ">=" } else { "<=" };
-        let between = r.bounds.map_or("-".to_owned(), |[low, high]| {
-            format!(
-                "{low} and {high}",
-                low = number(low, 3),
-                high = number(high, 3)
-            )
-        });
-        table.add_row([
-            r.name.to_owned(),
-            r.target.clone().unwrap_or("-".to_owned()),
-            format!("{sign} {:e}", r.limit),
-            number(r.obtained, 5),
-            between,
-            if r.met { "yes" } else { "NO" }.to_owned(),
-        ]);
+        table.add_row(requirement(r));
     }
-    super::terminal::numbers(&mut table, 2..);
+    super::terminal::numbers(&mut table, 1..2);
+    super::terminal::numbers(&mut table, 3..6);
     super::terminal::show(&table);
-    if let Some(c) = &check.confidence {
+    let has_sign = |r: &Requirement| r.limited() != r.name;
+    if check.requirements.iter().any(has_sign) {
+        say!("|x|: the magnitude of x, which may be above or below 0");
+    }
+    if let (Some(c), Some(percent)) = (&check.confidence, percent) {
         say!(
-            "the {} intervals hold at once with {:.0} % confidence ({}: each by itself with {:.2} %)",
-            c.intervals,
-            100.0 * c.joint,
+            "computed: from one run with noise. at most: the largest magnitude that the figure may have with other noise"
+        );
+        say!(
+            "{percent:.0} %: the confidence that {} together ({}: {:.2} % for each by itself)",
+            match c.intervals {
+                1 => "this bound holds".to_owned(),
+                count => format!("all {count} of these bounds hold"),
+            },
             c.correction,
             100.0 * c.each
         );
     }
+    say!(
+        "margin: how far the bound (without one, the computed figure) is inside of the limit, in % of the limit; below 0 it is outside"
+    );
+    for r in check.requirements.iter().filter(|r| !r.met) {
+        let on = r
+            .target
+            .as_ref()
+            .map_or(String::new(), |t| format!(" on {t}"));
+        let mend = r.mend.as_deref().unwrap_or_default();
+        say!("what would mend {}{on}: {mend}", r.limited());
+    }
+}
+
+/// A requirement's row.
+fn requirement(r: &Requirement) -> [String; 7] {
+    [
+        r.limited(),
+        format!("{} {}", r.sign(), constant(r.limit, 4)),
+        r.target.clone().unwrap_or("-".to_owned()),
+        number(r.obtained, 4),
+        r.most().map_or("-".to_owned(), |most| number(most, 3)),
+        format!("{} %", number(100.0 * r.margin(), 3)),
+        if r.met { "pass" } else { "FAIL" }.to_owned(),
+    ]
 }
 
 /// Bits that a word has and bits that its proved range needs; `None` where wrapping or limiting is its function.
