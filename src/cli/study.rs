@@ -163,14 +163,25 @@ fn into_folder(
             super::common::wrote(&arguments.out, &["report.html", DESIGNS]);
         }
     }
-    let unmet = done.study.chosen.iter().filter(|c| c.point.is_none());
-    let unmet: Vec<String> = unmet
-        .map(|c| format!("{}: {}", c.target, c.reason))
-        .collect();
+    let unmet = unmet(&done.study);
     if !request.limits.is_empty() && !unmet.is_empty() {
         return Err(Error::Check(unmet.join("; ")));
     }
     Ok(())
+}
+
+/// Why targets have no point, each reason once with all targets that have it.
+fn unmet(s: &Study) -> Vec<String> {
+    let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
+    for c in s.chosen.iter().filter(|c| c.point.is_none()) {
+        match reasons.iter_mut().find(|(reason, _)| *reason == c.reason) {
+            Some((_, targets)) => targets.push(&c.target),
+            None => reasons.push((&c.reason, vec![&c.target])),
+        }
+    }
+    let told = reasons.iter();
+    told.map(|(reason, targets)| format!("{}: {reason}", targets.join(", ")))
+        .collect()
 }
 
 /// The columns of figures: title and unit.
@@ -186,6 +197,9 @@ fn print(s: &Study) {
     say!("what the word lengths add to the gyro's own errors; costs in % of the given design's");
     super::terminal::show(&points(s));
     say!("*: on that target's front: nothing cheaper has so small a merit");
+    if s.chosen.iter().any(|c| c.nearest.is_some()) {
+        say!("!: the verified design that is nearest to what is required; it does NOT meet it");
+    }
     say!(
         "limit: {}",
         match s.limits_from {
@@ -198,8 +212,7 @@ fn print(s: &Study) {
     say!(
         "merit: the largest ratio of a column to its limit (`by`: which column), by the estimates; smaller is better"
     );
-    let mut all = std::iter::once(&s.reference).chain(&s.front);
-    if all.any(is_within_by_estimate_alone) {
+    if all_points(s).any(is_within_by_estimate_alone) {
         say!(
             "?: the estimates are within the limits, the whole of their {:.0} % intervals (study.json) is not. No such point is chosen.",
             100.0 * s.confidence.joint
@@ -238,9 +251,14 @@ fn print(s: &Study) {
          than {percent:.0} %; -: none in the range"
     );
     for chosen in &s.chosen {
-        match chosen.point {
-            Some(point) => say!("{}: point {point}, {}", chosen.target, chosen.reason),
-            None => say!("{}: {}", chosen.target, chosen.reason),
+        if let Some(point) = chosen.point {
+            say!("{}: point {point}, {}", chosen.target, chosen.reason);
+        }
+    }
+    // Where something is required the failed check says this.
+    if s.required.is_empty() {
+        for reason in unmet(s) {
+            say!("{reason}");
         }
     }
     say!(
@@ -269,8 +287,12 @@ fn points(s: &Study) -> comfy_table::Table {
     header.extend(COLUMNS);
     header.extend(["merit", "by"]);
     let mut table = super::terminal::table(&header);
-    for p in std::iter::once(&s.reference).chain(&s.front) {
-        table.add_row(row(p, &targets));
+    for p in all_points(s) {
+        let mut row = row(p, &targets);
+        if s.chosen.iter().any(|c| c.nearest == Some(p.number)) {
+            row[0].insert(0, '!');
+        }
+        table.add_row(row);
     }
     let limits = s.limits.limits().into_iter();
     let limits = limits.map(|(_, limit)| limit.map_or("-".to_owned(), |l| number(l, 3)));
@@ -280,6 +302,13 @@ fn points(s: &Study) -> comfy_table::Table {
     table.add_row(limit);
     super::terminal::numbers(&mut table, 1..1 + targets.len() + COLUMNS.len() + 1);
     table
+}
+
+/// The given design, the front, and what is beside it.
+fn all_points(s: &Study) -> impl Iterator<Item = &Point> {
+    std::iter::once(&s.reference)
+        .chain(&s.front)
+        .chain(&s.nearest)
 }
 
 /// A merit of at most 1 does not say by itself that a point may be chosen.

@@ -1,18 +1,16 @@
-//! What a study answers: which point to take, what a bit more or less of a word does there, and which requirement
-//! cannot be met because of which word.
+//! What a study answers: which point to take, and what a bit more or less of a word does there. Where there is none,
+//! [`super::unmet`] says why.
 
 use super::bench::Bench;
-use super::certainty::Bounds;
 use super::figures::Figures;
 use super::merit::Scale;
 use super::outcome::{Chosen, Point, Required, Step};
-use super::reporting::{Checked, RESOLUTION, Reporting};
-use super::retune;
-use super::search::{self, FINEST_MERIT};
+use super::reporting::{Checked, Reporting};
+use super::search::FINEST_MERIT;
 use super::space::Lengths;
+use super::unmet::{Near, required, why_not};
 use crate::cost::{self, Cost};
-use crate::design::word::Word;
-use crate::design::{Design, LimitName, Limits};
+use crate::design::{LimitName, Limits};
 use crate::parallel::in_parallel;
 use crate::text::number;
 use std::collections::BTreeMap;
@@ -27,7 +25,7 @@ pub(super) struct Seen {
 
 impl Seen {
     /// Those that say what a limit on the bias can be, which includes the start, or on the rest.
-    fn of(&self, bias: bool) -> impl Iterator<Item = &Checked> {
+    pub(super) fn of(&self, bias: bool) -> impl Iterator<Item = &Checked> {
         let late = self.late.iter().filter(move |_| bias);
         self.good.values().chain(late)
     }
@@ -130,7 +128,7 @@ pub(super) fn figures_hold(work: &Reporting, c: &Checked) -> bool {
 }
 
 /// True if bytes and cycles are within their limits. An FPGA has no cycles of a processor.
-fn costs_hold(cost: &Cost, is_fabric: bool, limits: &Limits) -> bool {
+pub(super) fn costs_hold(cost: &Cost, is_fabric: bool, limits: &Limits) -> bool {
     limits.iter().all(|limit| {
         let value = cost_of(cost, is_fabric, limit.name);
         value.is_none_or(|value| value <= limit.value)
@@ -147,7 +145,7 @@ pub fn cost_of(cost: &Cost, is_fabric: bool, name: LimitName) -> Option<f64> {
     }
 }
 
-fn target<'w>(work: &'w Reporting, objective: usize) -> &'w str {
+pub(super) fn target<'w>(work: &'w Reporting, objective: usize) -> &'w str {
     work.design.study.targets.get(objective).map_or("", |t| t)
 }
 
@@ -158,6 +156,7 @@ pub(super) fn answers(
     points: &[(Lengths, Point)],
     given: &Point,
     best: &[Option<Lengths>],
+    near: &[Option<Near>],
 ) -> Answers {
     let limits = work.limits;
     let required = required(work, seen);
@@ -167,6 +166,7 @@ pub(super) fn answers(
         let target = target(work, objective);
         let cost = |p: &Point| p.price.get(target).copied().unwrap_or(f64::INFINITY);
         let point = points.iter().find(|(l, _)| Some(l) == lengths.as_ref());
+        let nearest = near.get(objective).and_then(Option::as_ref);
         notes.extend(point.and_then(|(l, p)| {
             let worse = unlimited(work, &seen.good.get(l)?.verified.figures)?;
             let number = p.number;
@@ -187,11 +187,12 @@ pub(super) fn answers(
                 };
                 format!("{what}: {part:.1} % of the given design's cost")
             }
-            None => why_not(work, seen, &required, objective),
+            None => why_not(work, &required, nearest, objective),
         };
         chosen.push(Chosen {
             target: target.to_owned(),
             point: point.map(|(_, p)| p.number),
+            nearest: nearest.map(|near| near.number),
             reason,
             sensitivity: point.map_or(Vec::new(), |(l, _)| sensitivity(work, l)),
         });
@@ -223,240 +224,6 @@ fn unlimited(work: &Reporting, figures: &Figures) -> Option<String> {
         });
     let worse: Vec<String> = worse.collect();
     (!worse.is_empty()).then(|| worse.join(", "))
-}
-
-/// Each limit with the best that is shown of any design, and the word in the way.
-fn required(work: &Reporting, seen: &Seen) -> Vec<Required> {
-    let mut out = Vec::new();
-    for limit in work.limits.iter() {
-        let (best, lengths) = match limit.name {
-            LimitName::Bandwidth => (work.bandwidth_hz, None),
-            LimitName::RomBytes | LimitName::CyclesPerRow => smallest(work, limit.name),
-            name => finest(seen, name),
-        };
-        let met = if limit.name.is_least() {
-            best >= limit.value
-        } else {
-            best <= limit.value
-        };
-        let word = lengths.filter(|_| !met).and_then(|l| match limit.name {
-            LimitName::RomBytes | LimitName::CyclesPerRow => dearest(work, limit.name, &l, best),
-            name => coarsest(work, &l, &|b| b.most(name)),
-        });
-        out.push(Required {
-            name: limit.name.name(),
-            limit: limit.value,
-            best,
-            can_be_met: met,
-            limited_by: match limit.name {
-                LimitName::Bandwidth if !met => Some("circuit.decimator.ratio"),
-                _ => word.map(|w| w.name),
-            },
-            length: word.map(|w| w.length),
-            at_end_of_range: word.is_some_and(|w| w.at_end),
-            varied: word.is_some_and(|w| w.varied),
-        });
-    }
-    out
-}
-
-/// A word that is in the way, as it is in the best design.
-#[derive(Debug, Clone, Copy)]
-struct InTheWay {
-    name: &'static str,
-    length: u32,
-    /// It cannot go further in the study's range.
-    at_end: bool,
-    /// The study varies it.
-    varied: bool,
-}
-
-impl InTheWay {
-    /// The word as it is in `design`, where it would have to go up, or else down.
-    fn new(work: &Reporting, design: &Design, word: Word, up: bool) -> Self {
-        let length = word.length(design).unwrap_or(0);
-        let given = i64::from(word.length(work.design).unwrap_or(0));
-        let variables = work.space.variables.iter();
-        let mut own = variables.filter(|v| v.words.contains(&word)).map(|v| {
-            // Of tied words the ends move with the first.
-            let end = if up { v.high } else { v.low };
-            i64::from(end) - i64::from(v.given) + given
-        });
-        let end = own.next_back();
-        InTheWay {
-            name: word.key(),
-            length,
-            at_end: end.is_some_and(|end| {
-                if up {
-                    i64::from(length) >= end
-                } else {
-                    i64::from(length) <= end
-                }
-            }),
-            varied: end.is_some(),
-        }
-    }
-
-    fn text(&self) -> String {
-        let where_it_is = match (self.varied, self.at_end) {
-            (false, _) => ", which this study does not vary",
-            (true, true) => ", the end of its range",
-            (true, false) => "",
-        };
-        format!(
-            ", limited by `{}` with {}{where_it_is}",
-            self.name, self.length
-        )
-    }
-}
-
-/// The least that a figure is shown to be at most, and of which design.
-fn finest(seen: &Seen, name: LimitName) -> (f64, Option<Lengths>) {
-    let all = seen.of(name == LimitName::Bias);
-    let most = all.filter_map(|c| Some((c.bounds.most(name)?, &c.lengths)));
-    most.min_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(b.1)))
-        .map_or((f64::MAX, None), |(most, l)| (most, Some(l.clone())))
-}
-
-/// The design that ran with the least of a value.
-fn least(work: &Reporting, of: &dyn Fn(&Lengths) -> Option<f64>) -> Option<(f64, Lengths)> {
-    let all = work.bench.all().into_iter();
-    let valued = all.filter_map(|l| Some((of(&l).filter(|v| v.is_finite())?, l)));
-    valued.min_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)))
-}
-
-/// A design with one word, of all that it has and not only of those that vary, a bit longer (`1`) or shorter (`-1`).
-fn with_one(design: &Design, by: i32) -> Vec<(Word, Design)> {
-    let words = Word::ALL.into_iter();
-    let of = |w: Word| {
-        let length = w.length(design)?.checked_add_signed(by)?;
-        let other = retune::with_lengths(design, &[(w, length)]).ok()?;
-        Some((w, other))
-    };
-    words.filter_map(of).collect()
-}
-
-/// The word that keeps a bound of a design from being less: that of which one bit more lowers it the most; or where
-/// none lowers it by more than a merit is certain to, that of which one bit less raises it the most.
-fn coarsest(
-    work: &Reporting,
-    lengths: &[u32],
-    of: &(dyn Fn(&Bounds) -> Option<f64> + Sync),
-) -> Option<InTheWay> {
-    let design = work.space.design(work.design, lengths).ok()?;
-    let value = |d: &Design| {
-        let verified = work.verifier.verify(&d.without_stops()).ok()?;
-        of(&work.bounds(&verified))
-    };
-    let own = value(&design)?;
-    let both = [1, -1].map(|by| {
-        let others = with_one(&design, by);
-        let values = in_parallel(&others, work.bench.threads(), &|_| {}, |(_, d)| value(d));
-        let words = others.iter().map(|(w, _)| *w);
-        let valued = words.zip(values).filter_map(|(w, v)| Some((v?, w)));
-        valued.collect::<Vec<(f64, Word)>>()
-    });
-    let lowest = both[0].iter().min_by(|a, b| a.0.total_cmp(&b.0));
-    if let Some((value, word)) = lowest
-        && *value < own * (1.0 - RESOLUTION)
-    {
-        return Some(InTheWay::new(work, &design, *word, true));
-    }
-    let (_, word) = both[1].iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
-    Some(InTheWay::new(work, &design, *word, true))
-}
-
-/// The least bytes or cycles of a design that is good for anything, and of which.
-fn smallest(work: &Reporting, name: LimitName) -> (f64, Option<Lengths>) {
-    let worst = search::worst_merit(work.bench, work.searched);
-    let value = |l: &Lengths| {
-        let good = work.bench.merit(work.searched, l) <= worst;
-        least_cost(work, name, work.bench.costs(l).filter(|_| good)?)
-    };
-    least(work, &value).map_or((f64::MAX, None), |(value, l)| (value, Some(l)))
-}
-
-/// The least of a cost over the targets.
-fn least_cost(work: &Reporting, name: LimitName, costs: &[Cost]) -> Option<f64> {
-    let of = |(o, c): (usize, &Cost)| cost_of(c, target(work, o) == "fpga", name);
-    costs.iter().enumerate().filter_map(of).reduce(f64::min)
-}
-
-/// The word of which one bit less saves the most of a design's bytes or cycles, `value`.
-fn dearest(work: &Reporting, name: LimitName, lengths: &[u32], value: f64) -> Option<InTheWay> {
-    let design = work.space.design(work.design, lengths).ok()?;
-    let costs = |d: &Design| {
-        let objectives = work.bench.objectives.iter();
-        let costs: Vec<Cost> = objectives.map(|b| cost::of_design(d, b.target)).collect();
-        least_cost(work, name, &costs).unwrap_or(f64::MAX)
-    };
-    let others = with_one(&design, -1).into_iter();
-    let saving = others
-        .map(|(w, d)| (costs(&d), w))
-        .filter(|(c, _)| *c < value);
-    let (_, word) = saving.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    Some(InTheWay::new(work, &design, word, false))
-}
-
-/// Why no design holds what is asked.
-fn why_not(work: &Reporting, seen: &Seen, required: &[Required], objective: usize) -> String {
-    if work.limits.is_empty() {
-        return "no point of the front is as good as the given design".to_owned();
-    }
-    let missed: Vec<&Required> = required.iter().filter(|r| !r.can_be_met).collect();
-    if missed.is_empty() {
-        return nearest(work, seen, objective);
-    }
-    let said: Vec<String> = missed
-        .iter()
-        .map(|r| {
-            let word = match (r.limited_by, r.length) {
-                (Some(name), Some(length)) => InTheWay {
-                    name,
-                    length,
-                    at_end: r.at_end_of_range,
-                    varied: r.varied,
-                }
-                .text(),
-                (Some(name), None) => format!(", limited by `{name}`"),
-                (None, _) => String::new(),
-            };
-            format!(
-                "{} cannot be met: {} is required, {} is the best that is shown of any design{word}",
-                r.name,
-                number(r.limit, 3),
-                number(r.best, 3)
-            )
-        })
-        .collect();
-    said.join("; ")
-}
-
-/// What keeps the nearest design from holding all limits, each of which some design holds.
-fn nearest(work: &Reporting, seen: &Seen, objective: usize) -> String {
-    let each = "each requirement can be met by itself, and no design that was verified is shown to meet all of them at once";
-    let is_fabric = target(work, objective) == "fpga";
-    let able = seen.of(work.limits.get(LimitName::Bias).is_some());
-    let able = able.filter(|c| {
-        let cost = work.bench.costs(&c.lengths).and_then(|c| c.get(objective));
-        cost.is_some_and(|c| costs_hold(c, is_fabric, work.limits))
-    });
-    let misses = able.filter_map(|c| {
-        let limits = work.limits.iter();
-        let parts = limits.filter_map(|l| Some((c.bounds.most(l.name)? / l.value, l.name)));
-        let (part, name) = parts.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        Some((part, name, &c.lengths))
-    });
-    let Some((part, name, lengths)) =
-        misses.min_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.2.cmp(b.2)))
-    else {
-        return each.to_owned();
-    };
-    let word = coarsest(work, lengths, &|b| b.most(name)).map_or(String::new(), |w| w.text());
-    format!(
-        "{each}: the nearest has {part:.3} times the limit of {}{word}",
-        name.name()
-    )
 }
 
 /// One bit more and one bit less of each word.

@@ -4,7 +4,7 @@
 //! runs, [`measure`] runs it, [`figures`] are what comes out, [`merit`] is one number of them. [`mod@bench`] runs and
 //! prices designs, each once, [`journal`] keeps that. [`front`] and [`search`] look for the cheapest, [`quarter`] for one that
 //! costs a quarter less. [`verify`] runs
-//! again what is reported, [`certainty`] says how certain that is, [`budget`] says what each word adds, [`job`] does all of it, `reporting` what follows the search, [`progress`] says how far it is, [`outcome`] is `study.json`, [`shard`] divides the work.
+//! again what is reported, [`certainty`] says how certain that is, [`budget`] says what each word adds, [`job`] does all of it, `reporting` what follows the search, `unmet` says why no design is enough, `late` which starts are too far off, [`progress`] says how far it is, [`outcome`] is `study.json`, [`shard`] divides the work.
 
 mod additive;
 pub mod answer;
@@ -17,6 +17,7 @@ pub mod figures;
 pub mod front;
 pub mod job;
 pub mod journal;
+mod late;
 pub mod measure;
 pub mod merit;
 pub mod outcome;
@@ -29,4 +30,5 @@ pub mod scenario;
 pub mod search;
 pub mod shard;
 pub mod space;
+mod unmet;
 pub mod verify;

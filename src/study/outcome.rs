@@ -138,7 +138,10 @@ pub struct Chosen {
     pub target: String,
     /// Number in `front`; null = none meets what is required.
     pub point: Option<usize>,
-    /// Why this one, or what is in the way.
+    /// Where something is required and none meets it: the number of the verified design that comes nearest, in `front` or
+    /// `nearest`; 0 = the given design.
+    pub nearest: Option<usize>,
+    /// Why this one, or what is in the way and what to do.
     pub reason: String,
     /// One bit more or less of each word.
     pub sensitivity: Vec<Step>,
@@ -153,6 +156,8 @@ pub struct Required {
     pub limit: f64,
     /// The best that is shown of any design: of a figure the largest that it may be with the study's confidence.
     pub best: f64,
+    /// Of a figure its size in that design without the interval; null of costs and the bandwidth.
+    pub estimate: Option<f64>,
     /// It can be met by itself.
     pub can_be_met: bool,
     /// If not: the word that limits it.
@@ -163,6 +168,8 @@ pub struct Required {
     pub at_end_of_range: bool,
     /// The study varies this word.
     pub varied: bool,
+    /// One bit more of it (of a cost: less) lowers that best by more than a merit is certain to. False: no word's bit does.
+    pub step_helps: bool,
 }
 
 /// A design that costs a quarter less than the given one on a target and is as good.
@@ -216,6 +223,9 @@ pub struct Study {
     pub reference: Point,
     /// Undominated, verified designs, the finest last.
     pub front: Vec<Point>,
+    /// Verified designs off the front that come nearest to what is required on a target where none meets it. Their start from
+    /// power-on may be off by more than a point of the front may be.
+    pub nearest: Vec<Point>,
     /// The points that are chosen.
     pub chosen: Vec<Chosen>,
     /// What was required; empty without requirements.

@@ -8,6 +8,7 @@ use super::design_text;
 use super::figures::Figures;
 use super::front::{Point as Candidate, front, resolved};
 use super::job::Done;
+use super::late::{Late, late_starts};
 use super::merit::Scale;
 use super::outcome::{
     Conditions, Parameter, Point, Quarter, QuarterWord, Study, Sweep, Swept, WordLengths,
@@ -16,11 +17,12 @@ use super::progress::{Progress, Step};
 use super::quarter::{SHARE, Tried};
 use super::search;
 use super::space::{Lengths, Space};
+use super::unmet::{self, Near};
 use super::verify::{Verified, Verifier};
 use crate::design::{Design, Limits};
 use crate::error::{InputError, Result};
 use crate::parallel::in_parallel;
-use crate::text::{counted, number};
+use crate::text::counted;
 use std::collections::BTreeMap;
 
 /// Points of a front whose merits differ by less are one point with alternatives: the merit of a point is certain
@@ -54,34 +56,6 @@ pub(super) struct Reporting<'a> {
 
 /// Why a point is dropped of which a word can overflow: an error of its own, whatever its figures are.
 const OVERFLOWS: &str = "a word can overflow that in the given design cannot";
-
-/// A start from power-on after which the error may be too large.
-#[derive(Debug, Clone, Copy)]
-struct Late {
-    /// The largest error that the interval does not exclude, deg/s.
-    start_dps: f64,
-    /// The limit of the bias, deg/s.
-    limit_dps: f64,
-}
-
-/// Why points with such starts are dropped; `None` without any.
-fn late_starts(late: &[Late]) -> Option<String> {
-    let starts = || late.iter().map(|l| l.start_dps);
-    let limit = number(late.first()?.limit_dps, 3);
-    let [least, most] = [
-        starts().fold(f64::INFINITY, f64::min),
-        starts().fold(0.0, f64::max),
-    ]
-    .map(|v| number(v, 3));
-    let range = match least == most {
-        true => most,
-        false => format!("{least} to {most}"),
-    };
-    Some(format!(
-        "the error after power-on may be as large as {range} deg/s. Allowed is the limit of the bias, {limit} deg/s (for a \
-         point with merit above 1: that limit times the merit)"
-    ))
-}
 
 /// What stands in the result as it is.
 pub(super) struct Method<'a> {
@@ -123,6 +97,13 @@ impl Reporting<'_> {
             }
         }
         points.sort_by(|a, b| b.2.merit.total_cmp(&a.2.merit).then_with(|| a.0.cmp(&b.0)));
+        let on_front = points.len();
+        let nearest = unmet::nearest(self, &seen, &chosen);
+        for c in nearest.iter().flatten() {
+            if c.lengths != given && points.iter().all(|(l, ..)| *l != c.lengths) {
+                points.push((c.lengths.clone(), *c, self.point(c)));
+            }
+        }
         let digits = points.len().to_string().len();
         let mut files = Vec::new();
         for (k, (_, c, point)) in points.iter_mut().enumerate() {
@@ -135,7 +116,11 @@ impl Reporting<'_> {
             .iter()
             .map(|(l, _, p)| (l.clone(), p.clone()))
             .collect();
-        let answers = answer::answers(self, &seen, &numbered, &base, &chosen);
+        let near = nearest.into_iter();
+        let near: Vec<Option<Near>> = near.map(|c| c.map(|c| Near::among(c, &numbered))).collect();
+        let answers = answer::answers(self, &seen, &numbered, &base, &chosen, &near);
+        let all = numbered.iter().map(|(_, p)| p.clone());
+        let (front, nearest) = (all.clone().take(on_front), all.skip(on_front));
         notes.extend(answers.notes);
         let threads = self.bench.threads();
         let mut chosen_budgets = BTreeMap::new();
@@ -154,7 +139,8 @@ impl Reporting<'_> {
             command: how.command.to_owned(),
             parameters: self.space.variables.iter().map(parameter).collect(),
             reference: base,
-            front: numbered.iter().map(|(_, p)| p.clone()).collect(),
+            front: front.collect(),
+            nearest: nearest.collect(),
             chosen: answers.chosen,
             required: answers.required,
             limits: *self.scale,
@@ -215,18 +201,21 @@ impl Reporting<'_> {
                     seen.late.push(c);
                 }
                 Ok((one, c)) => {
-                    let why = one.and_then(|one| late_starts(&[one]));
-                    notes.extend(why.map(|why| format!("the given design itself: {why}")));
+                    notes.extend(one.and_then(|one| late_starts("the given design", &[one])));
                     seen.good.insert(lengths.clone(), c);
                 }
                 Err(why) => *reasons.entry(why).or_default() += 1,
             }
         }
-        reasons.extend(late_starts(&late).map(|why| (why, late.len() as u64)));
         let told =
             |(why, count): (&String, &u64)| format!("{} dropped: {why}", counted(*count, "point"));
         notes.extend(reasons.iter().map(told));
-        let dropped = reasons.values().sum::<u64>();
+        let count = late.len() as u64;
+        notes.extend(late_starts(
+            &format!("{} dropped", counted(count, "point")),
+            &late,
+        ));
+        let dropped = reasons.values().sum::<u64>() + count;
         (seen, dropped as usize)
     }
 

@@ -37,7 +37,7 @@ pub struct Space {
 
 /// Without `[study.ranges]`: so much shorter, and so much longer.
 const SHORTER: u32 = 10;
-const LONGER: u32 = 3;
+pub(super) const LONGER: u32 = 3;
 
 /// A word is not made shorter than this by default, and never longer than the design's limits.
 fn least_sensible(word: Word) -> u32 {

@@ -395,6 +395,20 @@ fn a_limit_on_the_bias_is_met_by_the_cheapest_design_that_is_shown_to_meet_it() 
         told(&done)
     );
     let result = json(&bytes(&out));
+    let nearest = result["chosen"][0]["nearest"].as_u64().expect("a design");
+    let mark = format!("!{nearest}");
+    let printed = String::from_utf8_lossy(&done.stdout);
+    let marked =
+        |l: &str| l.trim_start().starts_with(&mark) || l.trim_start().starts_with("!given");
+    assert!(printed.lines().any(marked), "{printed}");
+    // Once, though it is so of both targets, and with what would do.
+    let said = told(&done);
+    assert_eq!(said.matches("bias_dps cannot be met").count(), 1, "{said}");
+    assert!(!printed.contains("cannot be met"), "{printed}");
+    assert!(
+        said.contains("It is shown to meet `--for \"bias_dps<="),
+        "{said}"
+    );
     let best = result["required"][0]["best"].as_f64().expect("a number");
     let given = &result["reference"];
     let own = size(given, "bias_dps").max(size(given, "startup_error_dps"));
@@ -402,7 +416,8 @@ fn a_limit_on_the_bias_is_met_by_the_cheapest_design_that_is_shown_to_meet_it() 
     let notes = result["notes"].to_string();
     for text in [
         "dropped: the error after power-on may be as large as ",
-        "Allowed is the limit of the bias, 1.00e-9 deg/s",
+        "Allowed is the limit of the bias, 1.00e-9 deg/s. ",
+        "What to do: a limit of `bias_dps<=",
     ] {
         assert!(notes.contains(text), "{notes}");
     }

@@ -49,7 +49,8 @@ struct Row {
 /// A page that cannot be rendered, which would be a fault of this program.
 pub fn html(s: &Study) -> Result<String> {
     let targets: Vec<String> = s.reference.price.keys().cloned().collect();
-    let all = std::iter::once(&s.reference).chain(&s.front);
+    let all = std::iter::once(&s.reference);
+    let all = all.chain(&s.front).chain(&s.nearest);
     let page = Page {
         headline: headline(s),
         finding: format!(
@@ -74,7 +75,15 @@ pub fn html(s: &Study) -> Result<String> {
             .map(|c| [c.target.clone(), answer(c.point, &c.reason)])
             .collect(),
         required: s.required.iter().map(required).collect(),
-        points: all.map(|p| row(p, &targets)).collect(),
+        points: all
+            .map(|p| {
+                let mut row = row(p, &targets);
+                if s.chosen.iter().any(|c| c.nearest == Some(p.number)) {
+                    row.name += " (! nearest)";
+                }
+                row
+            })
+            .collect(),
         fronts: both(|width| {
             targets
                 .iter()
