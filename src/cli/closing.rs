@@ -275,7 +275,10 @@ fn with_deviation(value: f64, std: f64) -> String {
 fn sentence(c: &Closure) -> String {
     let names: Vec<&str> = c.steps.iter().map(|s| s.effect.as_str()).collect();
     let channel = c.residual_structure.strongest_channel.as_deref();
-    let channel = channel.map_or(String::new(), |c| format!("; it depends most on {c}"));
+    let past = c.both_ways().map_or(String::new(), |thermometer| {
+        format!(" or on the past of {thermometer}, as heating and cooling differ")
+    });
+    let channel = channel.map_or(String::new(), |c| format!("; it depends most on {c}{past}"));
     match c.verdict {
         Verdict::Complete => "complete: nothing beyond noise is left".to_owned(),
         Verdict::Explained => format!("explained by {}", names.join(", ")),
@@ -305,6 +308,7 @@ fn sentence(c: &Closure) -> String {
 #[cfg(test)]
 mod tests {
     use super::{Said, errors, held_out, polynomial, sentence, with_deviation};
+    use crate::record::Warning;
     use crate::verdict::{Closure, Errors, FirmwareErrors, SCHEMA, Step, Structure, Verdict};
     use std::collections::BTreeMap;
 
@@ -387,6 +391,23 @@ mod tests {
             assert!(said.contains(part), "{said}");
         }
         assert!(!sentence(&closure("lsb", 0)).contains("polynomial"));
+    }
+
+    #[test]
+    fn where_heating_and_cooling_differ_time_is_not_named_alone() {
+        let mut both = closure("deg/s", 0);
+        let found = Warning::on("heating_cooling_loop", "die_degc", String::new());
+        both.warnings.push(found);
+        let past = "on the past of die_degc";
+        assert!(!sentence(&both).contains(past));
+        both.residual_structure.strongest_channel = Some("time_s".to_owned());
+        let said = sentence(&both);
+        assert!(
+            said.contains(&format!("depends most on time_s or {past}, as ")),
+            "{said}"
+        );
+        both.warnings.clear();
+        assert!(!sentence(&both).contains(past));
     }
 
     #[test]

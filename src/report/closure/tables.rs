@@ -152,6 +152,11 @@ pub fn next(c: &Closure) -> String {
     let mut out = String::new();
     if let Some(channel) = &c.residual_structure.strongest_channel {
         out += &format!(" What is left shows most in {channel}.");
+        if let Some(thermometer) = c.both_ways() {
+            out += &format!(
+                " As heating and cooling differ, it may hang on the past of {thermometer} rather than on time."
+            );
+        }
     }
     for step in &c.steps {
         if let Some(experiment) = &step.separating_experiment {
