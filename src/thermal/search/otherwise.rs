@@ -123,9 +123,15 @@ impl Search<'_> {
         self.with_ties(&mut found)?;
         self.with_thermometers(&mut found);
         let named: Vec<String> = found.terms.iter().map(Term::id).collect();
+        let excluded = self.candidates.iter();
+        let excluded: Vec<String> = excluded
+            .filter(|k| self.is_excluded_at_rest(k.as_ref()))
+            .map(|k| k.id())
+            .collect();
         for term in &mut found.terms {
-            // What is in beside a step is no other name for it.
-            term.rivals.retain(|id| !named.contains(id));
+            // What is in beside a step is no other name for it, nor is what the record excludes.
+            let is_other = |id: &String| !named.contains(id) && !excluded.contains(id);
+            term.rivals.retain(is_other);
         }
         found.once = self.once(&found)?;
         if !found.once.is_empty() {
