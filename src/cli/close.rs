@@ -258,6 +258,7 @@ fn augmented(closed: &Closed, design: &Design) -> Option<String> {
     let planned = Planned {
         plan: correction.plan.clone(),
         noise_dps: correction.formats.noise_dps,
+        heldout_rms_dps: correction.heldout_rms_dps,
     };
     Some(crate::job::fitted_design::with_correction(design, &planned))
 }

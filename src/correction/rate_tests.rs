@@ -162,6 +162,7 @@ fn a_design_reads_the_square_back_and_does_without() {
         let planned = Planned {
             plan: bent(Some(0), [1e-3, 0.5, s2]),
             noise_dps: 2e-3,
+            heldout_rms_dps: None,
         };
         let text = planned.to_toml();
         assert_eq!(text.contains("s2"), written, "{text}");

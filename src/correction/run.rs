@@ -125,6 +125,8 @@ pub struct Correction {
     pub plan: Plan,
     /// The words.
     pub formats: Formats,
+    /// What it leaves, bit for bit, of readings that its coefficients have not seen, deg/s rms; `None` where nobody measured it.
+    pub heldout_rms_dps: Option<f64>,
     step: Step,
     bound_dps: f64,
 }
@@ -140,6 +142,7 @@ impl Correction {
             bound_dps: bound::bound_dps(plan, formats),
             plan: plan.clone(),
             formats: formats.clone(),
+            heldout_rms_dps: None,
         })
     }
 

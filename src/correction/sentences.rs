@@ -36,6 +36,12 @@ pub fn facts(correction: &Correction) -> Vec<String> {
     facts.push(format!(
         "at most {} deg/s from these terms in real numbers (analysis), where no word saturates{relay}",
         at_most(correction.bound_dps(), 3)));
+    facts.extend(correction.heldout_rms_dps.map(|rms| {
+        format!(
+            "held-out error {} deg/s rms: what this firmware leaves of readings of its record that its coefficients have not seen",
+            number(rms, 3)
+        )
+    }));
     facts
 }
 

@@ -433,9 +433,14 @@ fn a_plan_reads_back_from_a_design_file_and_mistakes_are_shown_in_their_place() 
         let planned = Planned {
             plan: plan(300 + seed, seed as usize % 9, true),
             noise_dps: 2e-3,
+            heldout_rms_dps: (seed % 2 == 0).then_some(3.25e-3),
         };
         let design = parse(&planned.to_toml(), None).unwrap();
-        assert_eq!(design.correction, Some(planned));
+        assert_eq!(design.correction, Some(planned.clone()));
+        // The bundle says it where it is known.
+        let facts = super::sentences::facts(&planned.compile().unwrap()).join("\n");
+        let told = facts.contains("held-out error 0.00325 deg/s rms: ");
+        assert_eq!(told, planned.heldout_rms_dps.is_some(), "{facts}");
     }
     assert_eq!(parse("", None).unwrap().correction, None);
 

@@ -32,7 +32,10 @@ impl Planned {
     /// As [`Correction::new`] and [`Formats::choose`].
     pub fn compile(&self) -> Result<Correction> {
         self.plan.check()?;
-        Correction::new(&self.plan, &Formats::choose(&self.plan, self.noise_dps)?)
+        let formats = Formats::choose(&self.plan, self.noise_dps)?;
+        let mut correction = Correction::new(&self.plan, &formats)?;
+        correction.heldout_rms_dps = self.heldout_rms_dps;
+        Ok(correction)
     }
 
     /// The table as text, read back as itself.
@@ -42,6 +45,9 @@ impl Planned {
         _ = writeln!(text, "period_s = {:?}", plan.period_s);
         _ = writeln!(text, "full_scale_dps = {:?}", plan.full_scale_dps);
         _ = writeln!(text, "noise_dps = {:?}", self.noise_dps);
+        if let Some(rms) = self.heldout_rms_dps {
+            _ = writeln!(text, "heldout_rms_dps = {rms:?}");
+        }
         text += "inputs = [\n";
         for input in &plan.inputs {
             let column = toml::Value::from(input.column.as_str());

@@ -154,6 +154,8 @@ pub struct Planned {
     pub plan: Plan,
     /// Noise of a reading, deg/s rms.
     pub noise_dps: f64,
+    /// What its firmware leaves of readings that its coefficients have not seen, deg/s rms; `None` where nobody measured it.
+    pub heldout_rms_dps: Option<f64>,
 }
 
 /// The noise of a reading that words are chosen for if nothing else is said, in full scales: 1e-3 deg/s

@@ -34,7 +34,15 @@ pub(super) fn correction(table: &Table) -> Result<Planned> {
         Some(plan.full_scale_dps * NOISE_PER_FULL_SCALE),
         |v| v.real(Real::Positive, "noise of a reading, deg/s rms"),
     )?;
-    Ok(Planned { plan, noise_dps })
+    let heldout_rms_dps = table.take("heldout_rms_dps", None, |v| {
+        let meaning = "error on readings that the coefficients have not seen, deg/s rms";
+        v.real(Real::Positive, meaning).map(Some)
+    })?;
+    Ok(Planned {
+        plan,
+        noise_dps,
+        heldout_rms_dps,
+    })
 }
 
 fn input(value: &Value) -> Result<Input> {

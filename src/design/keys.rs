@@ -155,6 +155,7 @@ pub(super) const KEYS: &[(&str, &[(&str, &str)])] = &[
             ("period_s", "10.0"),
             ("full_scale_dps", "500.0"),
             ("noise_dps", "1e-3"),
+            ("heldout_rms_dps", "2e-3"),
             (
                 "inputs",
                 "[{ column = \"phase_rad\", offset = -1.8, scale = 0.4 }]",

@@ -166,7 +166,12 @@ pub fn close(
         closure.design_sha256 = crate::digest::sha256(design.source.text.as_bytes());
         (closure, before, after, accidents, firmware)
     };
-    let (correction, firmware_dps) = firmware.map(|f| (f.correction, f.residual_dps)).unzip();
+    let (mut correction, firmware_dps) = firmware.map(|f| (f.correction, f.residual_dps)).unzip();
+    if let Some(correction) = &mut correction {
+        // Its bundle says it. A record without any error has none to say.
+        let rms = closure.firmware.heldout_rms;
+        correction.heldout_rms_dps = rms.filter(|rms| rms.is_finite() && *rms > 0.0);
+    }
     Ok(Closed {
         closure,
         channels: whole,
