@@ -167,9 +167,18 @@ fn every_instruction_set_gives_the_bits_of_the_blocks() {
 
 #[test]
 fn codes_of_16_bits_give_the_rows_of_the_same_codes_widened() {
-    let design = default_design().expect("the embedded design");
+    let mut design = default_design().expect("the embedded design");
     let mut draw = Draw(0);
-    for count in [0, 1, 2047, 2048, 2049, 3 * 2048 + 17] {
+    // Periods shorter and longer than what is widened at a time.
+    for (ratio, count) in [
+        (32, 0),
+        (32, 1),
+        (32, 999),
+        (100, 999),
+        (128, 999),
+        (300, 2000),
+    ] {
+        design.circuit.decimator.ratio = ratio;
         let [drive, sense] = [(); 2].map(|()| codes(&mut draw, design.circuit.adc.format, count));
         let narrow = |codes: &[i32]| codes.iter().map(|c| *c as i16).collect::<Vec<i16>>();
         let mut both = [(); 2].map(|()| engine(&design, ArithmeticKind::Fixed));

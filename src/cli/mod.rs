@@ -118,7 +118,8 @@ fn parser() -> clap::Command {
     };
     Cli::command().mut_subcommands(|command| {
         command.mut_args(|arg| {
-            let is_of_words = !arg.get_possible_values().is_empty();
+            let is_of_words =
+                !arg.get_possible_values().is_empty() && arg.get_action().takes_values();
             let is_value =
                 arg.get_action().takes_values() && !arg.is_positional() && !is_path(&arg);
             match (is_of_words, is_value) {
