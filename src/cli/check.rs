@@ -41,6 +41,9 @@ const PLANNED: [&str; 2] = ["check.json", timing::NAME];
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let watch = Stages::start("proving and running");
     let design = arguments.design.read()?;
+    if let Some(samples) = arguments.samples {
+        super::equiv::enough(&design, samples, None)?;
+    }
     let claim =
         |out: &PathBuf| super::common::claim(out, &PLANNED, &recorded.inputs, arguments.force);
     let results = arguments.out.as_ref().map(claim).transpose()?;

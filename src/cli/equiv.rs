@@ -157,8 +157,11 @@ fn codes(design: &Design, arguments: &Arguments) -> Result<(Vec<i32>, Vec<i32>, 
     Ok((codes.0, codes.1, origin))
 }
 
-/// Refuses fewer samples than make one row to compare; `capture` has them, or else `--samples` asks for them.
-fn enough(design: &Design, samples: u64, capture: Option<&Path>) -> Result<()> {
+/// Refuses fewer samples than make one row; `capture` has them, or else `--samples` asks for them.
+///
+/// # Errors
+/// Too few samples (exit 2).
+pub(super) fn enough(design: &Design, samples: u64, capture: Option<&Path>) -> Result<()> {
     let least = job::least_samples(design);
     if samples >= least {
         return Ok(());
@@ -171,12 +174,12 @@ fn enough(design: &Design, samples: u64, capture: Option<&Path>) -> Result<()> {
     );
     Err(match capture {
         Some(path) => InputError::new(format!(
-            "the capture has {samples} ADC samples, and {least} are the least that can be compared: {why}"
+            "the capture has {samples} ADC samples, and {least} are the least: {why}"
         ))
         .in_file(path)
         .help("capture longer: the figures are certain from some thousand rows on"),
         None => InputError::new(format!(
-            "`--samples` is {samples}, and {least} are the least that can be compared: {why}"
+            "`--samples` is {samples}, and {least} are the least: {why}"
         ))
         .help(format!("give `--samples {least}` or more")),
     }
