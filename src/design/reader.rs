@@ -163,6 +163,10 @@ fn syntax(doc: &Doc, e: &toml::de::Error) -> Error {
     let said = e.message();
     let help = if said.contains("duplicate key") {
         "a table has each key once, and a file each table once: delete or merge one of the two"
+    } else if said.contains("invalid basic string") {
+        "close the text with a double quote, as in `table = \"Q1.15\"`"
+    } else if said.contains("between digits") {
+        "a `_` may stand between two digits only: write the number without it"
     } else if said.contains("string") {
         "put a text in double quotes, as in `table = \"Q1.15\"`"
     } else if said.contains("newline") {
@@ -182,6 +186,7 @@ fn syntax(doc: &Doc, e: &toml::de::Error) -> Error {
     let bracket = ["unclosed", "between array elements"];
     let open = bracket.iter().any(|word| said.contains(word));
     let help = open_header(doc.text, offset)
+        .or_else(|| no_equals(doc.text, offset).filter(|_| said.contains("key with no value")))
         .or_else(|| {
             let text = Some(doc.text).filter(|_| !said.contains("string"))?;
             odd_quotes(text, offset)
@@ -215,7 +220,8 @@ fn open_header(text: &str, offset: usize) -> Option<String> {
     let start = text.get(..offset)?.rfind('\n').map_or(0, |p| p + 1);
     let line = text.get(start..)?.lines().next()?;
     let written = line.split('#').next()?.trim();
-    let name = written.trim_matches(['[', ']']).trim();
+    let name = written.trim_matches(['[', ']']);
+    let name = name.split_whitespace().collect::<Vec<_>>().join(".");
     let is_name = |part: &str| {
         let part = part.trim();
         let is_bare = |c: char| c.is_ascii_alphanumeric() || "_-".contains(c);
@@ -231,6 +237,16 @@ fn open_header(text: &str, offset: usize) -> Option<String> {
     // Between the brackets of an array's value such a line is an element.
     (is_header && unclosed(text.get(..start)?).is_none())
         .then(|| format!("write the table's header in this line as `{header}`"))
+}
+
+/// What to write in the line of a mistake that has a key and a value and no `=`.
+fn no_equals(text: &str, offset: usize) -> Option<String> {
+    let start = text.get(..offset)?.rfind('\n').map_or(0, |p| p + 1);
+    let line = text.get(start..)?.lines().next()?.split('#').next()?.trim();
+    let (key, value) = line.split_once(|c: char| c.is_whitespace() || c == ':')?;
+    let value = value.trim_start_matches([':', ' ']);
+    (!value.is_empty() && !key.is_empty())
+        .then(|| format!("a key and its value have `=` between them: `{key} = {value}`"))
 }
 
 /// The last `key = [` or `key = {` of a text whose value the text does not close: where its `=` is, and what closes it.

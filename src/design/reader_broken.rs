@@ -24,6 +24,10 @@ const BROKEN: &[Case] = &[
     ("[circuit.cordic]", "[circuit.cordic¦", "not TOML", "header in this line as `[circuit.cordic]`"),
     ("[circuit.cordic]", "[[circuit.cordic]¦", "not TOML", "header in this line as `[circuit.cordic]`"),
     ("coefficients_raw = [114923930, 800391448, 1415954326]", "coefficients_raw = [114923930\n¦800391448, 1415954326]", "not TOML", "value of `coefficients_raw` that line"),
+    ("[circuit.cordic]", "[circuit¦ cordic]", "not TOML", "header in this line as `[circuit.cordic]`"),
+    ("phase_bits = 32", "phase_bits ¦32", "not TOML", "have `=` between them: `phase_bits = 32`"),
+    ("phase_bits = 32", "phase_bits = 3_2¦_", "not TOML", "without it"),
+    ("name = \"gyro\"", "name = \"gyro¦", "not TOML", "close the text with a double quote"),
     // Unknown keys and tables.
     ("sample_rate_hz = ", "¦sample_rate_khz = ", "unknown key `sample_rate_khz` in `[circuit]`", "`sample_rate_hz`? Its value is in Hz: multiply by 1e3"),
     ("tuning_word = ", "¦tunning_word = ", "unknown key `tunning_word`", "did you mean `tuning_word`?"),
