@@ -34,7 +34,7 @@ pub(super) fn correction(table: &Table) -> Result<Planned> {
         Some(plan.full_scale_dps * NOISE_PER_FULL_SCALE),
         |v| v.real(Real::Positive, "noise of a reading, deg/s rms"),
     )?;
-    let heldout_rms_dps = table.take("heldout_rms_dps", None, |v| {
+    let heldout_rms_dps = table.take("heldout_rms_dps", Some(None), |v| {
         let meaning = "error on readings that the coefficients have not seen, deg/s rms";
         v.real(Real::Positive, meaning).map(Some)
     })?;

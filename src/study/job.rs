@@ -4,7 +4,7 @@ use super::bench::Bench;
 use super::certainty::Confidence;
 use super::journal::Journal;
 use super::merit::Scale;
-use super::outcome::Study;
+use super::outcome::Done;
 use super::progress::Progress;
 use super::reporting::{Method, Reporting};
 use super::search::{self, Effort};
@@ -30,15 +30,6 @@ pub struct Request<'a> {
     pub merged: &'a [std::path::PathBuf],
     /// Never search the whole space.
     pub heuristic: bool,
-}
-
-/// `study.json` and the design files: name and text.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Done {
-    /// The result.
-    pub study: Study,
-    /// Name below the folder, text.
-    pub files: Vec<(String, String)>,
 }
 
 /// Runs a study. `said` is told how far it is.

@@ -277,3 +277,12 @@ pub struct Conditions {
     /// ADC samples of a run in search and verification.
     pub samples: [u64; 2],
 }
+
+/// `study.json` and the design files: name and text.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Done {
+    /// The result.
+    pub study: Study,
+    /// Name below the folder, text.
+    pub files: Vec<(String, String)>,
+}

@@ -7,11 +7,10 @@ use super::certainty::{Bounds, Confidence, largest};
 use super::design_text;
 use super::figures::Figures;
 use super::front::{Point as Candidate, front, resolved};
-use super::job::Done;
 use super::late::{Late, late_starts};
 use super::merit::Scale;
 use super::outcome::{
-    Conditions, Parameter, Point, Quarter, QuarterWord, Study, Sweep, Swept, WordLengths,
+    Conditions, Done, Parameter, Point, Quarter, QuarterWord, Study, Sweep, Swept, WordLengths,
 };
 use super::progress::{Progress, Step};
 use super::quarter::{SHARE, Tried};
