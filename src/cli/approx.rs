@@ -270,7 +270,8 @@ fn print(o: &Outcome, out: &std::path::Path) {
     row(
         "certified",
         o.error.certified_max_abs,
-        "the emitted code, at every x of the domain (proved)".to_owned(),
+        "the emitted code, at every input code (proved); rounding x to its code is not in it"
+            .to_owned(),
     );
     let at = o.error.at_input_raw;
     match (o.error.exhaustive_max_abs, o.error.sampled_max_abs) {

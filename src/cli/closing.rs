@@ -116,10 +116,9 @@ pub(super) fn print(
     if let Some(rms) = c.firmware.heldout_rms {
         say!(
             "firmware's model, bit for bit{}: held-out rms {rms:.5} {}",
-            if compared.is_some() {
-                ""
-            } else {
-                " (--verify compiles and compares)"
+            match compared {
+                None if c.unit == "deg/s" => " (--verify compiles and compares)",
+                _ => "",
             },
             c.unit_text()
         );

@@ -225,7 +225,8 @@ fn print(outcome: &Outcome, out: &Path) {
             match outcome.parts.run.continuous {
                 true => "that takes the averaged readings of a thermal run (leave --duration out)",
                 false =>
-                    "that takes a run at rest over some temperatures, to which it can be fitted",
+                    "that takes a run at rest over some temperatures, and a fit whose coefficients their format holds (a warning says where \
+                     it does not)",
             }
         );
     }

@@ -371,8 +371,8 @@ pub fn sentences_with(design: &Design, bounds: &Bounds, of_run: Option<OfRun>) -
             "NOT kept"
         };
         lines.push(format!(
-            "Bias and rate were asked to be within {} deg/s of it at every calibrated input. With the rounding of the rate \
-             they are within {}: {word}.",
+            "Bias and rate were asked to be within {} deg/s of it at every calibrated word of the thermometer. With the rounding of \
+             the rate they are within {}: {word}. The thermometer's own rounding to its word is not in that.",
             asked.bound_dps,
             at_most(covered, 3)
         ));

@@ -66,7 +66,7 @@ fn called(plan: &Plan) -> Vec<String> {
             "it has a memory, which counts calls. After a gap of k periods of {period} s call it k times with the new reading: each call \
              returns a rate, and the last one is the corrected rate of that reading; do not use those before it"
         ),
-        false => "it has no memory: a missing or an extra call changes nothing".to_owned(),
+        false => "it has no memory: a missing or an extra call changes no other reading's correction".to_owned(),
     });
     said
 }

@@ -77,7 +77,7 @@ pub const FLAGS: [(&str, &str); 12] = [
     ),
     (
         "overflow",
-        "they have overflowed, or a node before them has, so that their error is not one of rounding",
+        "they have overflowed, or a node that stands before them in this table has: their error may not be one of rounding",
     ),
     (
         "phase_cut",

@@ -135,7 +135,7 @@ pub(super) fn resolve(line: Line<'_>, mapping: &RecordMapping) -> Result<Roles> 
                 .error(
                     1,
                     format!("the record has no column {role}, which is required"),
-                    suggestion(role, &kept),
+                    suggestion(role, &kept, mapping),
                 )
                 .into());
         }
@@ -155,7 +155,7 @@ fn lacking(
         let message = format!(
             "the record has no column \"{wanted}\", which [record.columns] names for {role}"
         );
-        return line.error(1, message, suggestion(role, names));
+        return line.error(1, message, suggestion(role, names, mapping));
     };
     let meant = nearest(wanted, names).or_else(|| guesses::guess(role, names));
     let meant = meant.map_or(String::new(), |m| format!("did you mean \"{m}\"? "));

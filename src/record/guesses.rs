@@ -1,7 +1,7 @@
 //! Which columns of a file are likely meant, as names of columns go; and what of a design would say so.
 
 use crate::design::record_columns::{THERMOMETERS, unit_of};
-use crate::design::units;
+use crate::design::{RecordMapping, units};
 
 /// Ends of names that say that a column holds an ADC's or a register's codes.
 const CODES: [&str; 6] = ["lsb", "raw", "counts", "count", "codes", "code"];
@@ -111,32 +111,41 @@ pub fn mapped_with_remark(role: &str, column: &str) -> String {
     }
 }
 
-/// Lists the file's columns and shows the part of a design file that would map `role`, and what else it lacks.
-pub(super) fn suggestion(role: &str, names: &[&str]) -> String {
+/// Lists the file's columns and shows the part of a design file that would map `role`, and what else it lacks beside what
+/// `mapping` has.
+pub(super) fn suggestion(role: &str, names: &[&str], mapping: &RecordMapping) -> String {
     let named: Vec<&str> = names.iter().copied().filter(|n| !n.is_empty()).collect();
     let mut text = listed(names);
     let has = |role: &str| {
-        named
-            .iter()
-            .any(|n| *n == role || units::meant(n) == Some(role))
+        let in_file = |n: &&str| *n == role || units::meant(n) == Some(role);
+        let by_design = mapping.columns.contains_key(role);
+        let is_counted = role == "time_s" && mapping.row_period_s.is_some();
+        named.iter().any(in_file) || by_design || is_counted
     };
-    let mut lines = vec![mapped_with_remark(
-        role,
-        guess(role, &named).unwrap_or(PLACEHOLDER),
-    )];
-    // What would be asked for next, where a column looks like it.
-    let others = ["time_s", "rate_out_dps", "die_degc"];
-    let others = others
-        .into_iter()
-        .filter(|other| *other != role && !has(other));
-    let others =
-        others.filter(|other| *other != "die_degc" || !THERMOMETERS.iter().any(|t| has(t)));
-    lines.extend(others.filter_map(|o| Some(mapped_with_remark(o, guess(o, &named)?))));
-    text.push_str(&format!(
-        "\n  say in the design which one it is. These lines are a whole design file, say gyro.toml: `gyrogen run gyro.toml --record \
-         ...` and `gyrogen close gyro.toml --record ...` take it:\n    [record.columns]\n    {}",
-        lines.join("\n    ")
-    ));
+    let line = |role| {
+        let column = guess(role, &named).unwrap_or(PLACEHOLDER);
+        mapped_with_remark(role, column)
+    };
+    let mut lines = vec![line(role)];
+    // What would be asked for next.
+    let others = ["time_s", "rate_out_dps"];
+    let others = others.into_iter().filter(|o| *o != role && !has(o));
+    lines.extend(others.map(line));
+    if !THERMOMETERS.iter().any(|t| *t == role || has(t)) {
+        let remark = match guess("die_degc", &named) {
+            Some(_) => "",
+            None => "# where a column is a thermometer: ",
+        };
+        lines.push(format!("{remark}{}", line("die_degc")));
+    }
+    let where_to = match mapping.places.is_empty() && mapping.row_period_at.is_none() {
+        true => {
+            "say in the design which one it is. These lines are a whole design file, say gyro.toml: `gyrogen run gyro.toml --record ...` \
+             and `gyrogen close gyro.toml --record ...` take it:\n    [record.columns]"
+        }
+        false => "add to [record.columns] of the design:",
+    };
+    text.push_str(&format!("\n  {where_to}\n    {}", lines.join("\n    ")));
     let axes = guesses("rate_out_dps", &named);
     if let [first @ .., last] = axes.as_slice()
         && !first.is_empty()

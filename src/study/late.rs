@@ -23,8 +23,8 @@ pub(super) fn late_starts(what: &str, late: &[Late]) -> Option<String> {
     };
     Some(format!(
         "{what}: the error after power-on may be as large as {range} deg/s. Allowed is the limit of the bias, {limit} deg/s. A point \
-         whose merit is above 1 is allowed that limit times its merit. What to do: a limit of `bias_dps<={most}`, in `--for` or \
-         `[requirements]`, allows such starts"
+         whose merit is above 1 is allowed that limit times its merit. Nothing has to be done about them, unless no design is chosen for it: \
+         a limit of `bias_dps<={most}`, in `--for` or `[requirements]`, allows such starts"
     ))
 }
 

@@ -338,6 +338,11 @@ pub(super) fn why_not(
     said.join(". ")
 }
 
+/// Is the start from power-on in the figure? `None` of what is known without a run.
+fn has_start(r: &Required) -> Option<bool> {
+    r.estimate.map(|_| r.name == LimitName::Bias.name())
+}
+
 /// A limit that no design holds, with what is in the way.
 fn in_the_way(work: &Reporting, r: &Required) -> String {
     let words = || Word::ALL.into_iter();
@@ -365,8 +370,13 @@ fn in_the_way(work: &Reporting, r: &Required) -> String {
         (None, Some(name), ..) => format!(", limited by `{name}`"),
         (None, None, ..) => String::new(),
     };
+    let shown = match has_start(r) {
+        Some(true) => " (the upper end of its interval, with the error after power-on)",
+        Some(false) => " (the upper end of its interval)",
+        None => "",
+    };
     format!(
-        "{} cannot be met: {} is required, and {} is the best that is shown of any design{why}",
+        "{} cannot be met: {} is required, and {} is the best that is shown of any design{shown}{why}",
         r.name,
         number(r.limit, 3),
         number(r.best, 3)

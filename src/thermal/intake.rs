@@ -228,9 +228,15 @@ fn channels_of(
     let name = name.unwrap_or_else(|| {
         let has: Vec<&str> = record.columns.keys().map(String::as_str).collect();
         let line = baseline::line_of_thermometer(&has).filter(|_| !record.is_of_log());
-        let help = line.map_or(String::new(), |line| {
-            format!(". If this column is one, add to [record.columns] of the design: {line}")
-        });
+        let help = match line {
+            Some(line) => {
+                format!(". If this column is one, add to [record.columns] of the design: {line}")
+            }
+            None if record.is_of_log() => String::new(),
+            None => ". If one of its columns is one, add to [record.columns] of the design: die_degc = { column = \"NAME_IN_THE_FILE\", \
+                     unit = \"degC\" }"
+                .to_owned(),
+        };
         let said = format!(
             "the record has no thermometer: the polynomial is a constant, and effects of temperature cannot be seen{help}"
         );
