@@ -378,9 +378,10 @@ mod tests {
             radius in 0.3..1.5f64,
         ) {
             let mut rows: Vec<Vec<f64>> = entries.chunks(3).map(<[f64]>::to_vec).collect();
-            for (k, row) in rows.iter_mut().enumerate() { row[k] += 1.5; } // diagonally dominant: no far point is near
+            for (k, row) in rows.iter_mut().enumerate() { row[k] += 2.0; }
+            // Diagonally dominant by at least 1.4 - 2 * 0.6: a point in the ball has no coordinate beyond (2 + sqrt(1.5)) / 0.2 = 16.2.
             let mut brute = Vec::new();
-            for a in -9..=9i64 { for b in -9..=9i64 { for c in -9..=9i64 {
+            for a in -17..=17i64 { for b in -17..=17i64 { for c in -17..=17i64 {
                 let d: f64 = (0..3).map(|i| {
                     let v = offset[i] - a as f64 * rows[0][i] - b as f64 * rows[1][i] - c as f64 * rows[2][i];
                     v * v
