@@ -1,5 +1,5 @@
 //! What a study answers: which point to take, and what a bit more or less of a word does there. Where there is none,
-//! [`super::unmet`] says why.
+//! `unmet` says why.
 
 use super::bench::Bench;
 use super::figures::Figures;
