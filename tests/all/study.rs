@@ -417,7 +417,7 @@ fn a_limit_on_the_bias_is_met_by_the_cheapest_design_that_is_shown_to_meet_it() 
     for text in [
         "dropped: the error after power-on may be as large as ",
         "Allowed is the limit of the bias, 1.00e-9 deg/s. ",
-        "allows such starts",
+        "unless no design is chosen for it: a limit of `bias_dps<=",
     ] {
         assert!(notes.contains(text), "{notes}");
     }
