@@ -112,7 +112,10 @@ impl<W: HasKernel, R: Lane, const IDLE: bool> Ends for Fixed<W, R, IDLE> {
     }
     #[inline(always)]
     fn at(&self, sample: u64) {
-        self.at_sample(sample);
+        // Casts that are idle report nothing.
+        if !IDLE {
+            self.at_sample(sample);
+        }
     }
     fn stopped(&self) -> Option<Overflowed> {
         self.overflowed()

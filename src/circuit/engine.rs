@@ -237,8 +237,6 @@ struct Running<F: Arithmetic, S: Arithmetic<Residue = F::Residue>, const N: usiz
     samples: u64,
     /// Samples of the period at hand.
     phase: usize,
-    /// A cast at the sample rate may stop the run.
-    watched: bool,
     /// Drive gain as last put out.
     gain: Option<f64>,
 }
@@ -251,12 +249,9 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Runnin
         scale: FloatScale,
         (kernel, batch): FastWays<N>,
     ) -> Self {
-        let product = &chain.mixers[0].product;
         let mut running = Running {
             fast_state: chain.start_fast(&fast),
             slow_state: chain.start_slow(&slow),
-            watched: product.overflow == Some(crate::numeric::format::Overflow::Error)
-                && !product.is_proved(),
             chain,
             fast,
             slow,
@@ -281,16 +276,15 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Runnin
         Some(S::gain(gain, &self.scale))
     }
 
-    /// Codes inside one period: nothing but the fast state changes.
-    #[inline(always)]
+    /// Codes inside one period: nothing but the fast state changes. A function of its own, so that what is around it takes none of
+    /// its registers.
+    #[inline(never)]
     fn block(&mut self, drive: &[i32], sense: &[i32]) {
         let fraction_bits = self.chain.code_fraction_bits;
         // A copy that does not escape lives in registers.
         let mut state = self.fast_state;
         for (k, (d, s)) in drive.iter().zip(sense).enumerate() {
-            if self.watched {
-                self.fast.at(self.samples + k as u64);
-            }
+            self.fast.at(self.samples + k as u64);
             let codes = [
                 self.fast.code(*d, fraction_bits),
                 self.fast.code(*s, fraction_bits),
@@ -310,7 +304,9 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Runnin
         };
         let (single, drive) = drive.split_at(left_over);
         let (single_sense, sense) = sense.split_at(left_over);
-        self.block(single, single_sense);
+        if !single.is_empty() {
+            self.block(single, single_sense);
+        }
         if let Some(kernel) = self.kernel.as_mut().filter(|_| !drive.is_empty()) {
             F::run_kernel(kernel, &mut self.fast_state, [drive, sense]);
             self.samples += drive.len() as u64;

@@ -268,6 +268,8 @@ pub(crate) enum End {
 #[derive(Debug, Clone)]
 pub struct Kernel<L> {
     idle: bool,
+    /// No shift exceeds the lane.
+    follows_the_table: bool,
     /// Zeros appended.
     pub(crate) left: u32,
     /// Bits dropped.
@@ -317,9 +319,11 @@ impl<L: Lane> Kernel<L> {
             Some(Overflow::Saturate | Overflow::SaturateSymmetric) => End::Clamp,
             Some(Overflow::Error) => End::Report,
         };
+        let left = (-shift).max(0) as u32;
         Kernel {
             idle: false,
-            left: (-shift).max(0) as u32,
+            follows_the_table: left < L::BITS && sign_only.is_none(),
+            left,
             right: right.min(L::BITS - 1),
             base: L::low(base),
             negative: L::low(negative),
@@ -342,46 +346,56 @@ impl<L: Lane> Kernel<L> {
         let v = self.round(v);
         match self.end {
             End::Exact => v,
+            End::Clamp => v.clamp(self.low, self.high),
+            _ => self.wrapped_or_reported(v, outside),
+        }
+    }
+
+    /// The overflow steps that few designs have. A call, so that the loops over casts stay short.
+    #[inline(never)]
+    fn wrapped_or_reported(&self, v: L, outside: impl FnOnce(L)) -> L {
+        match self.end {
             End::WrapSigned => v.sign_extend(self.bits),
             End::WrapUnsigned => v.and(self.high),
-            End::Clamp => v.clamp(self.low, self.high),
-            End::Report => {
-                if v < self.low || v > self.high {
-                    outside(v);
-                }
+            End::Report if v < self.low || v > self.high => {
+                outside(v);
                 v.clamp(self.low, self.high)
             }
+            End::Report | End::Exact | End::Clamp => v,
         }
     }
 
     /// True if the word before the overflow step is what the table says: no shift exceeds the lane.
     pub(crate) fn follows_the_table(&self) -> bool {
-        self.left < L::BITS && self.sign_only.is_none()
+        self.follows_the_table
     }
 
     /// The word before the overflow step: rounded, not limited.
     #[inline(always)]
     pub fn round(&self, v: L) -> L {
-        if self.left > 0 {
-            return if self.left >= L::BITS {
-                // Only a wrap can follow (or the word is 0): no bit of v is left.
-                L::default()
-            } else {
-                v.shl(self.left)
-            };
+        if !self.follows_the_table {
+            return self.shifted_out(v);
         }
-        if let Some((below, above)) = self.sign_only {
-            return match v.cmp(&L::default()) {
-                std::cmp::Ordering::Less => below,
-                std::cmp::Ordering::Equal => L::default(),
-                std::cmp::Ordering::Greater => above,
-            };
+        if self.left > 0 {
+            return v.shl(self.left);
         }
         let sign = v.shr(L::BITS - 1);
         v.plus(self.base)
             .plus(self.negative.and(sign))
             .plus(self.odd.and(v.shr(self.right)))
             .shr(self.right)
+    }
+
+    /// The same where a shift leaves no bit of a word.
+    #[inline(never)]
+    fn shifted_out(&self, v: L) -> L {
+        // After zeros alone a wrap can follow, or the word is 0.
+        let (below, above) = self.sign_only.unwrap_or_default();
+        match v.cmp(&L::default()) {
+            std::cmp::Ordering::Less => below,
+            std::cmp::Ordering::Equal => L::default(),
+            std::cmp::Ordering::Greater => above,
+        }
     }
 }
 
