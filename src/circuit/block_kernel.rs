@@ -14,7 +14,7 @@
 use super::chain::{Chain, FastState};
 use super::demodulator::Mixer;
 use super::sample_lanes::{CarrierPair, Portable, SampleLanes, by_channel, carrier_pair};
-use crate::numeric::cast::{End, Kernel};
+use crate::numeric::cast::{End, Kernel, form};
 
 #[cfg(test)]
 #[path = "block_kernel_tests.rs"]
@@ -117,16 +117,6 @@ struct Known {
     samples: usize,
     /// By the phase before the block: the carriers, by sample of a part, part and channel.
     blocks: Vec<(u64, Vec<[[i64; 4]; 2]>)>,
-}
-
-/// How a product is quantised: chosen when the loop is compiled.
-mod form {
-    /// Not at all.
-    pub const IDLE: u8 = 0;
-    /// A constant is added, bits are dropped, nothing can overflow.
-    pub const ROUNDED: u8 = 1;
-    /// Any rounding, any overflow.
-    pub const ANY: u8 = 2;
 }
 
 impl<const N: usize> BlockKernel<N> {
@@ -412,15 +402,6 @@ impl<'a> Part<'a> {
 
 /// The product's cast.
 impl Kernel<i64> {
-    fn form(&self) -> u8 {
-        let rounds_by_sum = self.left == 0 && self.negative == 0 && self.odd == 0;
-        match self.end {
-            End::Exact if self.left == 0 && self.right == 0 => form::IDLE,
-            End::Exact if rounds_by_sum => form::ROUNDED,
-            _ => form::ANY,
-        }
-    }
-
     /// As [`Kernel::apply`], in every lane.
     #[inline(always)]
     fn in_lanes<S: SampleLanes, const FORM: u8>(&self, simd: S, v: S::Words) -> S::Words {

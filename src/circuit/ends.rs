@@ -6,7 +6,7 @@ use super::engine::Rows;
 use super::float_kernel::FloatKernel;
 use crate::design::Design;
 use crate::numeric::arithmetic::Arithmetic;
-use crate::numeric::cast::HasKernel;
+use crate::numeric::cast::{HasKernel, form};
 use crate::numeric::fixed::{Fixed, Overflowed};
 use crate::numeric::float::Float;
 use crate::numeric::format::pow2;
@@ -80,7 +80,7 @@ pub(super) trait Ends: Arithmetic {
     );
 }
 
-impl<W: HasKernel, R: Lane, const IDLE: bool> Ends for Fixed<W, R, IDLE> {
+impl<W: HasKernel, R: Lane, const FORM: u8> Ends for Fixed<W, R, FORM> {
     #[inline(always)]
     fn code(&self, code: i32, _fraction_bits: i32) -> W {
         W::from_i32(code)
@@ -112,8 +112,8 @@ impl<W: HasKernel, R: Lane, const IDLE: bool> Ends for Fixed<W, R, IDLE> {
     }
     #[inline(always)]
     fn at(&self, sample: u64) {
-        // Casts that are idle report nothing.
-        if !IDLE {
+        // No other cast reports anything.
+        if FORM == form::ANY {
             self.at_sample(sample);
         }
     }

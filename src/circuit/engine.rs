@@ -10,6 +10,7 @@ use super::row_batch::{RowBatch, Stages};
 pub use super::rows::{Rows, columns};
 use crate::design::Design;
 use crate::numeric::arithmetic::{Arithmetic, Block};
+use crate::numeric::cast::form;
 use crate::numeric::fixed::{Fixed, Overflowed};
 use crate::numeric::float::Float;
 use crate::numeric::trace::ir::Program;
@@ -168,6 +169,8 @@ pub fn lane_bits<const N: usize>(chain: &Chain<N>, program: &Program) -> LaneBit
     }
 }
 
+type Narrow<const FORM: u8 = { form::ANY }> = Fixed<i64, i64, FORM>;
+
 fn with_stages<const N: usize>(
     design: &Design,
     kind: ArithmeticKind,
@@ -183,7 +186,11 @@ fn with_stages<const N: usize>(
     }
     let bits = lane_bits(&chain, &chain.trace());
     let narrow = bits.fast <= 64 && bits.residue <= 64;
-    let idle = chain.mixers.iter().all(|m| m.product.is_idle());
+    let products = chain
+        .mixers
+        .iter()
+        .map(|m| m.product.kernel::<i64>().form());
+    let form = products.max().unwrap_or(form::ANY);
     let instructions = instructions.unwrap_or_else(|| Instructions::best(&chain));
     let kernel = narrow
         .then(|| BlockKernel::new(&chain, instructions))
@@ -195,11 +202,12 @@ fn with_stages<const N: usize>(
         .then(|| RowBatch::new(&mut chain, instructions))
         .flatten();
     let parts = (chain, float_scale, (kernel, batch));
-    match (narrow, idle, slow_is_narrow) {
-        (true, true, true) => fixed::<Fixed<i64, i64, true>, Fixed<i64, i64>, N>(parts),
-        (true, true, false) => fixed::<Fixed<i64, i64, true>, Fixed<i128, i64>, N>(parts),
-        (true, false, true) => fixed::<Fixed<i64, i64>, Fixed<i64, i64>, N>(parts),
-        (true, false, false) => fixed::<Fixed<i64, i64>, Fixed<i128, i64>, N>(parts),
+    // Words of more than 64 bits at the decimated rate are rare, and one form serves them all.
+    match (narrow, form, slow_is_narrow) {
+        (true, form::IDLE, true) => fixed::<Narrow<{ form::IDLE }>, Narrow, N>(parts),
+        (true, form::ROUNDED, true) => fixed::<Narrow<{ form::ROUNDED }>, Narrow, N>(parts),
+        (true, _, true) => fixed::<Narrow, Narrow, N>(parts),
+        (true, _, false) => fixed::<Narrow, Fixed<i128, i64>, N>(parts),
         _ if bits.fast <= 64 => fixed::<Fixed<i64, i128>, Fixed<i128, i128>, N>(parts),
         _ => fixed::<Fixed<i128, i128>, Fixed<i128, i128>, N>(parts),
     }
@@ -285,10 +293,7 @@ impl<F: Ends, S: Ends + Arithmetic<Residue = F::Residue>, const N: usize> Runnin
         let mut state = self.fast_state;
         for (k, (d, s)) in drive.iter().zip(sense).enumerate() {
             self.fast.at(self.samples + k as u64);
-            let codes = [
-                self.fast.code(*d, fraction_bits),
-                self.fast.code(*s, fraction_bits),
-            ];
+            let codes = [*d, *s].map(|code| self.fast.code(code, fraction_bits));
             self.chain.sample(&self.fast, &mut state, codes);
         }
         self.fast_state = state;

@@ -237,6 +237,16 @@ impl HasKernel for i128 {
     }
 }
 
+/// How much a cast has to do: a constant of the loop that it is in, chosen when the loop is compiled.
+pub mod form {
+    /// Nothing.
+    pub const IDLE: u8 = 0;
+    /// A constant is added, bits are dropped, nothing can overflow.
+    pub const ROUNDED: u8 = 1;
+    /// Any rounding, any overflow.
+    pub const ANY: u8 = 2;
+}
+
 /// What a kernel does with a word outside its limits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum End {
@@ -334,6 +344,23 @@ impl<L: Lane> Kernel<L> {
             low: L::saturated(low),
             high: L::saturated(high),
         }
+    }
+
+    /// What it has to do, of [`form`].
+    pub fn form(&self) -> u8 {
+        let zero = L::default();
+        let rounds_by_sum = self.left == 0 && self.negative == zero && self.odd == zero;
+        match self.end {
+            End::Exact if self.left == 0 && self.right == 0 => form::IDLE,
+            End::Exact if rounds_by_sum && self.follows_the_table => form::ROUNDED,
+            _ => form::ANY,
+        }
+    }
+
+    /// Runs a cast of the form [`form::ROUNDED`].
+    #[inline(always)]
+    pub fn rounded(&self, v: L) -> L {
+        v.plus(self.base).shr(self.right)
     }
 
     /// Runs the cast. `outside` is called once with the word before the overflow step if the

@@ -2,9 +2,9 @@
 //! chain's ranges fit into.
 
 use super::arithmetic::{Arithmetic, IndexTable, LoopBody, Ring, SineTable, StateVisitor, Table};
-use super::cast::{Cast, HasKernel, Label};
+use super::cast::{Cast, HasKernel, Label, form};
 use super::lane::Lane;
-use std::cell::Cell;
+use std::cell::{Cell, OnceCell};
 use std::marker::PhantomData;
 
 /// An overflow where the design says `error`: the run stops here.
@@ -50,21 +50,21 @@ impl std::fmt::Display for Overflowed {
 /// Integers with run-time formats: words in lanes `W`, residues in lanes `R`.
 ///
 /// Remembers the first overflow of a cast whose mode is `error`; the word saturates and the run
-/// goes on until its owner looks. With `IDLE` no cast acts at all: for parts of a chain whose every
-/// cast the ranges have proved idle.
+/// goes on until its owner looks. `FORM`, of [`form`], is the most that a cast of the part of a chain has to do that this runs:
+/// with less than `ANY` the ranges have proved that no word overflows there.
 #[derive(Debug, Default)]
-pub struct Fixed<W, R, const IDLE: bool = false> {
+pub struct Fixed<W, R, const FORM: u8 = { form::ANY }> {
     sample: Cell<u64>,
-    overflowed: Cell<Option<Overflowed>>,
+    overflowed: OnceCell<Overflowed>,
     lanes: PhantomData<(W, R)>,
 }
 
-impl<W, R, const IDLE: bool> Fixed<W, R, IDLE> {
+impl<W, R, const FORM: u8> Fixed<W, R, FORM> {
     /// An arithmetic that has seen no overflow.
     pub fn new() -> Self {
         Fixed {
             sample: Cell::new(0),
-            overflowed: Cell::new(None),
+            overflowed: OnceCell::new(),
             lanes: PhantomData,
         }
     }
@@ -77,29 +77,27 @@ impl<W, R, const IDLE: bool> Fixed<W, R, IDLE> {
 
     /// The first overflow so far.
     pub fn overflowed(&self) -> Option<Overflowed> {
-        self.overflowed.get()
+        self.overflowed.get().copied()
     }
 }
 
-impl<W: Lane, R, const IDLE: bool> Fixed<W, R, IDLE> {
+impl<W: Lane, R, const FORM: u8> Fixed<W, R, FORM> {
     #[cold]
     #[inline(never)]
     fn report(&self, cast: &Cast, value: W, operands: &[W]) {
-        if self.overflowed.get().is_none() {
-            let operand = |k: usize| operands.get(k).map(|w| w.wide());
-            self.overflowed.set(Some(Overflowed {
-                sample: self.sample.get(),
-                label: cast.label,
-                cast: cast.id,
-                value: value.wide(),
-                operands: [operand(0), operand(1)],
-                coefficient_shift: cast.coefficient_shift,
-            }));
-        }
+        let operand = |k: usize| operands.get(k).map(|w| w.wide());
+        self.overflowed.get_or_init(|| Overflowed {
+            sample: self.sample.get(),
+            label: cast.label,
+            cast: cast.id,
+            value: value.wide(),
+            operands: [operand(0), operand(1)],
+            coefficient_shift: cast.coefficient_shift,
+        });
     }
 }
 
-impl<W: HasKernel, R: Lane, const IDLE: bool> Arithmetic for Fixed<W, R, IDLE> {
+impl<W: HasKernel, R: Lane, const FORM: u8> Arithmetic for Fixed<W, R, FORM> {
     type Word = W;
     type Residue = R;
     type Truth = bool;
@@ -132,12 +130,13 @@ impl<W: HasKernel, R: Lane, const IDLE: bool> Arithmetic for Fixed<W, R, IDLE> {
     }
     #[inline(always)]
     fn cast(&self, a: W, cast: &Cast, operands: &[W]) -> W {
-        if IDLE {
-            debug_assert!(cast.is_idle());
-            return a;
+        let kernel = cast.kernel::<W>();
+        debug_assert!(kernel.form() <= FORM);
+        match FORM {
+            form::IDLE => a,
+            form::ROUNDED => kernel.rounded(a),
+            _ => kernel.apply(a, |value| self.report(cast, value, operands)),
         }
-        cast.kernel::<W>()
-            .apply(a, |value| self.report(cast, value, operands))
     }
     #[inline(always)]
     fn wrap(&self, a: W, bits: u32, _fraction_bits: i32) -> W {
