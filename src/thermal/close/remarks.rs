@@ -3,8 +3,8 @@
 use super::Told;
 use crate::record::Warning;
 use crate::text::number;
-use crate::thermal::no_gain;
-use crate::thermal::search::LEVEL;
+use crate::thermal::search::{LEVEL, Term};
+use crate::thermal::{no_gain, rails};
 
 impl Told<'_> {
     /// All of it but what firmware has to say; `sweep_loop` is said of heating and cooling.
@@ -12,6 +12,7 @@ impl Told<'_> {
         warnings.extend(self.accidents().or_else(|| self.riddled()));
         warnings.extend(self.no_gain(sweep_loop.is_some()));
         warnings.extend(sweep_loop);
+        warnings.extend(self.unrepeated_clip());
         if !self.found.within_rounding.is_empty() {
             let each = self.found.within_rounding.iter();
             let names: Vec<String> = each
@@ -83,6 +84,47 @@ impl Told<'_> {
             .flatten()
     }
 
+    /// What is said of a clip that is named and that no equal readings show. An applied rate that moves takes the output beyond a level
+    /// at any temperature, which no bend of the drift does: there the name says enough.
+    fn unrepeated_clip(&self) -> Option<Warning> {
+        let c = self.search.channels;
+        let terms = self.found.terms.iter().enumerate();
+        let mut clips = terms.filter(|(_, term)| term.candidate.is_last());
+        let (k, clip) = clips.next().filter(|_| c.moving("rate_dps").is_none())?;
+        let levels = self.unrepeated_levels_dps(k, clip);
+        let levels: Vec<String> = levels.iter().map(|level| number(*level, 4)).collect();
+        let each = match levels.len() {
+            1 => "the level",
+            _ => "each level",
+        };
+        (!levels.is_empty()).then(|| {
+            let said = format!(
+                "{} is found at {} deg/s, where readings do not repeat as those of a clipped converter or output word do. A real clip \
+                 there lies before the noise, as in an amplifier; a bend or an extreme of the drift that the other causes do not follow \
+                 looks the same. Look at the converter's codes, and compare {each} with the gyro's full scale",
+                clip.id(),
+                levels.join(" and "),
+            );
+            Warning::on("clip_without_repeated_readings", "rate_out_dps", said)
+        })
+    }
+
+    /// Levels, deg/s, of a clip, the term of that number, on whose side no readings repeat, neither among the fitted rows nor among all.
+    fn unrepeated_levels_dps(&self, number: usize, clip: &Term) -> Vec<f64> {
+        let estimates = self.search.estimates(self.after);
+        let Some(estimate) = estimates.get(number) else {
+            return Vec::new();
+        };
+        let of_all = rails::of(self.whole, &vec![true; self.whole.len()]);
+        let seen = [self.search.rails.as_ref(), of_all.as_ref()];
+        let seen = || seen.into_iter().flatten();
+        let reported = clip.candidate.report(self.search.channels, estimate);
+        let level = |name: &str| reported.get(name).map(|(level, _)| *level);
+        let upper = level("high_dps").filter(|_| seen().all(|rails| rails.upper_dps.is_none()));
+        let lower = level("low_dps").filter(|_| seen().all(|rails| rails.lower_dps.is_none()));
+        upper.into_iter().chain(lower).collect()
+    }
+
     /// What is said of rows that no figure has in it.
     fn accidents(&self) -> Option<Warning> {
         let search = self.search;
@@ -115,13 +157,21 @@ impl Told<'_> {
         let rows = search.riddled(self.after)?;
         let unfitted = rows.iter().filter(|row| !search.train[**row]).count();
         let first = rows.first().map(|row| search.channels.time_s[*row])?;
+        let question = match search.channels.moving("rate_dps") {
+            Some(_) => {
+                "Do the output and the applied rate of a row belong to one time (a rate table that moves within rows, an output that comes \
+                 late)?"
+            }
+            None => {
+                "Was the gyro turned or shaken in them, or is their output faulty? Cut them, or record again at rest"
+            }
+        };
         Some(Warning::on(
             "many_outliers",
             "rate_out_dps",
             format!(
                 "{} of {} rows ({unfitted} not fitted) are more than six deviations off the others, the first at {first} s: too many \
-                 for accidents, so they are in the errors, and no candidate makes them. Do the output and the applied \
-                 rate of a row belong to one time (a rate table that moves within rows, an output that comes late)?",
+                 for accidents, so they are in the errors, and no candidate makes them. {question}",
                 rows.len(),
                 search.channels.len()
             ),
@@ -207,6 +257,81 @@ mod tests {
         assert!(told.contains("and a constant leaves 0."), "{told}");
         let at_rest = turned(0..0);
         assert!(at_rest.firmware.compensable && message(&at_rest, "firmware_useless").is_none());
+    }
+
+    /// A gyro whose output is clipped at a level; `rate_dps` is applied in turn, both ways, and `late_dps` is noise that comes after the
+    /// clip.
+    fn clipped(level_dps: f64, rate_dps: f64, late_dps: f64) -> Closure {
+        let mut random = Random::new(6);
+        let degc = triangle(360);
+        let rate: Vec<f64> = (0..360)
+            .map(|k| rate_dps * f64::from(k % 5 - 2) / 2.0)
+            .collect();
+        let output: Vec<f64> = degc
+            .iter()
+            .zip(&rate)
+            .map(|(t, rate)| {
+                let [early, late] = [0.01 - late_dps, late_dps].map(|std| std * random.normal());
+                (0.5 + 0.05 * t + rate + early).min(level_dps) + late
+            })
+            .collect();
+        let mut record = record("die_degc", &degc, &output);
+        record.columns.insert("rate_dps".to_owned(), rate);
+        closure(&record)
+    }
+
+    #[test]
+    fn a_clip_at_rest_without_equal_readings_is_told_with_what_looks_the_same() {
+        let code = "clip_without_repeated_readings";
+        let is_named = |c: &Closure| c.steps.iter().any(|s| s.effect == "output_saturation");
+        let before = clipped(3.0, 0.0, 0.01);
+        assert!(is_named(&before), "{:?}", before.steps);
+        let told = message(&before, code).unwrap();
+        for part in [
+            "output_saturation is found at 3.00",
+            "lies before the noise",
+            "compare the level with the gyro's full scale",
+        ] {
+            assert!(told.contains(part), "{told}");
+        }
+        // Readings that repeat show a clip of the converter; a rate that passes the level shows one at any temperature.
+        for shown in [clipped(3.0, 0.0, 0.0), clipped(30.0, 40.0, 0.01)] {
+            assert!(is_named(&shown), "{:?}", shown.steps);
+            assert_eq!(message(&shown, code), None);
+        }
+    }
+
+    /// One row in six is off by fifty times the noise: too many for accidents.
+    #[test]
+    fn many_outliers_ask_of_a_rate_table_where_there_is_one() {
+        let asked = |rate_dps: f64| {
+            let mut random = Random::new(7);
+            let degc = triangle(360);
+            let rate: Vec<f64> = (0..360)
+                .map(|k| rate_dps * f64::from(k % 5 - 2) / 2.0)
+                .collect();
+            let pairs = degc.iter().zip(&rate);
+            let output: Vec<f64> = pairs
+                .map(|(t, rate)| {
+                    let off = match random.uniform() {
+                        u if u < 1.0 / 12.0 => -0.5,
+                        u if u < 1.0 / 6.0 => 0.5,
+                        _ => 0.0,
+                    };
+                    0.3 + 0.01 * t + rate + off + 0.01 * random.normal()
+                })
+                .collect();
+            let mut record = record("die_degc", &degc, &output);
+            record.columns.insert("rate_dps".to_owned(), rate);
+            let closure = closure(&record);
+            message(&closure, "many_outliers").unwrap().to_owned()
+        };
+        let (at_rest, turned) = (asked(0.0), asked(40.0));
+        assert!(
+            at_rest.contains("record again at rest") && !at_rest.contains("rate table"),
+            "{at_rest}"
+        );
+        assert!(turned.contains("a rate table that moves"), "{turned}");
     }
 
     #[test]
