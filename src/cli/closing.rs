@@ -1,5 +1,7 @@
 //! What `gyrogen close` prints: the causes with their parameters, the verdict, the errors, the comparison.
 
+mod figures;
+
 use crate::selftest::controls::Controls;
 use crate::statistics::blocks::Role;
 use crate::statistics::stats;
@@ -9,6 +11,7 @@ use crate::thermal::effects::covariate::of_another_axis;
 use crate::thermal::firmware::emitted::Emitted;
 use crate::thermal::search::declared;
 use crate::verdict::{Closure, Verdict};
+use figures::{errors, held_out, no_gain, small_and_left};
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -22,6 +25,8 @@ pub(super) struct Said {
     thermometer: String,
     /// What the readings are before anything is subtracted, and the rms of the rows that judge, deg/s.
     as_read: (&'static str, f64),
+    /// What a constant leaves of them, deg/s rms.
+    constant_rms_dps: f64,
     /// How many these are.
     judging: usize,
     /// Part of the rows that judge, and part that choose.
@@ -57,9 +62,16 @@ impl Said {
                 Some(_) => ("as read less rate_dps", stats::rms(&as_read)),
                 None => ("as read", stats::rms(&as_read)),
             },
+            constant_rms_dps: closed.constant_rms_dps,
             judging: as_read.len(),
             roles: [Role::Judge, Role::Choose].map(share),
         }
+    }
+
+    /// How far a held-out rms is off by chance, as a share: the standard deviation of the rms of so many independent values of a normal
+    /// law.
+    fn chance(&self) -> f64 {
+        1.0 / (2.0 * self.judging.max(1) as f64).sqrt()
     }
 
     /// Whether an equation has the temperature in it.
@@ -113,6 +125,9 @@ pub(super) fn print(
     }
     say!("{}", sentence(c));
     say!("{}", errors(c, said));
+    if let Some(told) = said.and_then(|said| small_and_left(c, said)) {
+        say!("{told}");
+    }
     if let Some(rms) = c.firmware.heldout_rms {
         say!(
             "firmware's model, bit for bit{}: held-out rms {rms:.5} {}",
@@ -122,6 +137,9 @@ pub(super) fn print(
             },
             c.unit_text()
         );
+        if let Some(told) = said.and_then(|said| no_gain(c, said)) {
+            say!("{told}");
+        }
     } else if c.unit == "deg/s" {
         say!("no firmware was written: the warnings say why");
     }
@@ -169,23 +187,6 @@ fn contributions(c: &Closure, said: &Said) {
     }
 }
 
-/// The errors from the readings on, a step at a time.
-fn errors(c: &Closure, said: Option<&Said>) -> String {
-    let (before, after, floor) = (c.before.heldout_rms, c.after.heldout_rms, c.noise_floor_rms);
-    let unit = c.unit_text();
-    let Some(said) = said else {
-        return format!("held-out rms {before:.5} -> {after:.5} {unit}, noise floor {floor:.5}");
-    };
-    let causes = match c.steps.is_empty() {
-        true => String::new(),
-        false => format!("{after:.5} after the causes too; "),
-    };
-    let (as_read, rms) = said.as_read;
-    format!(
-        "held-out rms, {unit}: {rms:.5} {as_read}; {before:.5} after the polynomial; {causes}noise floor {floor:.5}"
-    )
-}
-
 /// A row for each cause.
 fn table(c: &Closure) -> comfy_table::Table {
     // A cause that another effect explains as well is told with its rivals; mostly there are none.
@@ -230,32 +231,6 @@ fn covariates(c: &Closure) {
              evidence is under this name in closure.json and report.html."
         );
     }
-}
-
-/// What the rows served for, what the noise floor is, and why `run` has other figures: a line each.
-fn held_out(said: Option<&Said>) -> String {
-    let Some(Said { roles, judging, .. }) = said else {
-        return "held out: a part of the capture that no fit used".to_owned();
-    };
-    let [judge, choose] = roles.map(|share| (100.0 * share).round());
-    let fit = 100.0 - judge - choose;
-    let which = match roles[0] > 0.0 {
-        true => format!(
-            "rows: {fit} % for fitting, {choose} % for the choice of causes, {judge} % held out for the error."
-        ),
-        false => format!(
-            "rows: {fit} % for fitting, {choose} % for the choice of causes. The held-out error is of these {choose} % too, as the \
-             record is too short to keep others for it alone."
-        ),
-    };
-    // Standard deviation of the rms of so many independent values of a normal law.
-    let chance = (100.0 / (2.0 * (*judging).max(1) as f64).sqrt()).round();
-    format!(
-        "{which}\nnoise floor: white noise, from differences of neighbouring residuals. The held-out rms has slow noise in it as \
-         well, and being of {judging} rows it is off by {chance} % by chance alone (one standard deviation).\n`run` has other figures: its \
-         held-out rms is of blocks that are each predicted from all other rows, and its noise floor is of the residuals of a \
-         polynomial."
-    )
 }
 
 /// Below it a chance's digits say nothing: the noise's law is not known so far out.
@@ -306,23 +281,24 @@ fn sentence(c: &Closure) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Said, errors, held_out, polynomial, sentence, with_deviation};
+    use super::{Said, polynomial, sentence, with_deviation};
     use crate::record::Warning;
     use crate::verdict::{Closure, Errors, FirmwareErrors, SCHEMA, Step, Structure, Verdict};
     use std::collections::BTreeMap;
 
-    fn of_roles(roles: [f64; 2], judging: usize) -> Said {
+    pub(super) fn of_roles(roles: [f64; 2], judging: usize) -> Said {
         Said {
             polynomial: String::new(),
             equations: Vec::new(),
             thermometer: "die_degc".to_owned(),
             as_read: ("as read", 1.55),
+            constant_rms_dps: 1.5,
             judging,
             roles,
         }
     }
 
-    fn closure(unit: &'static str, steps: usize) -> Closure {
+    pub(super) fn closure(unit: &'static str, steps: usize) -> Closure {
         let errors = |heldout_rms| Errors {
             heldout_rms,
             ..Errors::default()
@@ -360,23 +336,6 @@ mod tests {
             evidence: Vec::new(),
             warnings: Vec::new(),
         }
-    }
-
-    #[test]
-    fn errors_begin_with_the_readings_and_name_each_step() {
-        let said = of_roles([0.07, 0.2], 42);
-        assert_eq!(
-            errors(&closure("deg/s", 1), Some(&said)),
-            "held-out rms, deg/s: 1.55000 as read; 0.50000 after the polynomial; 0.02000 after the causes too; noise floor 0.01000"
-        );
-        assert_eq!(
-            errors(&closure("deg/s", 0), Some(&said)),
-            "held-out rms, deg/s: 1.55000 as read; 0.50000 after the polynomial; noise floor 0.01000"
-        );
-        assert_eq!(
-            errors(&closure("lsb", 1), None),
-            "held-out rms 0.50000 -> 0.02000 LSB, noise floor 0.01000"
-        );
     }
 
     #[test]
@@ -429,30 +388,6 @@ mod tests {
         };
         assert!(has("gain (T - T_l)") && has("x = (T - center) / half width"));
         assert!(!has("a Tilt of T_l") && !has("f(supply_v)"));
-    }
-
-    #[test]
-    fn held_out_rows_are_told_apart_from_those_of_run() {
-        let said = |judge, choose| held_out(Some(&of_roles([judge, choose], 50)));
-        let both = said(0.06, 0.2);
-        assert!(
-            both.starts_with(
-                "rows: 74 % for fitting, 20 % for the choice of causes, 6 % held out for the error.\n"
-            ),
-            "{both}"
-        );
-        let one = said(0.0, 0.2);
-        assert!(
-            one.starts_with("rows: 80 % for fitting, 20 % for the choice of causes. The held-out"),
-            "{one}"
-        );
-        for text in [both, one] {
-            assert_eq!(text.lines().count(), 3, "{text}");
-            assert!(
-                text.contains("of 50 rows it is off by 10 % by chance"),
-                "{text}"
-            );
-        }
     }
 
     #[test]

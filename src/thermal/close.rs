@@ -4,6 +4,8 @@ mod carried;
 mod evidence;
 mod remarks;
 
+pub use carried::MORE;
+
 use super::baseline::{self, BaselineFit};
 use super::channels::Channels;
 use super::checks;
@@ -38,6 +40,8 @@ pub struct Closed {
     pub correction: Option<Correction>,
     /// What that leaves of each row, bit for bit, deg/s; NaN without a reading.
     pub firmware_dps: Option<Vec<f64>>,
+    /// What a constant, the median of the fitted rows, leaves of the held-out rows that the errors are of, deg/s rms.
+    pub constant_rms_dps: f64,
 }
 
 /// The effects that the design's user suspects, for a record.
@@ -130,7 +134,7 @@ pub fn close(
     warnings.extend(steps.map(RateSteps::warning));
     warnings.extend(no_judges(&taken.intake.split));
     let whole = taken.intake.whole();
-    let (closure, before, after, accidents, firmware) = {
+    let (closure, before, after, accidents, firmware, constant_rms_dps) = {
         let search = taken.search(effort);
         if !search.heldout.contains(&true) {
             let rows = record.len();
@@ -164,7 +168,15 @@ pub fn close(
         closure.warnings = warnings;
         closure.command = command.to_owned();
         closure.design_sha256 = crate::digest::sha256(design.source.text.as_bytes());
-        (closure, before, after, accidents, firmware)
+        let constant_rms_dps = told.constant_rms_dps(&told.rows.judging);
+        (
+            closure,
+            before,
+            after,
+            accidents,
+            firmware,
+            constant_rms_dps,
+        )
     };
     let (mut correction, firmware_dps) = firmware.map(|f| (f.correction, f.residual_dps)).unzip();
     if let Some(correction) = &mut correction {
@@ -181,6 +193,7 @@ pub fn close(
         after,
         correction,
         firmware_dps,
+        constant_rms_dps,
     })
 }
 

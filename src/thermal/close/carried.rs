@@ -9,8 +9,9 @@ use crate::text::number;
 use crate::thermal::channels::Channels;
 use crate::thermal::firmware;
 
-/// An error that is so many times another one is more: that of firmware beside the model's, or the declared one's.
-const MORE: f64 = 1.02;
+/// An error that is so many times another one is more: that of firmware beside the model's, the declared one's, or a constant's
+/// (convention).
+pub const MORE: f64 = 1.02;
 
 /// Firmware that leaves more than so many times what a constant leaves is worse than that, and not by chance: in white noise and in a
 /// walk, with one to six sweeps of the temperature, a polynomial left more than 1.7 times as much in one of a thousand.
@@ -110,15 +111,20 @@ impl Told<'_> {
         Some(carried)
     }
 
-    /// What is said where firmware makes the rows that choose, of which it leaves `firmware_dps` rms, worse than a constant does. The
-    /// constant is the median of the fitted rows: their mean may be as far off as the polynomial.
-    fn unlike_readings(&self, firmware_dps: f64) -> Option<Warning> {
+    /// What a constant leaves of some rows, deg/s rms. The constant is the median of the fitted rows: their mean may be as far off as the
+    /// polynomial.
+    pub(super) fn constant_rms_dps(&self, rows: &[bool]) -> f64 {
         let read = &self.whole.error_dps;
         let fitted = read.iter().zip(&self.rows.fitted);
         let fitted: Vec<f64> = fitted.filter(|(_, row)| **row).map(|(e, _)| *e).collect();
         let middle = stats::median(&fitted);
         let about: Vec<f64> = read.iter().map(|e| e - middle).collect();
-        let read_dps = rms_of(&about, &self.rows.choosing);
+        rms_of(&about, rows)
+    }
+
+    /// What is said where firmware makes the rows that choose, of which it leaves `firmware_dps` rms, worse than a constant does.
+    fn unlike_readings(&self, firmware_dps: f64) -> Option<Warning> {
+        let read_dps = self.constant_rms_dps(&self.rows.choosing);
         // Readings that are all the same have no error of their own, and firmware has its rounding.
         let noise_dps = self.after.fit.noise.white_rms_dps;
         (firmware_dps > WORSE * read_dps.hypot(noise_dps)).then(|| {
