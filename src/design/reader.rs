@@ -281,8 +281,8 @@ fn open_bracket(text: &str, offset: usize) -> Option<String> {
     })
 }
 
-/// What to write instead of the value in the line of a mistake: a decimal comma, a number with its unit, a text without
-/// quotes.
+/// What to write instead of the value in the line of a mistake: a decimal comma, several numbers, a number with its unit, a text
+/// without quotes.
 fn of_value(text: &str, offset: usize) -> Option<String> {
     let start = text.get(..offset)?.rfind('\n').map_or(0, |p| p + 1);
     let (key, value) = text.get(start..)?.lines().next()?.split_once('=')?;
@@ -301,6 +301,9 @@ fn of_value(text: &str, offset: usize) -> Option<String> {
             "write the decimal mark as a point: `{key} = {value}`"
         ));
     }
+    if let Some(help) = of_numbers(key, value) {
+        return Some(help);
+    }
     if let Some((number, unit)) = value.split_once(' ')
         && number.parse::<f64>().is_ok_and(f64::is_finite)
         && !unit.contains(['"', '\'', '='])
@@ -315,6 +318,28 @@ fn of_value(text: &str, offset: usize) -> Option<String> {
             .all(|c| c.is_alphanumeric() || "_-. ".contains(c));
     let is_truth = ["true", "false"].contains(&value.to_lowercase().as_str());
     (is_text && !is_truth).then(|| format!("put the text in double quotes: `{key} = \"{value}\"`"))
+}
+
+/// What to write instead of numbers in a row, `None` for any other value: one of them; all as one, where blanks part its digits by the
+/// thousand; or a list.
+fn of_numbers(key: &str, value: &str) -> Option<String> {
+    let numbers: Vec<&str> = value.split_whitespace().collect();
+    let [first, others @ ..] = numbers.as_slice() else {
+        return None;
+    };
+    let is_number = |word: &&str| word.parse::<f64>().is_ok_and(f64::is_finite);
+    if others.is_empty() || !numbers.iter().all(is_number) {
+        return None;
+    }
+    let is_thousands = |word: &&str| word.len() == 3 && word.bytes().all(|b| b.is_ascii_digit());
+    let one = match others.len() > 1 && others.iter().all(is_thousands) {
+        true => numbers.concat(),
+        false => (*first).to_owned(),
+    };
+    Some(format!(
+        "give one number, without a blank in it: `{key} = {one}`. If the key takes several, write them as a list: `{key} = [{}]`",
+        numbers.join(", ")
+    ))
 }
 
 #[cfg(test)]

@@ -17,6 +17,8 @@ const BROKEN: &[Case] = &[
     ("seed = 20040024", "seed = ¦007", "leading zero", "without leading zeros"),
     ("seed = 20040024", "seed = 2¦,5", "not TOML", "as a point: `seed = 2.5`"),
     ("name = \"gyro\"", "name = ¦flag", "not TOML", "double quotes: `name = \"flag\"`"),
+    ("phase_bits = 32", "phase_bits = ¦32 33", "not TOML", "without a blank in it: `phase_bits = 32`. If the key takes several, write them as a list: `phase_bits = [32, 33]`"),
+    ("seed = 20040024", "seed = ¦20 040 024", "not TOML", "one number, without a blank in it: `seed = 20040024`."),
     ("step_k = 5.0", "step_k = ¦5 K", "not TOML", "the number alone, the key's name has the unit: `step_k = 5`"),
     ("[record]", "[record]\ncolumns.time_s = { column = \"t_ms, unit = \"¦ms\" }", "not TOML", "is a quote missing before the comma in this line?"),
     ("[record]", "[record]\ncolumns.time_s = ¦t_ms\"", "not TOML", "is a quote missing in this line?"),
