@@ -204,6 +204,9 @@ fn with_tip(mut error: clap::Error, tip: &str) -> clap::Error {
 /// What to do about two options that exclude each other.
 fn of_conflict(one: &str, other: &str) -> &'static str {
     let has = |name: &str| one.contains(name) || other.contains(name);
+    if one == other && has("--for") {
+        return "give all limits in one `--for`, as in --for \"bias_dps<=0.01 arw_deg_rth<=0.01\"";
+    }
     if one == other {
         return "give it once";
     }
@@ -324,5 +327,13 @@ mod tests {
         assert_eq!(of_missing("--out <DIR>"), "for example `--out out`");
         assert_eq!(of_missing("--out <FILE>"), "for example `--out rows.csv`");
         assert!(of_missing("<NAME>").starts_with("give one of design, "));
+    }
+
+    #[test]
+    fn limits_that_are_given_one_by_one_are_told_to_stand_in_one_option() {
+        let twice = of_conflict("--for <LIMITS>", "--for <LIMITS>");
+        assert!(twice.contains("all limits in one `--for`"), "{twice}");
+        let other = of_conflict("--out <DIR>", "--out <DIR>");
+        assert_eq!(other, "give it once");
     }
 }

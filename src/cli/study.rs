@@ -1,19 +1,22 @@
 //! `gyrogen study`: what each bit of the circuit buys.
 
+mod points;
+
 use super::recorded::Recorded;
 use super::stages::Stages;
 use super::terminal::OutputFormat;
 use crate::design::{Design, Limits};
-use crate::error::{Error, Result, io_error};
+use crate::error::{Error, InputError, Result, io_error};
 use crate::output::Results;
 use crate::study::job::{self, Request};
 use crate::study::journal;
-use crate::study::outcome::{Point, Study};
+use crate::study::outcome::Study;
 use crate::study::progress::{Progress, Step};
 use crate::study::reporting::{DESIGNS, RESOLUTION};
 use crate::study::shard::Part;
 use crate::text::number;
 use crate::timing;
+use points::{Marks, all_points, is_within_by_estimate_alone, points};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::Instant;
@@ -23,8 +26,8 @@ use std::time::Instant;
 pub struct Arguments {
     #[command(flatten)]
     design: super::common::DesignFile,
-    /// The most that the word lengths may add to each error, such as "bias_dps<=0.01 arw_deg_rth<=0.01"; replaces the design's
-    /// `[requirements]`.
+    /// The most that the word lengths may add to each error, all limits in one text, such as "bias_dps<=0.01 arw_deg_rth<=0.01";
+    /// replaces the design's `[requirements]`.
     #[arg(long = "for", value_name = "LIMITS")]
     limits: Option<String>,
     /// Run only part K of N of those designs that are known before the search, and write their results for `--merge`.
@@ -56,6 +59,9 @@ const PLANNED: [&str; 4] = ["study.json", "report.html", timing::NAME, journal::
 /// requirement that cannot be met (exit 1).
 pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     let watch = Stages::start("searching and verifying");
+    if let Some(path) = arguments.design.path() {
+        refuse_limit(path, arguments.limits.as_deref())?;
+    }
     let design = arguments.design.read()?;
     let limits = match &arguments.limits {
         Some(text) => Limits::parse(text)?,
@@ -93,6 +99,23 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
     done
 }
 
+/// Refuses a limit in the place of the design: with blanks around it `--for` takes the first one alone.
+fn refuse_limit(path: &Path, limits: Option<&str>) -> Result<()> {
+    let text = path.to_string_lossy();
+    if !["<=", ">="].iter().any(|sign| text.contains(sign)) || path.exists() {
+        return Ok(());
+    }
+    let all: Vec<&str> = limits.into_iter().chain([text.as_ref()]).collect();
+    Err(InputError::new(format!(
+        "`{text}` is a limit and stands in the place of the design"
+    ))
+    .help(format!(
+        "give all limits in one `--for`: --for \"{}\"",
+        all.join(" ")
+    ))
+    .into())
+}
+
 /// The points' designs that are in a folder: a study replaces those of an earlier one, and how many it makes is known at
 /// its end.
 fn earlier_designs(out: &Path) -> Vec<String> {
@@ -119,7 +142,10 @@ fn into_folder(
     let threads = super::threads(arguments.threads);
     let begun: Mutex<Option<(Step, Instant)>> = Mutex::new(None);
     let said = |progress: Progress| {
-        if let Ok(mut begun) = begun.lock() {
+        if progress.step == Step::Answering {
+            // Nothing of it is counted: a stage with its clock.
+            watch.stage(progress.step.name());
+        } else if let Ok(mut begun) = begun.lock() {
             let since = match *begun {
                 Some((step, since)) if step == progress.step => since,
                 _ => begun.insert((progress.step, Instant::now())).1,
@@ -184,21 +210,20 @@ fn unmet(s: &Study) -> Vec<String> {
         .collect()
 }
 
-/// The columns of figures: title and unit.
-const COLUMNS: [&str; 5] = [
-    "bias\ndeg/s",
-    "drift\ndeg/s",
-    "noise\ndeg/s/rtHz",
-    "SF\nppm",
-    "spur\ndeg/s",
-];
-
 fn print(s: &Study) {
     say!("what the word lengths add to the gyro's own errors; costs in % of the given design's");
     super::terminal::show(&points(s));
     say!("*: on that target's front: nothing cheaper has so small a merit");
+    if s.chosen.iter().any(|c| c.point.is_some()) {
+        say!(">: the point that is chosen for that target; why is said below the second table");
+    }
+    if let Some(said) = Marks::of(s).beyond() {
+        say!("{said}");
+    }
     if s.chosen.iter().any(|c| c.nearest.is_some()) {
-        say!("!: the verified design that is nearest to what is required; it does NOT meet it");
+        say!(
+            "! before a point's number: the verified design that is nearest to what is required; it does NOT meet it"
+        );
     }
     say!(
         "limit: {}",
@@ -278,118 +303,24 @@ fn print(s: &Study) {
     }
 }
 
-/// The points and what a merit of 1 is.
-fn points(s: &Study) -> comfy_table::Table {
-    let targets: Vec<String> = s.reference.price.keys().cloned().collect();
-    let prices: Vec<String> = targets.iter().map(|t| format!("{t}\n%")).collect();
-    let mut header = vec!["point"];
-    header.extend(prices.iter().map(String::as_str));
-    header.extend(COLUMNS);
-    header.extend(["merit", "by"]);
-    let mut table = super::terminal::table(&header);
-    for p in all_points(s) {
-        let mut row = row(p, &targets);
-        if s.chosen.iter().any(|c| c.nearest == Some(p.number)) {
-            row[0].insert(0, '!');
-        }
-        table.add_row(row);
-    }
-    let limits = s.limits.limits().into_iter();
-    let limits = limits.map(|(_, limit)| limit.map_or("-".to_owned(), |l| number(l, 3)));
-    let blank = targets.iter().map(|_| String::new());
-    let mut limit = vec!["limit".to_owned()];
-    limit.extend(blank.chain(limits).chain(["1".to_owned()]));
-    table.add_row(limit);
-    super::terminal::numbers(&mut table, 1..1 + targets.len() + COLUMNS.len() + 1);
-    table
-}
-
-/// The given design, the front, and what is beside it.
-fn all_points(s: &Study) -> impl Iterator<Item = &Point> {
-    std::iter::once(&s.reference)
-        .chain(&s.front)
-        .chain(&s.nearest)
-}
-
-/// A merit of at most 1 does not say by itself that a point may be chosen.
-fn is_within_by_estimate_alone(p: &Point) -> bool {
-    p.merit <= 1.0 && !p.shown
-}
-
-fn row(p: &Point, targets: &[String]) -> Vec<String> {
-    let mut row = vec![if p.number == 0 {
-        "given".to_owned()
-    } else {
-        p.number.to_string()
-    }];
-    for target in targets {
-        let part = p.price_of_given.get(target).copied().unwrap_or(f64::NAN);
-        let mark = if p.targets.contains(target) { "*" } else { "" };
-        row.push(format!("{mark}{:.1}", 100.0 * part));
-    }
-    row.extend([
-        number(p.bias_error_dps, 3),
-        number(p.drift_residual_dps, 3),
-        number(p.noise_dps_rthz, 3),
-        format!("{:.1}", p.scale_factor_ppm),
-        number(p.spur_dps, 3),
-        // A column of its own would make the table wider than 100.
-        match is_within_by_estimate_alone(p) {
-            true => format!("?{:.3}", p.merit),
-            false => format!("{:.3}", p.merit),
-        },
-        // Its column.
-        match p.limited_by.split('_').next() {
-            Some("scale") => "SF",
-            name => name.unwrap_or_default(),
-        }
-        .to_owned(),
-    ]);
-    row
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::outcome::WordLengths;
 
     #[test]
-    fn a_merit_within_the_limits_by_the_estimates_alone_is_marked() {
-        let mut point = Point {
-            number: 4,
-            design: None,
-            targets: vec!["fpga".to_owned()],
-            word_lengths: WordLengths::new(),
-            cost: Default::default(),
-            price: Default::default(),
-            price_of_given: Default::default(),
-            bias_error_dps: 0.0,
-            drift_residual_dps: 0.0,
-            noise_dps_rthz: 0.0,
-            arw_deg_rth: 0.0,
-            scale_factor_ppm: 0.0,
-            spur_dps: 0.0534,
-            spur_hz: 1.0,
-            spur_detuned: true,
-            spur_floor_dps: 0.0,
-            merit: 0.926,
-            limited_by: "spur_dps",
-            parts: Default::default(),
-            bounds: Default::default(),
-            as_good_as_given: false,
-            shown: false,
-            verified: true,
-            startup_error_dps: None,
-            changes: Default::default(),
-            alternatives: Vec::new(),
+    fn a_limit_in_the_place_of_the_design_is_told_where_it_belongs() {
+        let told = |path: &str, limits| {
+            refuse_limit(Path::new(path), limits)
+                .unwrap_err()
+                .to_string()
         };
-        let told = |p: &Point| row(p, &[]).split_off(1 + COLUMNS.len());
-        assert_eq!(told(&point), ["?0.926", "spur"]);
-        assert_eq!(COLUMNS[4], "spur\ndeg/s");
-        point.shown = true;
-        assert_eq!(told(&point), ["0.926", "spur"]);
-        // What is beyond its limits needs no mark.
-        (point.shown, point.merit) = (false, 2.81);
-        assert_eq!(told(&point), ["2.810", "spur"]);
+        let second = told("rom_bytes<=4000", Some("bias_dps<=0.01"));
+        assert!(
+            second.contains("--for \"bias_dps<=0.01 rom_bytes<=4000\""),
+            "{second}"
+        );
+        let alone = told("bandwidth_hz>=40", None);
+        assert!(alone.contains("--for \"bandwidth_hz>=40\""), "{alone}");
+        assert!(refuse_limit(Path::new("gyro.toml"), None).is_ok());
     }
 }

@@ -131,7 +131,7 @@ impl Limits {
         self.0.sort_by_key(|l| l.name);
     }
 
-    /// Reads `bias_dps<=0.01 arw_deg_rth<=0.01`.
+    /// Reads `bias_dps<=0.01 arw_deg_rth<=0.01`, with blanks or commas between the limits.
     ///
     /// # Errors
     /// What is no such limit, with the limits that there are.

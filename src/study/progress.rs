@@ -7,6 +7,19 @@ pub enum Step {
     Searching,
     /// Points run again.
     Verifying,
+    /// Single words of the designs that answer are changed. How many runs that takes is not counted.
+    Answering,
+}
+
+impl Step {
+    /// What is being done, in words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Step::Searching => "searching",
+            Step::Verifying => "verifying",
+            Step::Answering => "weighing single words of the chosen designs",
+        }
+    }
 }
 
 /// How far a step is.
@@ -24,22 +37,22 @@ pub struct Progress {
     pub at_most: bool,
 }
 
+/// Before it the speed so far says little, s (convention): the first designs are the fastest.
+const TOLD_AFTER_S: f64 = 2.0;
+
 impl Progress {
-    /// A line for a terminal; `seconds` since the step began. The time left is that of the designs left at the speed
-    /// so far, and is not told before some have run.
+    /// A line for a terminal; `seconds` since the step began. The time left is that of the step's designs that are left, at the speed
+    /// so far, and is not told before some have run. How long the steps after it take is not known.
     pub fn line(&self, seconds: f64) -> String {
-        let name = match self.step {
-            Step::Searching => "searching",
-            Step::Verifying => "verifying",
-        };
+        let name = self.step.name();
         let most = if self.at_most { "at most " } else { "" };
         let mut line = format!(
             "{name}: {} of {most}{} designs, {seconds:.0} s",
             self.done, self.of
         );
-        if self.new > 0 {
+        if self.new > 0 && seconds >= TOLD_AFTER_S {
             let left = self.of.saturating_sub(self.done) as f64 * seconds / self.new as f64;
-            line += &format!(", {most}{left:.0} s left");
+            line += &format!(", about {left:.0} s left of this step");
         }
         line
     }
@@ -62,8 +75,9 @@ mod tests {
         let line = progress.line(2.0);
         assert_eq!(
             line,
-            "searching: 300 of at most 6500 designs, 2 s, at most 124 s left"
+            "searching: 300 of at most 6500 designs, 2 s, about 124 s left of this step"
         );
+        assert!(!progress.line(1.9).contains("left"));
         progress = Progress {
             step: Step::Verifying,
             done: 0,

@@ -117,6 +117,13 @@ impl Reporting<'_> {
             .collect();
         let near = nearest.into_iter();
         let near: Vec<Option<Near>> = near.map(|c| c.map(|c| Near::among(c, &numbered))).collect();
+        (self.said)(Progress {
+            step: Step::Answering,
+            done: 0,
+            new: 0,
+            of: 0,
+            at_most: false,
+        });
         let answers = answer::answers(self, &seen, &numbered, &base, &chosen, &near);
         let all = numbered.iter().map(|(_, p)| p.clone());
         let (front, nearest) = (all.clone().take(on_front), all.skip(on_front));
