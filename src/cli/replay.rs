@@ -171,6 +171,9 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         rate(samples, started.elapsed()),
     );
     talk!("{}", units(&design, kind, &columns));
+    if let Some(said) = uncorrected(&design) {
+        talk!("note: {said}");
+    }
     if arguments.format == Told::Json {
         let replayed = Replayed {
             schema: "gyrogen.replay/1",
@@ -198,6 +201,14 @@ fn foreign_bias(design: &Design, columns: &[&str]) -> Option<String> {
     Some(format!(
         "{said}. The column rate is compensated for that gyro alone"
     ))
+}
+
+/// Said of a design with a correction: the rows are those of its circuit, and averaged readings come after them.
+fn uncorrected(design: &Design) -> Option<&'static str> {
+    design.correction.as_ref().map(|_| {
+        "the design's [correction] is not applied to these rows, as it acts on readings that are averaged over many of them. `gyrogen emit \
+         --part correction` writes the firmware that applies it; residuals.csv of `gyrogen close` has what that leaves of the record"
+    })
 }
 
 /// What the numbers in the rows' columns are.
@@ -339,5 +350,18 @@ mod tests {
             .collect();
         assert_eq!(said(&tone), None);
         assert_eq!((said(&[]), said(&[5]), said(&[5; 40])), (None, None, None));
+    }
+
+    #[test]
+    fn a_correction_that_the_rows_do_not_have_is_said() {
+        let of = |text: &str| uncorrected(&crate::design::reader::parse(text, None).unwrap());
+        assert_eq!(of(""), None);
+        let table = "[correction]\nperiod_s = 1.0\nfull_scale_dps = 1024.0\nnoise_dps = 0.01\ninputs = []\n\
+                     terms = [{ kind = \"product\", gain_dps = 0.3, factors = [] }]\n";
+        let said = of(table).unwrap();
+        assert!(
+            said.contains("not applied to these rows") && said.contains("emit --part correction"),
+            "{said}"
+        );
     }
 }
