@@ -29,6 +29,8 @@ pub fn emit(
         // Two whole readings, and one that is broken off after a row.
         long_restart: SEGMENT.max(2 * u64::from(conversion.rows()) + 1),
         part: "conversion",
+        called: "once a row",
+        restart: "is 1 at a row that begins a reading anew, after power-on and after rows that are missing, and 0 at every other one",
         facts: conversion.facts(),
         design_sha256: origin.sha256,
         command: origin.command,

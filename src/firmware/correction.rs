@@ -37,6 +37,8 @@ pub fn emit(
         model: &|| Box::new(correction.stepper()),
         long_restart: crate::vectors::stimulus::SEGMENT,
         part: "correction",
+        called: "once a reading",
+        restart: "is 1 at the first reading after power-on and 0 at every other one: 1 says that the power was off before this reading",
         facts: sentences::facts(correction),
         design_sha256: origin.sha256,
         command: origin.command,

@@ -41,6 +41,10 @@ pub struct Stepped<'a> {
     pub long_restart: u64,
     /// `part` in the manifest.
     pub part: &'static str,
+    /// When the function is called, for the README: `once a reading`.
+    pub called: &'static str,
+    /// What its first parameter, `restart`, is, for the README: a predicate.
+    pub restart: &'static str,
     /// Lines for the head of the sources.
     pub facts: Vec<String>,
     /// Of the text of the design that it is emitted from.
@@ -101,6 +105,8 @@ pub fn emit(what: &Stepped, language: Language) -> Result<Vec<EmittedFile>> {
         number: view.chain_number,
         count: CALLS,
         restart: RESTART,
+        called: what.called,
+        restarts: what.restart,
         checksum: format!("{:#x}", checksum(what.model, &ranges, &wide)),
     });
     let rates = ranges.iter().skip(1).enumerate();

@@ -19,7 +19,7 @@ use crate::vectors::stimulus::{self, SEED};
 /// Draws for each function in the self-test.
 const SELFTEST_DRAWS: u32 = 256;
 
-/// What the templates show of a function with a state that is called once a reading.
+/// What the templates show of a function with a state that is called once a reading, or once a row.
 #[derive(Debug, Clone)]
 pub struct StreamView {
     /// The function.
@@ -40,6 +40,10 @@ pub struct StreamView {
     pub count: usize,
     /// A restart so often.
     pub restart: usize,
+    /// When it is called.
+    pub called: &'static str,
+    /// What its parameter `restart` is.
+    pub restarts: &'static str,
     /// FNV-1a of the outputs.
     pub checksum: String,
 }
