@@ -38,6 +38,10 @@ pub fn print(c: &Controls) {
         table.add_row(words::fake(fake));
     }
     super::terminal::show(&table);
+    say!(
+        "fake column: noise with that spectrum, which means nothing. p: the probability that noise alone lets the best of all effects do \
+         as well, before any cause and beside those that were found. control: whether a cause has the column's name"
+    );
     say!("negative control: {}", words::negative(c));
     if !c.positive.is_empty() {
         let mut table = super::terminal::table(&[
@@ -52,6 +56,11 @@ pub fn print(c: &Controls) {
             table.add_row(words::planted(planted));
         }
         super::terminal::show(&table);
+        say!(
+            "90 % found from: the size that is found in nine of ten records like this one. planted x: the size that was planted in what the \
+             closing left. Both are in noises of a row; which is: the planted one in the effect's own unit. named: records with its name; \
+             listed: with another name that lists it as indistinguishable. other names: what else was named (how often)"
+        );
     }
     say!("positive control: {}", words::positive(c));
 }

@@ -217,7 +217,7 @@ fn print(outcome: &Outcome, out: &Path) {
     say!("fit in {}: {}.", s.fit.thermometer, s.fit.reason);
     say!(
         "held-out rms {:.4} deg/s: each of {} blocks in time was predicted from the others. The noise floor, from differences of neighbouring \
-         residuals, is {:.4} deg/s rms.",
+         residuals, is {:.4} deg/s rms. Both are of the fitted polynomial; `close` has other ones, of other rows and with its causes.",
         s.fit.heldout_rms_dps,
         outcome.parts.fit.blocks.len(),
         s.fit.noise_floor_rms_dps

@@ -123,6 +123,10 @@ fn print(o: &Outcome) {
             false => String::new(),
         }
     );
+    say!(
+        "wrong names: records with a name that neither is the effect nor lists it; which is: the size of `90 % found from` in the effect's \
+         own unit, or why there is none; -: none"
+    );
     for e in o.effects.iter().filter(|e| !e.wrong_names.is_empty()) {
         say!("{}: wrongly {}", e.effect, listed(&e.wrong_names));
     }
