@@ -38,16 +38,23 @@ pub(super) fn small_and_left(c: &Closure, said: &Said) -> Option<String> {
 pub(super) fn no_gain(c: &Closure, said: &Said) -> Option<String> {
     let firmware = c.firmware.heldout_rms?;
     let gains = |other: f64| other > MORE * firmware;
+    // Less than that is no gain, and the figures are not to contradict the sentence.
+    let what = |other: f64| match other > firmware {
+        true => "hardly anything",
+        false => "nothing",
+    };
     let (constant, polynomial) = (said.constant_rms_dps, c.before.heldout_rms);
     if c.warnings.iter().any(|w| w.code == "no_gain") {
         None
     } else if !gains(constant) {
         Some(format!(
-            "the firmware gains nothing over a constant here, which leaves {constant:.5} deg/s rms of the same rows"
+            "the firmware gains {} over a constant here, which leaves {constant:.5} deg/s rms of the same rows",
+            what(constant)
         ))
     } else if !c.steps.is_empty() && !gains(polynomial) {
         Some(format!(
-            "the causes gain nothing in firmware here: the polynomial alone leaves {polynomial:.5} deg/s rms of the same rows"
+            "the causes gain {} in firmware here: the polynomial alone leaves {polynomial:.5} deg/s rms of the same rows",
+            what(polynomial)
         ))
     } else {
         None
@@ -126,11 +133,16 @@ mod tests {
         };
         assert_eq!(no_gain(&of(1, 0.02), &said), None);
         // The constant leaves 1.5, the polynomial 0.5.
-        let mut none = of(0, 1.49);
+        let mut none = of(0, 1.51);
         let told = no_gain(&none, &said).unwrap();
         assert!(
             told.contains("nothing over a constant here, which leaves 1.50000"),
             "{told}"
+        );
+        let hardly = no_gain(&of(0, 1.49), &said).unwrap();
+        assert!(
+            hardly.contains("hardly anything over a constant"),
+            "{hardly}"
         );
         none.warnings
             .push(Warning::general("no_gain", String::new()));
