@@ -331,7 +331,7 @@ pub(super) fn why_not(
             None => "the given one".to_owned(),
         };
         said.push(format!(
-            "The nearest design is {named}, marked with ! in the table. It is shown to meet `--for \"{}\"`",
+            "The nearest design is {named}, marked with ! before its number in the table. It is shown to meet `--for \"{}\"`",
             held(work, near.checked, objective)
         ));
     }

@@ -46,7 +46,7 @@ impl Marks<'_> {
     pub(super) fn beyond(&self) -> Option<String> {
         let costs = self.costs.iter();
         let costs: Vec<String> = costs
-            .map(|(name, limit)| format!("{} {}", name.name(), number(*limit, 6)))
+            .map(|(name, limit)| format!("{} {limit}", name.name()))
             .collect();
         let of_costs = format!(
             "before a target's cost: the point is beyond {} there",
