@@ -29,7 +29,8 @@ pub struct Options {
     #[arg(long, value_name = "ID", requires = "self_test")]
     effect: Vec<String>,
     /// Seed of all random numbers.
-    #[arg(long, value_name = "N", default_value_t = 1, requires = "self_test")]
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "self_test",
+          value_parser = super::values::whole::<u64>(0..=u64::MAX))]
     seed: u64,
     /// Threads, 1 to 1024; as many as the machine has if left out. The result does not depend on it.
     #[arg(long, value_name = "N", requires = "self_test", value_parser = super::values::whole::<u16>(1..=1024))]

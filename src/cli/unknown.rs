@@ -25,7 +25,10 @@ pub(super) fn with_advice(mut error: clap::Error) -> clap::Error {
     match command.map_or(String::new(), |command| advice(command, &argument)) {
         // A similar option, if there is one, is named beside this.
         none if none.is_empty() => error,
-        tip => super::with_tip(error, &tip),
+        tip => {
+            error.remove(ContextKind::SuggestedArg);
+            super::with_tip(error, &tip)
+        }
     }
 }
 
@@ -81,6 +84,9 @@ fn advice(command: &clap::Command, argument: &str) -> String {
         ("run" | "close", "--record") | ("replay" | "equiv" | "close", "--capture") => "",
         (_, "--record") => "records are taken by `run` and `close`",
         (_, "--capture") => "captures are taken by `replay`, `equiv` and `close`",
+        (_, "--for") => {
+            "`study` takes limits in `--for`; those of `check` stand in the design's [requirements]"
+        }
         ("approx", "--from" | "--to") => "give the domain as --domain=0,1",
         (_, "--lang") => {
             "`close` and `approx` always write both C and Rust, without an option; `run`, `equiv` and `emit` take `--lang`"
@@ -90,7 +96,8 @@ fn advice(command: &clap::Command, argument: &str) -> String {
         }
         ("run", "--order") => "the order of the fit stands in the design: `order = 3` in [fit]",
         ("simulate", "--samples") => "give how long the run is as --duration S, in seconds",
-        (_, "-o") => return of_out(command),
+        (_, "-o") => return of_option(command, "out"),
+        (_, "--language") => return of_option(command, "lang"),
         (_, number) if number.starts_with('-') && number.parse::<f64>().is_ok() => {
             "a number is the value of an option, and stands behind its name"
         }
@@ -115,10 +122,10 @@ fn value_of(command: &clap::Command, long: &str) -> Option<String> {
     Some(name.to_string())
 }
 
-/// The option that another tool calls `-o`.
-fn of_out(command: &clap::Command) -> String {
-    value_of(command, "out").map_or(String::new(), |value| {
-        format!("did you mean --out {value}?")
+/// An option that another tool calls otherwise.
+fn of_option(command: &clap::Command, long: &str) -> String {
+    value_of(command, long).map_or(String::new(), |value| {
+        format!("did you mean --{long} {value}?")
     })
 }
 
@@ -161,7 +168,9 @@ mod tests {
         assert_eq!(said("approx", "--from"), "give the domain as --domain=0,1");
         assert_eq!(said("verify", "b"), "one folder at a time");
         assert_eq!(said("emit", "-o"), "did you mean --out DIR?");
+        assert_eq!(said("emit", "--language"), "did you mean --lang LANG?");
         assert_eq!(said("emit", "--foo"), "");
+        assert!(said("check", "--for").contains("[requirements]"));
         assert!(said("run", "--bound").contains("bound_dps in [compensation]"));
         assert!(said("run", "--order").contains("`order = 3` in [fit]"));
         assert!(!is_near("--order", "--force") && is_near("--recrod", "--record"));
