@@ -165,6 +165,10 @@ fn write(
     results.write("simulate.json", json.as_bytes())
 }
 
+/// Whose coefficients the rows "after" have: [`simulation::simulate`] fits them to the readings of its own run.
+const AFTER: &str = "after: compensated by a polynomial that was fitted to these readings (it is in the design.toml written here), not by the \
+                     coefficients of the given design.";
+
 fn print(outcome: &Outcome, out: &Path) {
     let s = &outcome.summary;
     if !s.paper.is_empty() {
@@ -219,7 +223,9 @@ fn print(outcome: &Outcome, out: &Path) {
         "drift: largest less smallest reading. rms: of the readings about zero, so that a constant bias is in it and not in the \
          drift."
     );
-    if s.after.is_none() {
+    if s.after.is_some() {
+        say!("{AFTER}");
+    } else {
         say!(
             "There are no rows \"after\", for no compensation was run: {}.",
             match outcome.parts.run.continuous {
@@ -251,7 +257,8 @@ fn print_sentences(outcome: &Outcome) {
     let a = &s.float_fixed;
     say!(
         "{} readings, drive at {}. The fixed-point chain is at most {} rad, {} Hz and {} deg/s (before compensation) from the \
-         same chain in floating point.",
+         same chain in floating point. The latter has a run of its own, without the rounding of the ADC; in `run` both have the same ADC \
+         codes.",
         s.readings,
         s.drive.replace('_', " "),
         number(a.phase_rad, 3),

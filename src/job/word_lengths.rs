@@ -143,9 +143,16 @@ impl WordLengths {
             Covers::CircuitAndCompensation => "word lengths of circuit and compensation",
             Covers::Compensation => "word lengths of the compensation",
         };
+        // `simulate` compares two runs, one of them without the ADC's rounding.
+        let codes = match self.covers {
+            Covers::CircuitAndCompensation => {
+                "; both had the same ADC codes: the ADC's rounding is not in it, unlike in the figure of `simulate`"
+            }
+            Covers::Compensation => "",
+        };
         let mut text = format!(
             "{limiting}: fit {} deg/s held-out rms, {whose} {} deg/s rms. Over these {} readings the compensated rate in fixed point \
-             differed from that in floating point by {} deg/s at most (measured)",
+             differed from that in floating point by {} deg/s at most (measured{codes})",
             shown(fit_dps, 3),
             shown(self.rms_dps, 2),
             self.readings,

@@ -44,7 +44,9 @@ fn a_short_product_is_named_with_what_it_does() {
     );
     let largest = "The largest part is that of circuit.demodulator.product (Q2.10). With Q2.18 the word lengths make ";
     assert!(sentence.contains(largest) && sentence.contains(" deg/s rms instead of 0."));
-    assert!(sentence.contains("deg/s at most (measured)"), "{sentence}");
+    // The figure of `simulate` is another one.
+    let codes = "deg/s at most (measured; both had the same ADC codes: ";
+    assert!(sentence.contains(codes), "{sentence}");
     let clause = words.clause(fit);
     assert!(
         clause.contains(
@@ -106,4 +108,8 @@ fn a_record_covers_the_compensation_alone() {
         "{sentence}"
     );
     assert!(!sentence.contains("word lengths of circuit"), "{sentence}");
+    assert!(
+        sentence.contains("deg/s at most (measured). "),
+        "{sentence}"
+    );
 }

@@ -106,6 +106,35 @@ fn the_default_run_reproduces_every_published_figure() {
     assert!((a - b).abs() < 1e-6, "{a} {b}");
 }
 
+/// Coefficients of 0 compensate nothing, and the run fits its own.
+#[test]
+fn the_rows_after_are_told_to_be_of_fitted_coefficients() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (file, out) = (folder.path().join("zero.toml"), folder.path().join("out"));
+    let mut design = include_str!("../../src/design/default.toml").to_owned();
+    for (from, to) in [
+        ("[114923930, 800391448, 1415954326]", "[0, 0, 0]"),
+        ("step_k = 5.0", "step_k = 10.0"),
+        ("samples_per_reading = 512", "samples_per_reading = 16"),
+    ] {
+        assert_eq!(design.matches(from).count(), 1, "{from}");
+        design = design.replace(from, to);
+    }
+    std::fs::write(&file, design).expect("written");
+    let output = gyrogen_here(&["simulate", text(&file), "--out", text(&out)]);
+    assert_eq!(output.status.code(), Some(0), "{}", told(&output));
+    let said = String::from_utf8(output.stdout).expect("UTF-8");
+    let words: Vec<&str> = said.split_whitespace().collect();
+    let said = words.join(" ");
+    for due in [
+        "after: compensated by a polynomial that was fitted to these readings",
+        "not by the coefficients of the given design.",
+        "in `run` both have the same ADC codes.",
+    ] {
+        assert!(said.contains(due), "{due}: {said}");
+    }
+}
+
 #[test]
 fn tracking_locks_follows_the_tempco_and_compensates_as_well() {
     let folder = tempfile::tempdir().expect("a folder");

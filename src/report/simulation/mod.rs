@@ -117,7 +117,8 @@ fn headline(outcome: &Outcome) -> String {
     let drive = s.drive.replace('_', " ");
     match &s.after {
         Some(after) => format!(
-            "Drive at {drive}: the rate output at rest drifts by {} deg/s, compensated in the bit-accurate chain by {} deg/s ({}).",
+            "Drive at {drive}: the rate output at rest drifts by {} deg/s. Compensated in the bit-accurate chain, with a polynomial that \
+             was fitted to these readings, it drifts by {} deg/s ({}).",
             significant(before, 4),
             significant(after.fixed.drift_pp_dps, 4),
             percent(after.fixed.drift_pp_dps, before)
