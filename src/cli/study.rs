@@ -213,7 +213,9 @@ fn unmet(s: &Study) -> Vec<String> {
 fn print(s: &Study) {
     say!("what the word lengths add to the gyro's own errors; costs in % of the given design's");
     super::terminal::show(&points(s));
-    say!("*: on that target's front: nothing cheaper has so small a merit");
+    say!(
+        "*: on that target's front: of the designs whose error after power-on is within the limit, nothing cheaper has so small a merit"
+    );
     if s.chosen.iter().any(|c| c.point.is_some()) {
         say!(">: the point that is chosen for that target; why is said below the second table");
     }
@@ -230,8 +232,8 @@ fn print(s: &Study) {
         match s.limits_from {
             "requirements" => "as required",
             _ =>
-                "what the word lengths may add before a figure of the gyro and its words together is one percent worse than with the \
-                 given design",
+                "what the given design's words add themselves, and beside it what makes a figure of the gyro and its words together one \
+                 percent worse. So the given design's merit is below 1",
         }
     );
     say!(

@@ -22,9 +22,10 @@ pub(super) fn late_starts(what: &str, late: &[Late]) -> Option<String> {
         _ => format!("{least} to {most}"),
     };
     Some(format!(
-        "{what}: the error after power-on may be as large as {range} deg/s. Allowed is the limit of the bias, {limit} deg/s. A point \
-         whose merit is above 1 is allowed that limit times its merit. Nothing has to be done about them, unless no design is chosen for it: \
-         a limit of `bias_dps<={most}`, in `--for` or `[requirements]`, allows such starts"
+        "{what}: the error after power-on may be as large as {range} deg/s. The limit of the bias, {limit} deg/s, is also the limit of this \
+         error. For a point with a merit above 1 the limit is multiplied by the merit. This note matters only where no design is chosen for a \
+         target. Then a wider limit of the bias helps, in `--for` or `[requirements]`: all errors that this note names are, as measured \
+         here, within `bias_dps<={most}`"
     ))
 }
 
@@ -41,7 +42,8 @@ mod tests {
         assert_eq!(late_starts("none", &[]), None);
         let said = late_starts("2 points dropped", &[late(2.341e-4), late(1.4501e-3)]).unwrap();
         for part in [
-            "as large as 0.000234 to 0.00146 deg/s. ",
+            "as large as 0.000234 to 0.00146 deg/s. The limit of the bias, 1.00e-4 deg/s, is also the limit of this error. ",
+            "only where no design is chosen for a target. ",
             "`bias_dps<=0.00146`",
         ] {
             assert!(said.contains(part), "{said}");

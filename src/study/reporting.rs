@@ -342,7 +342,7 @@ impl Reporting<'_> {
     /// A start is an error of the bias: the whole of its interval, deg/s, has to be within the limit of the bias, deg/s,
     /// times the point's merit where that is above 1. A point says that its figures are within merit times their limits,
     /// and that has to be so after a start too.
-    fn late(&self, c: &Checked) -> Option<Late> {
+    pub(super) fn late(&self, c: &Checked) -> Option<Late> {
         let limit_dps = self.scale.bias_dps.or(self.instrument.bias_dps)?;
         let claimed = self.scale.merit(&c.verified.figures).max(1.0);
         let start_dps = largest(c.bounds.startup_error_dps?);

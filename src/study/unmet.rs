@@ -294,10 +294,14 @@ fn excess(work: &Reporting, c: &Checked, objective: usize) -> Option<(f64, Limit
 }
 
 /// The limits that a verified design is shown to hold, as `--for` takes them: those that are required, raised where it misses them.
-fn held(work: &Reporting, c: &Checked, objective: usize) -> String {
+/// A figure that is raised is so by `margin`; costs and the bandwidth are the same in every study.
+fn held(work: &Reporting, c: &Checked, objective: usize, margin: f64) -> String {
     let text = |l: &Limit| {
         let name = l.name.name();
         match value(work, c, objective, l) {
+            Some(value) if value > l.value && c.bounds.most(l.name).is_some() && margin > 1.0 => {
+                format!("{name}<={}", with_margin(value, margin))
+            }
             Some(value) if value > l.value => format!("{name}<={}", at_most(value, 3)),
             None if l.name == LimitName::Bandwidth && work.bandwidth_hz < l.value => {
                 format!("{name}>={}", work.bandwidth_hz.floor())
@@ -331,11 +335,42 @@ pub(super) fn why_not(
             None => "the given one".to_owned(),
         };
         said.push(format!(
-            "The nearest design is {named}, marked with ! before its number in the table. It is shown to meet `--for \"{}\"`",
-            held(work, near.checked, objective)
+            "The nearest design is {named}, marked with ! before its number in the table"
         ));
+        said.extend(off_the_front(work, near));
+        let held = |margin| held(work, near.checked, objective, margin);
+        said.push(limits_to_ask_for(&held(1.0), &held(MARGIN)));
     }
     said.join(". ")
+}
+
+/// What a figure's limit is raised by, so that a new study, which measures on noise of its own, is likely to meet it too
+/// (convention).
+const MARGIN: f64 = 1.1;
+
+/// A figure times a margin, rounded up to two digits.
+fn with_margin(value: f64, margin: f64) -> String {
+    at_most(value * margin, 2)
+}
+
+/// Why the nearest design has no mark of a front, where its error after power-on keeps it off.
+fn off_the_front(work: &Reporting, near: &Near) -> Option<String> {
+    let late = work.late(near.checked).filter(|_| near.number > 0)?;
+    Some(format!(
+        "It is on no front because its error after power-on may be as large as {} deg/s, more than the limit of the bias allows",
+        at_most(late.start_dps, 3)
+    ))
+}
+
+/// The limits that a design meets as measured, and those, with a margin, that a new study can be asked for.
+fn limits_to_ask_for(held: &str, with_margin: &str) -> String {
+    let met = format!("As measured here, it meets `--for \"{held}\"`");
+    match held == with_margin {
+        true => met,
+        false => format!(
+            "{met}. A new study measures with other noise. Give it a limit with a margin, such as `--for \"{with_margin}\"`"
+        ),
+    }
 }
 
 /// Is the start from power-on in the figure? `None` of what is known without a run.
@@ -407,4 +442,26 @@ fn not_at_once(work: &Reporting, near: Option<&Near>, objective: usize) -> Strin
         name.name(),
         word.map_or(String::new(), |word| word.text(work))
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_limit_for_a_new_study_has_a_margin_and_is_not_promised() {
+        assert_eq!(with_margin(2.32e-4, MARGIN), "0.00026");
+        assert_eq!(with_margin(0.0123, MARGIN), "0.014");
+        let costs = limits_to_ask_for("rom_bytes<=4100", "rom_bytes<=4100");
+        assert_eq!(
+            costs,
+            "As measured here, it meets `--for \"rom_bytes<=4100\"`"
+        );
+        let figures = limits_to_ask_for("bias_dps<=0.000232", "bias_dps<=0.00026");
+        assert!(
+            figures.contains("meets `--for \"bias_dps<=0.000232\"`. A new study ")
+                && figures.ends_with(" a margin, such as `--for \"bias_dps<=0.00026\"`"),
+            "{figures}"
+        );
+    }
 }
