@@ -19,6 +19,7 @@ use crate::emit::bundle::{Bundle, Part, trace_compensation};
 use crate::equivalence::predicted;
 use crate::error::Result;
 use crate::nodes::node::operation;
+use crate::nodes::repair::Repair;
 use crate::nodes::{repair, run};
 use outcome::{Check, NodeCheck, Overflows, Witness};
 use proved::Proved;
@@ -84,9 +85,10 @@ pub fn check(design: &Design, command: &str, samples: usize) -> Result<Check> {
         if let Some(k) = repairs.iter().position(|r| r.is_of(&node.name)) {
             let mend = repairs.remove(k);
             reason += &format!(
-                ". The smallest change that mends it, in {}: {}",
+                ". The smallest change that mends it, in {}: {}{}",
                 design.place_of(&mend.key),
-                mend.change()
+                mend.change(),
+                beyond_the_samples(&mend, &nodes)
             );
         }
         reasons.push(reason);
@@ -109,6 +111,19 @@ pub fn check(design: &Design, command: &str, samples: usize) -> Result<Check> {
         confidence,
         holds: reasons.is_empty(),
         reasons,
+    })
+}
+
+/// Where the ranges that are proved of a repaired format's words need a longer one: that the repair is for the samples that were
+/// run. "At least", as a word before these that is made longer too may bring larger values to them.
+fn beyond_the_samples(mend: &Repair, nodes: &[NodeCheck]) -> String {
+    let own = nodes.iter().filter(|n| mend.is_of(&n.name));
+    let range = own.clone().fold((0, 0), |(high, low): (i128, i128), n| {
+        (high.max(n.proved[1]), low.min(n.proved[0]))
+    });
+    let symmetric = own.clone().any(|n| n.mode == "saturate_symmetric");
+    mend.longer(range, symmetric).map_or(String::new(), |format| {
+        format!(" (for the samples that were run; to hold what is proved possible for all inputs it takes at least {format})")
     })
 }
 

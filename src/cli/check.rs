@@ -1,5 +1,7 @@
 //! `gyrogen check`: what is proved of a design, what it costs, what could be better.
 
+mod meaning;
+
 use super::recorded::Recorded;
 use super::stages::Stages;
 use super::terminal::OutputFormat;
@@ -59,6 +61,9 @@ pub fn run(arguments: &Arguments, recorded: &Recorded) -> Result<()> {
         OutputFormat::Json => super::terminal::give(&json),
         OutputFormat::Text => {
             super::common::say_what_is_emitted(&design);
+            if let Some(note) = meaning::foreign(&design, arguments.design.path().is_some()) {
+                talk!("note: {note}");
+            }
             print(&check);
             if let Some(out) = &arguments.out {
                 super::common::wrote(out, &PLANNED[..1]);
@@ -102,6 +107,9 @@ fn print(check: &Check) {
         "has: the bits of the word. needs: the bits that hold its proved range. spare: has less needs; below 0 the word can overflow. -: \
          does not apply."
     );
+    for meaning in meaning::entries(&check.nodes) {
+        say!("{meaning}");
+    }
     roundings(&check.nodes);
     let open = || {
         let nodes = check.nodes.iter();
@@ -124,11 +132,7 @@ fn print(check: &Check) {
         |n: &&NodeCheck| check.rate_rms_dps.is_some() || !n.name.starts_with("compensation.");
     let (run, not_run): (Vec<_>, Vec<_>) = open().partition(is_run);
     if !run.is_empty() {
-        say!(
-            "None of these overflows happened in the {} samples of the design's own gyro. The check fails only where one did, or where \
-             it is certain.",
-            check.samples
-        );
+        say!("{}", meaning::unseen(check));
     }
     for node in &not_run {
         say!(
@@ -414,7 +418,7 @@ mod tests {
     use super::*;
     use crate::design::{reader, template};
 
-    fn checked(changes: &[(&str, &str)]) -> Check {
+    pub(super) fn checked(changes: &[(&str, &str)]) -> Check {
         let mut text = template::DEFAULT.to_owned();
         for (from, to) in changes {
             assert!(text.contains(from), "{from}");

@@ -28,6 +28,13 @@ impl Repair {
         format!("{} from {} to {}", self.key, self.from, self.to)
     }
 
+    /// The format that would hold these raw words, in the LSB of the repaired one, too; `None` where the repaired one does, and
+    /// of a length that is no format.
+    pub fn longer(&self, range: (i128, i128), symmetric: bool) -> Option<Format> {
+        let to: Format = self.to.parse().ok()?;
+        holding(to, range, symmetric).filter(|held| *held != to)
+    }
+
     /// True if a node of this name has its format from the key.
     pub fn is_of(&self, node: &str) -> bool {
         is_of(&self.key, node)
