@@ -226,7 +226,9 @@ fn print(design: &Design, e: &Equivalence, out: &Path) {
          deg/s is the bias or the rate, or a step on the way to them."
     );
     super::terminal::show(&words);
-    say!("headroom: bits by which the words could grow before they overflow.");
+    say!(
+        "headroom: bits by which the words could grow before they overflow. none: they overflowed. -: does not apply."
+    );
     if e.nodes.iter().any(|n| n.name.contains(" inner ")) {
         say!(
             "compensation.accumulator: of step k of Horner's scheme, inner k is the product of the input and the step before, outer k its \
@@ -257,7 +259,7 @@ fn print(design: &Design, e: &Equivalence, out: &Path) {
             );
         }
         if e.repair_verified == Some(true) {
-            say!("  with that, run again: nothing overflows");
+            say!("  tried: with that nothing overflows");
         }
     }
     print_spurs(e);
@@ -337,7 +339,7 @@ fn word_row(n: &NodeReport) -> Vec<String> {
         format!("{} {unit}", constant(n.lsb, 3))
             .trim_end()
             .to_owned(),
-        n.headroom_bits.map_or("-".into(), |b| format!("{b:.2}")),
+        n.headroom("-"),
         n.overflows.to_string(),
         n.flags.join(" "),
     ]

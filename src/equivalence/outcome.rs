@@ -102,6 +102,16 @@ impl NodeReport {
             errors: node.errors.clone(),
         }
     }
+
+    /// The headroom in bits, for a table; `absent` where there is no figure. A node that overflowed has none, although its words
+    /// after saturation or wrap are within the format.
+    pub fn headroom(&self, absent: &str) -> String {
+        match self.headroom_bits {
+            Some(_) if self.overflows > 0 => "none".to_owned(),
+            Some(bits) => format!("{bits:.2}"),
+            None => absent.to_owned(),
+        }
+    }
 }
 
 /// The first overflow, in the order of the circuit's steps.

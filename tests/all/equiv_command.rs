@@ -75,6 +75,14 @@ fn repaired(design: &str, key: &str, from: &str, to: &str, arguments: &[&str]) {
         talk.contains("overflow at sample") && talk.contains(key),
         "{talk}"
     );
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    let of_key = said.lines().filter(|l| l.trim_start().starts_with(key));
+    let mut words = of_key.map(|l| l.split_whitespace().collect::<Vec<_>>());
+    assert!(words.any(|w| w.contains(&"none")), "{key}: {said}");
+    assert!(
+        said.contains("  tried: with that nothing overflows\n"),
+        "{said}"
+    );
     let json = result(&out);
     let first = &json["first_overflow"];
     assert!(text(&first["node"]).starts_with(key), "{first}");

@@ -41,7 +41,7 @@ struct Page {
 #[derive(Debug)]
 struct Line {
     name: String,
-    /// Greatest error, greatest bound, worst share of a bound in %, rms, predicted rms (LSB), headroom in bits, overflows.
+    /// Greatest error, greatest bound, worst share of a bound in %, rms, predicted rms (LSB), headroom in bits or none, overflows.
     numbers: [String; 7],
     within: bool,
     flags: String,
@@ -173,7 +173,7 @@ fn line(n: &NodeReport) -> Line {
             fixed(100.0 * n.worst_error_to_bound, 1),
             lsb(n.rms_error),
             n.predicted_rms.map_or("–".to_owned(), lsb),
-            n.headroom_bits.map_or("–".to_owned(), |b| fixed(b, 2)),
+            n.headroom("–"),
             grouped(n.overflows),
         ],
         within: n.outside_bound == 0,
