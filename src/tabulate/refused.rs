@@ -27,6 +27,9 @@ pub(super) fn unmet(
     bound: f64,
     wanted: Wanted,
 ) -> Error {
+    if let Some(refusal) = output_too_coarse(request, bound) {
+        return refusal.into();
+    }
     let nearest = nearest(function, codes, request, wanted);
     let reached = nearest.map_or_else(String::new, |c| {
         format!(
@@ -40,6 +43,23 @@ pub(super) fn unmet(
     ))
     .help(in_the_way(function, codes, request, bound))
     .into()
+}
+
+/// The refusal of a bound that the rounding to the output's LSB alone forbids: what comes nearest to it does not matter then.
+fn output_too_coarse(request: &Request, bound: f64) -> Option<InputError> {
+    let half = request.output.lsb() / 2.0;
+    if bound > half {
+        return None;
+    }
+    let bits = (-(2.0 * bound).log2()).floor() as i64 + 1;
+    let refusal = InputError::new(format!(
+        "no form has a certified error of at most {bound:e} with `--output` {}: rounding to it alone costs up to half an LSB, {}",
+        request.output,
+        number(half, 3)
+    ));
+    Some(refusal.help(format!(
+        "give `--output` at least {bits} fraction bits, or a wider bound"
+    )))
 }
 
 /// A form with its formats.
@@ -58,16 +78,6 @@ fn named(candidate: &Candidate, request: &Request) -> String {
 
 /// What the request could do without, and what would be certified then.
 fn in_the_way(function: &Function, codes: Codes, request: &Request, bound: f64) -> String {
-    let half = request.output.lsb() / 2.0;
-    if bound <= half {
-        let bits = (-(2.0 * bound).log2()).floor() as i64 + 1;
-        return format!(
-            "the output is in the way: rounding to {} alone costs half an LSB, {half}. Give `--output` at least {bits} \
-             fraction bits, or a wider bound",
-            request.output,
-            half = number(half, 3)
-        );
-    }
     let found = |asked: &Request| {
         let wanted = wanted(asked.form);
         let all = choice::candidates(function, codes, asked, bound, wanted).ok()?;

@@ -88,10 +88,6 @@ fn formats_that_are_given_are_kept() {
 fn a_refusal_says_how_near_it_came_and_what_is_in_the_way() {
     let cases = [
         (
-            vec!["--bound=1e-6", "--form=auto"],
-            "at least 19 fraction bits",
-        ),
-        (
             vec!["--bound=1e-4", "--degree=3"],
             "`--degree 3` is in the way",
         ),
@@ -113,4 +109,13 @@ fn a_refusal_says_how_near_it_came_and_what_is_in_the_way() {
         assert!(told.contains("the nearest reaches "), "{told}");
         assert!(told.contains(way), "{told}");
     }
+    // Where the output's LSB forbids it, no form is named.
+    let told = refused(&SINE, &["--bound=1e-6", "--form=auto"]);
+    for due in [
+        "with `--output` Q1.15: rounding to it alone costs up to half an LSB, 1.53e-5",
+        "give `--output` at least 19 fraction bits, or a wider bound",
+    ] {
+        assert!(told.contains(due), "{told}");
+    }
+    assert!(!told.contains("nearest"), "{told}");
 }
