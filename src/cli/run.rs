@@ -11,6 +11,8 @@ use crate::job::DRIFT_BINS;
 use crate::job::bound::Line;
 use crate::job::outcome::{Drift, Outcome};
 use crate::text::{at_most, constant};
+use crate::thermal::BaselineFit;
+use crate::thermal::order::OrderTrial;
 use crate::timing;
 use std::path::{Path, PathBuf};
 
@@ -216,9 +218,10 @@ fn print(outcome: &Outcome, out: &Path) {
     );
     say!("fit in {}: {}.", s.fit.thermometer, s.fit.reason);
     say!(
-        "held-out rms {:.4} deg/s: each of {} blocks in time was predicted from the others. The noise floor, from differences of neighbouring \
+        "held-out rms {:.4} deg/s{}: each of {} blocks in time was predicted from the others. The noise floor, from differences of neighbouring \
          residuals, is {:.4} deg/s rms. Both are of the fitted polynomial; `close` has other ones, of other rows and with its causes.",
         s.fit.heldout_rms_dps,
+        which_rows(&outcome.parts.fit),
         outcome.parts.fit.blocks.len(),
         s.fit.noise_floor_rms_dps
     );
@@ -271,6 +274,15 @@ fn print(outcome: &Outcome, out: &Path) {
     next.extend(outcome.parts.record_csv.as_ref().map(|_| "record.csv"));
     next.extend(outcome.parts.firmware.bundles().map(|(_, folder)| folder));
     super::common::wrote(out, &next);
+}
+
+/// Which rows the held-out rms is of, where the reason for the order has it of others.
+fn which_rows(fit: &BaselineFit) -> &'static str {
+    let trial = fit.orders_tried.iter().find(|t| t.order == fit.order);
+    match trial.is_some_and(OrderTrial::outliers_change_heldout) {
+        true => " of all rows, those that stand out too",
+        false => "",
+    }
 }
 
 fn alternative(line: &Line) -> alternatives::Line<'_> {

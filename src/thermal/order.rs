@@ -26,6 +26,16 @@ pub struct OrderTrial {
     pub heldout_plus_one_se_dps: f64,
 }
 
+impl OrderTrial {
+    /// Whether the held-out rms of all rows and that without outliers are different figures in print (four places).
+    pub fn outliers_change_heldout(&self) -> bool {
+        format!("{:.4}", self.heldout_rms_dps) != format!("{:.4}", self.heldout_clean_rms_dps)
+    }
+}
+
+/// Which rows the figures of a reason are of, where outliers change them: the held-out rms that is printed beside it has all rows.
+const WITHOUT_OUTLIERS: &str = ". Orders are compared without the rows that stand out";
+
 /// The order, what was tried, and why.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Choice {
@@ -119,6 +129,9 @@ pub fn choose(sample: &Sample, wanted: FitOrder, most: usize, blocks: &[Range<us
             ": held-out rms {given:.4} deg/s. By held-out error it would be order {smallest}, held-out rms {by_rule:.4} deg/s{why}"
         ));
     }
+    if reason.contains("held-out rms") && chosen.is_some_and(|(t, _)| t.outliers_change_heldout()) {
+        reason.push_str(WITHOUT_OUTLIERS);
+    }
     let heldout = chosen.map_or_else(HeldOut::nothing, |(_, h)| h.clone());
     Choice {
         order,
@@ -154,6 +167,9 @@ fn standard_error(v: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::design::RecordMapping;
+    use crate::thermal::fit;
+    use crate::thermal::synthetic::{Random, options, record, triangle};
 
     /// Which order is the smallest, and which has the smallest error, cannot be mistaken for each other.
     #[test]
@@ -163,5 +179,29 @@ mod tests {
             ". Order 5 has the smallest held-out rms, 1.7723 deg/s. Order 3 is the smallest order that exceeds it by at most one \
              standard error (up to 2.0500 deg/s)"
         );
+    }
+
+    /// A spike makes the figure of all rows another one than that by which orders are compared, and the reason says so; without one
+    /// there is nothing to say.
+    #[test]
+    fn the_reason_says_that_outliers_are_not_in_its_figures() {
+        let reason = |spike_dps: f64| {
+            let degc = triangle(120);
+            let mut random = Random::new(3);
+            let mut rates: Vec<f64> = degc
+                .iter()
+                .map(|t| 0.02 * t + 0.01 * random.normal().clamp(-1.5, 1.5))
+                .collect();
+            rates[50] += spike_dps;
+            let record = record("die_degc", &degc, &rates);
+            let fit =
+                fit(&record, &RecordMapping::default(), &options(FitOrder::Auto)).expect("a fit");
+            let changed = fit.orders_tried[fit.order].outliers_change_heldout();
+            (fit.reason, changed)
+        };
+        let (with, changed) = reason(2.0);
+        assert!(with.ends_with(WITHOUT_OUTLIERS) && changed, "{with}");
+        let (without, changed) = reason(0.0);
+        assert!(!without.contains("stand out") && !changed, "{without}");
     }
 }
