@@ -380,7 +380,9 @@ pub fn sentences_with(design: &Design, bounds: &Bounds, of_run: Option<OfRun>) -
     if let Some(form) = c.form.as_ref() {
         let built = form.build(c.codes(&design.circuit), c.output.format);
         let detail = built.map_or(String::new(), |f| describe::detail(&f));
-        lines.push(format!("evaluated by a form that stands for it: {detail}"));
+        lines.push(format!(
+            "Firmware evaluates the bias by a form that replaces the polynomial: {detail}."
+        ));
     }
     if let Some(fitted) = &c.fitted {
         lines.push(format!(

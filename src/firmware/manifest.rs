@@ -242,10 +242,14 @@ pub fn facts(design: &Design, bundle: &Bundle) -> Vec<String> {
     }
     if let Some(k) = &design.compensation {
         facts.push(format!(
-            "compensation: input {}, coefficients {:?} {}, lowest order first",
+            "compensation: input {}, coefficients {:?} {}, lowest order first{}",
             input(&k.input),
             k.coefficients_raw,
-            k.coefficient_format
+            k.coefficient_format,
+            match k.form {
+                Some(_) => "; these and the accumulator are of the reference polynomial, which another form replaces here",
+                None => "",
+            }
         ));
         let rate = match k.rate_full_scale_dps == 1.0 {
             true => "in deg/s".to_owned(),

@@ -80,6 +80,13 @@ pub fn calibrate(
         chosen.extend(said);
         kept
     });
+    if design
+        .compensation
+        .as_ref()
+        .is_some_and(|c| c.form.is_some())
+    {
+        chosen = chosen.into_iter().map(of_reference).collect();
+    }
     Ok(Calibration {
         fit,
         chosen,
@@ -87,6 +94,19 @@ pub fn calibrate(
         kept,
         warnings,
     })
+}
+
+/// What was chosen, where another form replaces the polynomial in firmware: its coefficients and accumulator are not the firmware's.
+fn of_reference(chosen: String) -> String {
+    let is_of_polynomial = ["coefficients ", "accumulator "]
+        .iter()
+        .any(|what| chosen.starts_with(what));
+    match is_of_polynomial {
+        true => {
+            format!("for the reference polynomial, which a form replaces in firmware: {chosen}")
+        }
+        false => chosen,
+    }
 }
 
 /// What the firmware does where nothing was measured, and what to do about it.
@@ -135,8 +155,40 @@ fn gives_up_held_phase(design: &mut Design) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::design::reader;
+    use crate::design::target::Target;
+    use crate::design::{BiasBound, reader};
     use crate::thermal::synthetic::{Random, record, triangle};
+
+    /// What firmware does not have is not said to be chosen for it.
+    #[test]
+    fn words_of_a_polynomial_that_a_form_replaces_are_those_of_the_reference() {
+        let degc = triangle(200);
+        let mut random = Random::new(8);
+        let rates = degc.iter().map(|t| 0.02 * t + 0.01 * random.normal());
+        let record = record("die_degc", &degc, &rates.collect::<Vec<_>>());
+        let chosen = |auto| {
+            let mut design = reader::read(None).expect("the default");
+            design.bound = Some(BiasBound {
+                bound_dps: 0.05,
+                auto,
+                target: Target::CortexM4,
+            });
+            let made = calibrate(&mut design, &record, false).expect("a calibration");
+            let form = design.compensation.expect("a compensation").form;
+            (made.chosen, form.is_some())
+        };
+        let words =
+            |lines: &[String], start: &str| lines.iter().any(|line| line.starts_with(start));
+        let (replaced, by_form) = chosen(true);
+        assert!(by_form && !words(&replaced, "coefficients ") && !words(&replaced, "accumulator "));
+        assert!(words(
+            &replaced,
+            "for the reference polynomial, which a form replaces"
+        ));
+        assert!(words(&replaced, "output "), "{replaced:?}");
+        let (own, by_form) = chosen(false);
+        assert!(!by_form && words(&own, "coefficients "), "{own:?}");
+    }
 
     /// Twelve rows cannot carry order 5: the warning says what the firmware does beyond them, which the design decides.
     #[test]
