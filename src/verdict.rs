@@ -114,13 +114,12 @@ impl FirmwareErrors {
 }
 
 impl Closure {
-    /// The thermometer whose heating and cooling differ by more than noise, where what is left shows most in time.
+    /// The thermometer whose heating and cooling differ by more than noise. What is left depends on more than its reading then.
     ///
     /// Time rises all along a record, so that whatever hangs on the past of the temperature (lag, hysteresis) shows in time too:
     /// where time comes first and heating and cooling differ, both have to be said.
-    pub fn both_ways(&self) -> Option<&str> {
-        let in_time = self.residual_structure.strongest_channel.as_deref() == Some("time_s");
-        let mut warnings = self.warnings.iter().filter(|_| in_time);
+    pub fn loops_in(&self) -> Option<&str> {
+        let mut warnings = self.warnings.iter();
         let found = warnings.find(|w| w.code == "heating_cooling_loop")?;
         found.column.as_deref()
     }

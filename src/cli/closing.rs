@@ -11,7 +11,7 @@ use crate::thermal::effects::covariate::of_another_axis;
 use crate::thermal::firmware::emitted::Emitted;
 use crate::thermal::search::declared;
 use crate::verdict::{Closure, Verdict};
-use figures::{errors, held_out, no_gain, small_and_left};
+use figures::{errors, held_out, no_gain, of_capture, small_and_left};
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -23,6 +23,8 @@ pub(super) struct Said {
     equations: Vec<String>,
     /// The column that tells the temperature.
     thermometer: String,
+    /// Whether the record has a column besides this one, time and output.
+    has_others: bool,
     /// What the readings are before anything is subtracted, and the rms of the rows that judge, deg/s.
     as_read: (&'static str, f64),
     /// What a constant leaves of them, deg/s rms.
@@ -58,6 +60,7 @@ impl Said {
             polynomial: polynomial(&powers, &c.thermometer, [c.centre, c.half]),
             equations: terms.map(|t| t.candidate.equation(c, &t.point)).collect(),
             thermometer: c.thermometer.clone(),
+            has_others: c.columns.keys().any(|name| name != "time_s"),
             as_read: match c.column("rate_dps") {
                 Some(_) => ("as read less rate_dps", stats::rms(&as_read)),
                 None => ("as read", stats::rms(&as_read)),
@@ -123,24 +126,26 @@ pub(super) fn print(
     if let Some(said) = said {
         contributions(c, said);
     }
-    say!("{}", sentence(c));
+    say!("{}", sentence(c, said.is_none_or(|said| said.has_others)));
     say!("{}", errors(c, said));
     if let Some(told) = said.and_then(|said| small_and_left(c, said)) {
         say!("{told}");
     }
-    if let Some(rms) = c.firmware.heldout_rms {
+    if c.unit != "deg/s" {
+        say!("{}", of_capture(c));
+    } else if let Some(rms) = c.firmware.heldout_rms {
         say!(
             "firmware's model, bit for bit{}: held-out rms {rms:.5} {}",
             match compared {
-                None if c.unit == "deg/s" => " (--verify compiles and compares)",
-                _ => "",
+                None => " (--verify compiles and compares)",
+                Some(_) => "",
             },
             c.unit_text()
         );
         if let Some(told) = said.and_then(|said| no_gain(c, said)) {
             say!("{told}");
         }
-    } else if c.unit == "deg/s" {
+    } else {
         say!("no firmware was written: the warnings say why");
     }
     say!("{}", held_out(said));
@@ -166,6 +171,17 @@ fn causes(c: &Closure) {
         say!("+-: one standard deviation");
     }
     say!("p: the probability that noise alone lets the best of all effects do as well");
+    if has_rivals(c) {
+        let tells_apart = c.steps.iter().any(|s| s.separating_experiment.is_some());
+        say!(
+            "cannot be told from: one of these effects in place of the cause fits the measurement about as well, so that the cause may \
+             be any one of them{}",
+            match tells_apart {
+                true => ". report.html names the experiment that tells them apart",
+                false => "",
+            }
+        );
+    }
     covariates(c);
 }
 
@@ -187,12 +203,17 @@ fn contributions(c: &Closure, said: &Said) {
     }
 }
 
+/// Whether a cause has a rival that the record cannot tell it from.
+fn has_rivals(c: &Closure) -> bool {
+    c.steps.iter().any(|s| !s.indistinguishable_from.is_empty())
+}
+
 /// A row for each cause.
 fn table(c: &Closure) -> comfy_table::Table {
     // A cause that another effect explains as well is told with its rivals; mostly there are none.
-    let rivals = c.steps.iter().any(|s| !s.indistinguishable_from.is_empty());
+    let rivals = has_rivals(c);
     let mut headers = vec!["cause", "parameters", "held-out rms", "p"];
-    headers.extend(rivals.then_some("explained as well by"));
+    headers.extend(rivals.then_some("cannot be told from"));
     let mut table = super::terminal::table(&headers);
     for s in &c.steps {
         let parameters = s.parameters.iter().map(|(name, v)| {
@@ -245,14 +266,32 @@ fn with_deviation(value: f64, std: f64) -> String {
     format!("{value:.places$} +- {std:.places$}")
 }
 
-/// The verdict in a sentence.
-fn sentence(c: &Closure) -> String {
+/// The verdict in a sentence; `has_others` is whether the measurement has a column beside the output that is neither its thermometer
+/// nor time.
+fn sentence(c: &Closure, has_others: bool) -> String {
     let names: Vec<&str> = c.steps.iter().map(|s| s.effect.as_str()).collect();
     let channel = c.residual_structure.strongest_channel.as_deref();
-    let past = c.both_ways().map_or(String::new(), |thermometer| {
-        format!(" or on the past of {thermometer}, as heating and cooling differ")
-    });
-    let channel = channel.map_or(String::new(), |c| format!("; it depends most on {c}{past}"));
+    let channel = match (c.loops_in(), channel) {
+        (_, None) => String::new(),
+        // Of one column nothing is the most.
+        (None, Some("time_s")) => "; it depends most on time_s".to_owned(),
+        (None, Some(_)) if !has_others => String::new(),
+        (None, Some(channel)) => format!("; it depends most on {channel}"),
+        (Some(thermometer), Some("time_s")) => {
+            format!("; it depends on the direction of {thermometer}'s change, or on time_s")
+        }
+        (Some(thermometer), Some(channel)) if channel != thermometer => format!(
+            "; it depends most on {channel}, and on the direction of {thermometer}'s change"
+        ),
+        (Some(thermometer), Some(_)) => {
+            format!("; it depends on the direction of {thermometer}'s change")
+        }
+    };
+    // A formula in the columns of a row has no past.
+    let formula = match c.loops_in() {
+        Some(_) => "",
+        None => "; a cause that you suspect is tried as a formula in [[effects]] of the design",
+    };
     match c.verdict {
         Verdict::Complete => "complete: nothing beyond noise is left".to_owned(),
         Verdict::Explained => format!("explained by {}", names.join(", ")),
@@ -269,10 +308,7 @@ fn sentence(c: &Closure) -> String {
                 false => "",
             };
             match c.unit {
-                "deg/s" => format!(
-                    "{what}.{only} report.html says what to measure next; a cause that you suspect is tried as a formula in [[effects]] \
-                     of the design"
-                ),
+                "deg/s" => format!("{what}.{only} report.html says what to measure next{formula}"),
                 _ => what,
             }
         }
@@ -291,6 +327,7 @@ mod tests {
             polynomial: String::new(),
             equations: Vec::new(),
             thermometer: "die_degc".to_owned(),
+            has_others: false,
             as_read: ("as read", 1.55),
             constant_rms_dps: 1.5,
             judging,
@@ -340,7 +377,7 @@ mod tests {
 
     #[test]
     fn what_is_unexplained_says_what_firmware_does_and_what_helps() {
-        let said = sentence(&closure("deg/s", 0));
+        let said = sentence(&closure("deg/s", 0), true);
         for part in [
             "no known effect makes; it depends most on die_degc.",
             "subtracts the polynomial alone",
@@ -348,24 +385,35 @@ mod tests {
         ] {
             assert!(said.contains(part), "{said}");
         }
-        assert!(!sentence(&closure("lsb", 0)).contains("polynomial"));
+        assert!(!sentence(&closure("lsb", 0), true).contains("polynomial"));
+        // One column is not more than others.
+        let alone = sentence(&closure("deg/s", 0), false);
+        assert!(alone.contains("no known effect makes. "), "{alone}");
     }
 
     #[test]
-    fn where_heating_and_cooling_differ_time_is_not_named_alone() {
+    fn where_heating_and_cooling_differ_the_direction_is_named_and_no_formula() {
         let mut both = closure("deg/s", 0);
         let found = Warning::on("heating_cooling_loop", "die_degc", String::new());
         both.warnings.push(found);
-        let past = "on the past of die_degc";
-        assert!(!sentence(&both).contains(past));
-        both.residual_structure.strongest_channel = Some("time_s".to_owned());
-        let said = sentence(&both);
+        let direction = "depends on the direction of die_degc's change";
+        for (channel, tail) in [("die_degc", "."), ("time_s", ", or on time_s.")] {
+            both.residual_structure.strongest_channel = Some(channel.to_owned());
+            let said = sentence(&both, false);
+            assert!(said.contains(&format!("; it {direction}{tail}")), "{said}");
+            assert!(
+                !said.contains("[[effects]]") && !said.contains("depends most"),
+                "{said}"
+            );
+        }
+        both.residual_structure.strongest_channel = Some("supply_v".to_owned());
+        let said = sentence(&both, true);
         assert!(
-            said.contains(&format!("depends most on time_s or {past}, as ")),
+            said.contains("most on supply_v, and on the direction of die_degc's change"),
             "{said}"
         );
         both.warnings.clear();
-        assert!(!sentence(&both).contains(past));
+        assert!(!sentence(&both, true).contains("direction"));
     }
 
     #[test]

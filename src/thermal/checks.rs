@@ -262,11 +262,16 @@ fn seen(fit: &BaselineFit, l: Loop) -> String {
     )
 }
 
+/// What tells the two apart that make heating differ from cooling; a sentence without its full stop.
+pub const LOOP_EXPERIMENT: &str = "To tell a lag from a hysteresis, reverse the chamber's course at several temperatures, and at \
+     two ramp rates: the difference that a lag makes grows with the rate, that of a hysteresis does not";
+
 /// The loop of a record that no known effect explains, if it is more than noise.
 pub(super) fn unexplained_loop(fit: &BaselineFit) -> Option<Warning> {
     let l = fit.sweep_loop.filter(|l| l.significant)?;
     let said = format!(
-        "{}. No function of the thermometer can follow such a difference, and none of the known effects makes it",
+        "{}. No function of the thermometer can follow such a difference, and none of the known effects makes it. Nor can a formula of \
+         [[effects]], which has the columns of one row. {LOOP_EXPERIMENT}",
         seen(fit, l)
     );
     Some(Warning::on("heating_cooling_loop", &fit.thermometer, said))

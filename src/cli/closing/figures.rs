@@ -1,6 +1,7 @@
 //! What `gyrogen close` prints of errors: each with its rows, and what it says beside the others.
 
 use super::Said;
+use crate::capture::around::LEAST_VARIANCE;
 use crate::thermal::close::MORE;
 use crate::verdict::Closure;
 
@@ -9,7 +10,16 @@ pub(super) fn errors(c: &Closure, said: Option<&Said>) -> String {
     let (before, after, floor) = (c.before.heldout_rms, c.after.heldout_rms, c.noise_floor_rms);
     let unit = c.unit_text();
     let Some(said) = said else {
-        return format!("held-out rms {before:.5} -> {after:.5} {unit}, noise floor {floor:.5}");
+        let causes = match c.steps.is_empty() {
+            true => String::new(),
+            false => format!(", {after:.5} after the causes too"),
+        };
+        return format!(
+            "held-out rms of code less model, in {unit} of the ADC's codes, both channels together: {before:.5} after the declared \
+             tones{causes}\nnoise floor: {floor:.5} {unit} rms, white noise from the residual's spectrum; no less than {:.5} is taken, \
+             nearly the rounding error of an ideal ADC. Where the rounding repeats with the tone, the rms can be below it",
+            LEAST_VARIANCE.sqrt()
+        );
     };
     let causes = match c.steps.is_empty() {
         true => String::new(),
@@ -19,6 +29,18 @@ pub(super) fn errors(c: &Closure, said: Option<&Said>) -> String {
     format!(
         "held-out rms, {unit}: {rms:.5} {as_read}; {before:.5} after the polynomial; {causes}noise floor {floor:.5}"
     )
+}
+
+/// What is said of firmware for a capture: there is none, whatever a correction would leave.
+pub(super) fn of_capture(c: &Closure) -> String {
+    let none = "no firmware is written for a capture";
+    match c.firmware.heldout_rms.filter(|_| !c.steps.is_empty()) {
+        Some(rms) => format!(
+            "{none}; a correction of its codes in integers would leave a held-out rms of {rms:.5} {} (computed)",
+            c.unit_text()
+        ),
+        None => none.to_owned(),
+    }
 }
 
 /// What is said where something is left although the held-out rows show no more than noise, by chance one standard deviation more:
@@ -106,8 +128,23 @@ mod tests {
         );
         assert_eq!(
             errors(&closure("lsb", 1), None),
-            "held-out rms 0.50000 -> 0.02000 LSB, noise floor 0.01000"
+            "held-out rms of code less model, in LSB of the ADC's codes, both channels together: 0.50000 after the declared tones, \
+             0.02000 after the causes too\nnoise floor: 0.01000 LSB rms, white noise from the residual's spectrum; no less than \
+             0.26458 is taken, nearly the rounding error of an ideal ADC. Where the rounding repeats with the tone, the rms can be \
+             below it"
         );
+        assert!(!errors(&closure("lsb", 0), None).contains("causes"));
+    }
+
+    #[test]
+    fn of_a_capture_it_is_said_that_no_firmware_is_written() {
+        let of = |steps| {
+            let mut c = closure("lsb", steps);
+            c.firmware.heldout_rms = Some(0.3);
+            of_capture(&c)
+        };
+        assert_eq!(of(0), "no firmware is written for a capture");
+        assert!(of(1).ends_with("would leave a held-out rms of 0.30000 LSB (computed)"));
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::design::reader;
+use crate::record::Warning;
 use crate::thermal::close::close;
 use crate::thermal::search::Effort;
 use crate::thermal::synthetic::{Random, record, triangle};
@@ -146,4 +147,13 @@ fn a_channel_is_to_be_changed_by_itself_only_beside_another() {
     assert!(said(&closed));
     closed.channels.columns.clear();
     assert!(!said(&closed));
+    // Where heating and cooling differ, the experiment is another one.
+    let reverses = |closed: &Closed| {
+        let page = html(closed, "r.csv").unwrap();
+        page.contains("To tell a lag from a hysteresis, reverse the chamber")
+    };
+    assert!(!reverses(&closed));
+    let found = Warning::on("heating_cooling_loop", "die_degc", String::new());
+    closed.closure.warnings.push(found);
+    assert!(reverses(&closed));
 }

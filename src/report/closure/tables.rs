@@ -152,10 +152,15 @@ pub fn next(c: &Closure) -> String {
     let mut out = String::new();
     if let Some(channel) = &c.residual_structure.strongest_channel {
         out += &format!(" What is left shows most in {channel}.");
-        if let Some(thermometer) = c.both_ways() {
-            out += &format!(
-                " As heating and cooling differ, it may hang on the past of {thermometer} rather than on time."
-            );
+        if let Some(thermometer) = c.loops_in() {
+            out += &match channel == "time_s" {
+                true => format!(
+                    " As heating and cooling differ, it may hang on the past of {thermometer} rather than on time."
+                ),
+                false => format!(
+                    " As heating and cooling differ, it depends on the direction of {thermometer}'s change."
+                ),
+            };
         }
     }
     for step in &c.steps {

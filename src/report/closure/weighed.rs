@@ -4,6 +4,7 @@ use crate::report::axis::{Axis, Interval};
 use crate::report::figure::{Figure, one};
 use crate::report::svg::{Svg, Swatch};
 use crate::report::text::fixed;
+use crate::thermal::checks::LOOP_EXPERIMENT;
 use crate::verdict::{Closure, Evidence, Fate};
 use std::collections::BTreeMap;
 
@@ -102,6 +103,9 @@ pub fn measure_next(c: &Closure, has_others: bool) -> Vec<String> {
         out.push(format!(
             "Repeat the run with {channel} changed by itself, all else held: what is left shows most there."
         ));
+    }
+    if c.loops_in().is_some() {
+        out.push(format!("{LOOP_EXPERIMENT}."));
     }
     let mut missing: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
     for e in c.evidence.iter().filter(|e| e.fate == Fate::NoChannel) {
