@@ -49,8 +49,14 @@ impl Candidate for Warmup {
         &WARMUP
     }
 
-    fn equation(&self, _c: &Channels, point: &Point) -> String {
-        let law = "amplitude exp(-t_on / tau), t_on the time since power-on";
+    fn equation(&self, c: &Channels, point: &Point) -> String {
+        let law = match c.on_known {
+            true => "amplitude exp(-t_on / tau), t_on the time since power-on",
+            false => {
+                "amplitude exp(-t_on / tau), t_on the time since power-on: here time_s, as the record tells no time_since_power_on_s, so \
+                 that time_s = 0 is taken as power-on"
+            }
+        };
         match point.form {
             RESTED => format!(
                 "s {law}, s = 1 at first and less after a power-off that was too short to cool down: what had settled goes back \

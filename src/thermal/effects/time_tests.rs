@@ -84,6 +84,23 @@ fn no_warm_up_takes_longer_than_the_power_is_on() {
     }
 }
 
+/// What the time since power-on counts from is said where the record does not tell it.
+#[test]
+fn the_equation_says_what_is_taken_as_power_on() {
+    let time_s = [0.0, 10.0, 20.0, 30.0];
+    let equation = |on_s: Option<Vec<f64>>| {
+        let mut columns = BTreeMap::from([
+            ("rate_out_dps".to_owned(), vec![0.0; 4]),
+            ("die_degc".to_owned(), vec![0.0, 1.0, 2.0, 3.0]),
+        ]);
+        columns.extend(on_s.map(|on_s| ("time_since_power_on_s".to_owned(), on_s)));
+        let c = Channels::new(&time_s, &columns, "die_degc", |t| t).unwrap();
+        Warmup.equation(&c, &Point::at(0, &[f64::ln(20.0)]))
+    };
+    assert!(equation(None).contains("time_s = 0 is taken as power-on"));
+    assert!(!equation(Some(vec![50.0, 60.0, 70.0, 80.0])).contains("time_s = 0"));
+}
+
 /// The same with four power-ons of 750 s, each after a rest; `start` of each.
 fn restarted(seed: u64, rest_s: [f64; 3], start: [f64; 4]) -> (Vec<String>, Reported) {
     let on_s = |k: usize| 10.0 * (k % 75) as f64;
