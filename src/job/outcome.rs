@@ -268,7 +268,7 @@ impl Outcome {
         let mut said = parts.warnings.iter();
         let has_loop = said.any(|w| w.code == "heating_cooling_loop");
         let no_gain =
-            is_measured.then(|| no_gain::warning(&parts.fit.thermometer, triples, has_loop));
+            is_measured.then(|| no_gain::warning(&parts.fit.thermometer, triples, has_loop, true));
         let compensation = parts.design.compensation.as_ref();
         let fit = &parts.fit;
         let summary = Summary {

@@ -52,11 +52,13 @@ fn gains_nothing(readings: impl Iterator<Item = [f64; 3]> + Clone) -> bool {
 
 /// What is said of a compensation that takes nothing off; of readings in the order of time: the thermometer's, with the rate before
 /// the compensation and after it, deg/s, the applied rate subtracted. Where heating and cooling differ (`has_loop`), that is the reason
-/// and is told by itself, unless the gyro was turned, which makes them differ as well.
+/// and is told by itself, unless the gyro was turned, which makes them differ as well. Where it is not known that more than noise is
+/// there (`may_be_noise`), that is said to be possible.
 pub fn warning(
     thermometer: &str,
     readings: impl Iterator<Item = [f64; 3]> + Clone,
     has_loop: bool,
+    may_be_noise: bool,
 ) -> Option<Warning> {
     if !gains_nothing(readings.clone()) {
         return None;
@@ -68,10 +70,14 @@ pub fn warning(
     (!has_loop || is_turned).then(|| {
         let said = format!(
             "the compensation takes nothing of the drift off: the rate runs from {} to {} deg/s before it and varies as much after it. \
-             Either it does not follow {thermometer}, or the gyro was turned. Cut the rows in which it turned, or give the applied \
-             rate as rate_dps",
+             Either {}it does not follow {thermometer}, or the gyro was turned. If it was, cut the rows in which it turned, or give \
+             the applied rate as rate_dps",
             number(low, 4),
-            number(high, 4)
+            number(high, 4),
+            match may_be_noise {
+                true => "there is no drift beyond noise, or ",
+                false => "",
+            }
         );
         Warning::general("no_gain", said)
     })
@@ -105,11 +111,25 @@ mod tests {
                 let rate = sin + 0.2 * cos + 0.05 * noise(k) + turned;
                 [25.0 + 20.0 * cos, rate, rate]
             });
-            warning("die_degc", readings, has_loop).is_some()
+            warning("die_degc", readings, has_loop, false).is_some()
         };
         assert!(said(0.0, false));
         assert!(!said(0.0, true));
         assert!(said(50.0, true));
+    }
+
+    /// A run does not know whether more than noise is there; where it is known, noise is not named.
+    #[test]
+    fn noise_alone_is_said_where_it_may_be_all() {
+        let rate = |k: u32| slope(k) + noise(k);
+        let readings = (0..600).map(|k| [20.0 + f64::from(k) / 100.0, rate(k), rate(k)]);
+        let said = |may_be_noise| {
+            let found = warning("die_degc", readings.clone(), false, may_be_noise);
+            found.expect("a warning").message
+        };
+        let possible = "Either there is no drift beyond noise, or it does not follow die_degc, or";
+        assert!(said(true).contains(possible), "{}", said(true));
+        assert!(said(false).contains("Either it does not follow die_degc, or"));
     }
 
     #[test]

@@ -80,7 +80,7 @@ impl Told<'_> {
         let readings = usual.map(|(((before, after), u), _)| [*u, *before, *after]);
         let is_left = self.found.left.is_some();
         is_left
-            .then(|| no_gain::warning(&self.whole.thermometer, readings, has_loop))
+            .then(|| no_gain::warning(&self.whole.thermometer, readings, has_loop, false))
             .flatten()
     }
 
@@ -140,11 +140,12 @@ impl Told<'_> {
             "outliers",
             "rate_out_dps",
             format!(
-                "{} of {} rows ({unfitted} not fitted) stand out by more than six deviations, whatever the model, alone or a few in a \
+                "{} of {} rows ({}) stand out by more than six deviations, whatever the model, alone or a few in a \
                  row. They are taken for accidents and are not in the errors. Look at the farthest: at {} s it is off by {} \
                  deg/s",
                 rows.len(),
                 residual.len(),
+                kept_from_fit(unfitted),
                 search.channels.time_s[farthest],
                 number(residual[farthest], 3)
             ),
@@ -170,10 +171,11 @@ impl Told<'_> {
             "many_outliers",
             "rate_out_dps",
             format!(
-                "{} of {} rows ({unfitted} not fitted) are more than six deviations off the others, the first at {first} s: too many \
+                "{} of {} rows ({}) are more than six deviations off the others, the first at {first} s: too many \
                  for accidents, so they are in the errors, and no candidate makes them. {question}",
                 rows.len(),
-                search.channels.len()
+                search.channels.len(),
+                kept_from_fit(unfitted)
             ),
         ))
     }
@@ -193,6 +195,11 @@ impl Told<'_> {
         let ids = hidden.map(|j| j.candidate.id());
         ids.filter(|id| !taken(id)).collect()
     }
+}
+
+/// What so many rows are that no fit has seen.
+fn kept_from_fit(rows: usize) -> String {
+    format!("{rows} of them kept from the fit, for the choice of causes or the error")
 }
 
 #[cfg(test)]
@@ -327,6 +334,11 @@ mod tests {
             message(&closure, "many_outliers").unwrap().to_owned()
         };
         let (at_rest, turned) = (asked(0.0), asked(40.0));
+        assert!(
+            at_rest
+                .contains(" of them kept from the fit, for the choice of causes or the error) are"),
+            "{at_rest}"
+        );
         assert!(
             at_rest.contains("record again at rest") && !at_rest.contains("rate table"),
             "{at_rest}"
