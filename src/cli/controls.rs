@@ -56,10 +56,14 @@ pub fn print(c: &Controls) {
             table.add_row(words::planted(planted));
         }
         super::terminal::show(&table);
+        let listed = match c.positive.iter().any(|p| p.only_listed > 0) {
+            true => "; \"listed in\": with another name that lists it as indistinguishable",
+            false => "",
+        };
         say!(
             "90 % found from: the size that is found in nine of ten records like this one. planted x: the size that was planted in what the \
-             closing left. Both are in noises of a row; which is: the planted one in the effect's own unit. named: records with its name; \
-             listed: with another name that lists it as indistinguishable. other names: what else was named (how often)"
+             closing left. Both are in noises of a row; which is: the planted one in the effect's own unit. named: records with its \
+             name{listed}. other names: what else was named (how often)"
         );
     }
     say!("positive control: {}", words::positive(c));

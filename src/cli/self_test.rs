@@ -117,8 +117,8 @@ fn print(o: &Outcome) {
         "90 % found from: where a logistic curve through the counts of all sizes reaches 90 %.{}",
         match records < RECORDS_FOR_90 {
             true => format!(
-                " With {} of each size it is a rough figure: {RECORDS_FOR_90}, all found, show 90 % with 90 % confidence (--records \
-                 {RECORDS_FOR_90}).",
+                " With {} of each size it is a rough figure: it takes {RECORDS_FOR_90} records of each size, all found, to show 90 % \
+                 with 90 % confidence (--records {RECORDS_FOR_90}).",
                 counted(records as u64, "record")
             ),
             false => String::new(),
