@@ -45,8 +45,8 @@ fn what_was_read_is_told_in_the_contracts_order() {
     let (record, warnings) = try_parse(text.as_bytes(), &columns).unwrap();
     assert_eq!(
         record.understood(&columns),
-        "time_s from t_ms, rate_out_dps from gx_dps, die_degc from temp (degC assumed), flow \
-         (to leave a column out: ignore = [\"flow\"] in [record])"
+        "time_s from t_ms, rate_out_dps from gx_dps, die_degc from temp (degC assumed); further measured quantities, which \
+         `close` tries as causes: flow (to leave a column out: ignore = [\"flow\"] in [record])"
     );
     assert_eq!(
         record.rows_understood(&warnings, None),

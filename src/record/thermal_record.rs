@@ -158,7 +158,7 @@ impl ThermalRecord {
             let is_said = mapping.units.contains_key(name) || units::stated(file, name).is_some();
             !is_said && !self.is_of_log() && record_columns::unit_of(name) != "1"
         };
-        let said = names.into_iter().map(|name| match self.renamed.get(name) {
+        let tell = |name: &str| match self.renamed.get(name) {
             Some(file) if assumed(name, file) => {
                 format!(
                     "{name} from {file} ({} assumed)",
@@ -167,17 +167,25 @@ impl ThermalRecord {
             }
             Some(file) => format!("{name} from {file}"),
             None => name.to_owned(),
-        });
-        let mut text = said.collect::<Vec<_>>().join(", ");
+        };
+        let (known, others): (Vec<&str>, Vec<&str>) = names
+            .into_iter()
+            .partition(|name| record_columns::is_known(name));
+        let listed = |names: &[&str]| {
+            let told: Vec<String> = names.iter().map(|name| tell(name)).collect();
+            told.join(", ")
+        };
+        let mut text = listed(&known);
+        if let Some(other) = others.first() {
+            text.push_str(&format!(
+                "; further measured quantities, which `close` tries as causes: {} (to leave a column out: ignore = [\"{other}\"] in \
+                 [record])",
+                listed(&others)
+            ));
+        }
         if !mapping.ignore.is_empty() {
             let names: Vec<&str> = mapping.ignore.keys().map(String::as_str).collect();
             text.push_str(&format!("; left out: {}", names.join(", ")));
-        }
-        let mut others = self.columns.keys();
-        if let Some(other) = others.find(|name| !record_columns::is_known(name)) {
-            text.push_str(&format!(
-                " (to leave a column out: ignore = [\"{other}\"] in [record])"
-            ));
         }
         text
     }
