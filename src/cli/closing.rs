@@ -213,7 +213,8 @@ fn table(c: &Closure) -> comfy_table::Table {
     // A cause that another effect explains as well is told with its rivals; mostly there are none.
     let rivals = has_rivals(c);
     let mut headers = vec!["cause", "parameters", "held-out rms", "p"];
-    headers.extend(rivals.then_some("cannot be told from"));
+    // In two lines: beside long parameters the table keeps to 100 columns.
+    headers.extend(rivals.then_some("cannot be\ntold from"));
     let mut table = super::terminal::table(&headers);
     for s in &c.steps {
         let parameters = s.parameters.iter().map(|(name, v)| {
@@ -317,7 +318,7 @@ fn sentence(c: &Closure, has_others: bool) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Said, polynomial, sentence, with_deviation};
+    use super::{Said, polynomial, sentence, table, with_deviation};
     use crate::record::Warning;
     use crate::verdict::{Closure, Errors, FirmwareErrors, SCHEMA, Step, Structure, Verdict};
     use std::collections::BTreeMap;
@@ -414,6 +415,18 @@ mod tests {
         );
         both.warnings.clear();
         assert!(!sentence(&both, true).contains("direction"));
+    }
+
+    #[test]
+    fn rivals_stand_under_what_they_are() {
+        let mut c = closure("deg/s", 1);
+        assert!(!table(&c).to_string().contains("told from"));
+        c.steps[0].indistinguishable_from = vec!["ageing_drift".to_owned()];
+        let told = table(&c).to_string();
+        assert!(
+            told.contains("cannot be") && told.contains("told from"),
+            "{told}"
+        );
     }
 
     #[test]
