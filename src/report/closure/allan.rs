@@ -84,6 +84,22 @@ fn logs(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     positive.map(|p| (p.0.log10(), p.1.log10())).collect()
 }
 
+/// Shares of the frame within which two labels would touch: the height of a line of text, and what two texts take of the width of a
+/// telephone (convention).
+const LABEL_HEIGHT_SHARE: f64 = 0.08;
+const LABEL_WIDTH_SHARE: f64 = 0.9;
+
+/// How far along an axis a value lies, as a share of it.
+fn share(axis: &Axis, value: f64) -> f64 {
+    (value - axis.interval.low) / (axis.interval.high - axis.interval.low)
+}
+
+/// Whether labels at two places would touch.
+fn touch(one: &(f64, f64), other: &(f64, f64), [x, y]: [&Axis; 2]) -> bool {
+    let apart = |axis: &Axis, a: f64, b: f64| (share(axis, a) - share(axis, b)).abs();
+    apart(x, one.0, other.0) < LABEL_WIDTH_SHARE && apart(y, one.1, other.1) < LABEL_HEIGHT_SHARE
+}
+
 fn drawn(view: &View, curves: &[(&str, Vec<(f64, f64)>)], period_s: f64, width: f64) -> Figure {
     let noise = &view.closed.after.fit.noise;
     let taus: Vec<f64> = curves
@@ -142,12 +158,15 @@ fn drawn(view: &View, curves: &[(&str, Vec<(f64, f64)>)], period_s: f64, width: 
     let mut frame = svg
         .frame(300.0, 78.0, x.clone(), y.clone())
         .logarithmic(&x, &y);
+    let mut labelled: Vec<(f64, f64)> = Vec::new();
     for (words, line) in &parts {
         frame.line("bound", line);
-        if let (Some((at, level)), true) = (line.last(), line.len() > 1) {
-            let share = (at - x.interval.low) / (x.interval.high - x.interval.low);
-            let anchor = if share > 0.6 { "end" } else { "start" };
-            frame.note("slope", (*at, *level), anchor, words);
+        let ends = [line.last(), line.first()].into_iter().flatten();
+        let mut free = ends.filter(|end| !labelled.iter().any(|l| touch(l, end, [&x, &y])));
+        if let (Some(&(at, level)), true) = (free.next(), line.len() > 1) {
+            let anchor = if share(&x, at) > 0.6 { "end" } else { "start" };
+            frame.note("slope", (at, level), anchor, words);
+            labelled.push((at, level));
         }
     }
     for (class, points) in &data {
