@@ -339,14 +339,17 @@ pub(super) fn why_not(
         ));
         said.extend(off_the_front(work, near));
         let held = |margin| held(work, near.checked, objective, margin);
-        said.push(limits_to_ask_for(&held(1.0), &held(MARGIN)));
+        said.push(limits_to_ask_for(
+            &held(1.0),
+            &held(NEW_STUDY_MARGIN_FACTOR),
+        ));
     }
     said.join(". ")
 }
 
 /// What a figure's limit is raised by, so that a new study, which measures on noise of its own, is likely to meet it too
 /// (convention).
-const MARGIN: f64 = 1.1;
+const NEW_STUDY_MARGIN_FACTOR: f64 = 1.1;
 
 /// A figure times a margin, rounded up to two digits.
 fn with_margin(value: f64, margin: f64) -> String {
@@ -450,8 +453,8 @@ mod tests {
 
     #[test]
     fn a_limit_for_a_new_study_has_a_margin_and_is_not_promised() {
-        assert_eq!(with_margin(2.32e-4, MARGIN), "0.00026");
-        assert_eq!(with_margin(0.0123, MARGIN), "0.014");
+        assert_eq!(with_margin(2.32e-4, NEW_STUDY_MARGIN_FACTOR), "0.00026");
+        assert_eq!(with_margin(0.0123, NEW_STUDY_MARGIN_FACTOR), "0.014");
         let costs = limits_to_ask_for("rom_bytes<=4100", "rom_bytes<=4100");
         assert_eq!(
             costs,
