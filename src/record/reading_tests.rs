@@ -62,7 +62,7 @@ fn what_was_read_is_told_in_the_contracts_order() {
     assert!(
         record
             .understood(&columns)
-            .contains("die_degc from temp, flow"),
+            .contains("die_degc from temp; further measured quantities, "),
         "{}",
         record.understood(&columns)
     );

@@ -42,7 +42,7 @@ mod tests {
         assert_eq!(late_starts("none", &[]), None);
         let said = late_starts("2 points dropped", &[late(2.341e-4), late(1.4501e-3)]).unwrap();
         for part in [
-            "as large as 0.000234 to 0.00146 deg/s. The limit of the bias, 1.00e-4 deg/s, is also the limit of this error. ",
+            "as large as 0.000234 to 0.00146 deg/s. The limit of the bias, 0.000100 deg/s, is also the limit of this error. ",
             "only where no design is chosen for a target. ",
             "`bias_dps<=0.00146`",
         ] {
